@@ -1,0 +1,102 @@
+"""The one exception family: every error that a user can cause, and what the program says about it.
+
+    StationError                what is wrong, where, what to do; exit code 1
+    ├── InputError              a file's content is wrong; carries every `Problem` found in it
+    ├── OutputError             a result cannot be written (exists already, no room, no permission)
+    ├── MachineError            a pose or path the machine cannot take
+    │   ├── KinematicsError     the forward kinematics found no pose for these strut lengths
+    │   └── TravelError         a pose or strut length outside the travel
+    ├── TraceError              a recording that does not show the circle it should
+    ├── ModelError              a source needs what it was not given, or is not known
+    ├── CalibrationError        the recordings do not carry the fit that was asked for
+    └── InstrumentError         the port, the wire or the instrument
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+@dataclass(frozen=True, order=True)
+class Problem:
+    """One fault in one place of a file; `line` and `column` count from 1, 0 where unknown."""
+
+    file: str
+    line: int
+    column: int
+    what: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        """Return `file:line:column: what; remedy`, the form that editors jump to."""
+        place = self.file
+        if self.line:
+            place += f":{self.line}"
+            if self.column:
+                place += f":{self.column}"
+        return f"{place}: {self.what}" + (f"; {self.remedy}" if self.remedy else "")
+
+
+class StationError(Exception):
+    """Base of all errors that a user can cause.
+
+    Args:
+        what: what is wrong, one sentence without a full stop.
+        where: file, port, run or pose it concerns.
+        remedy: what the user can do about it.
+    """
+
+    def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
+        self.what = what
+        self.where = where
+        self.remedy = remedy
+        super().__init__(what, where, remedy)
+
+    def __str__(self) -> str:
+        """Return `where: what; remedy` on one line."""
+        text = f"{self.where}: {self.what}" if self.where else self.what
+        return f"{text}; {self.remedy}" if self.remedy else text
+
+
+class InputError(StationError):
+    """A file's content is wrong; every fault found is listed, not only the first."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(sorted(problems))
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+class OutputError(StationError):
+    """A result cannot be written."""
+
+
+class MachineError(StationError):
+    """A pose or path that the machine cannot take."""
+
+
+class KinematicsError(MachineError):
+    """The forward kinematics found no pose for these strut lengths."""
+
+
+class TravelError(MachineError):
+    """A pose or strut length outside the travel."""
+
+
+class TraceError(StationError):
+    """A recording that does not show the circle it should."""
+
+
+class ModelError(StationError):
+    """An error source needs what it was not given, or is not known."""
+
+
+class CalibrationError(StationError):
+    """The recordings do not carry the fit that was asked for."""
+
+
+class InstrumentError(StationError):
+    """The port, the wire or the instrument."""

@@ -1,0 +1,45 @@
+"""How numerical kernels are compiled and spread over the processor's cores."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+import numba
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Kernel = TypeVar("Kernel", bound="Callable[..., Any]")
+
+SMALLEST_BLOCK = 2048
+"""Poses per thread below which starting a thread costs more than it gains."""
+
+
+def compiled(kernel: Kernel) -> Kernel:
+    """Compile a loop to machine code at its first call and keep the code on disk for the next process.
+
+    The kernel runs without Python's global lock, so that `in_blocks` can run it on all cores. Numba's own
+    parallel loops are not used: their default thread layer aborts the process when two threads enter it.
+    """
+    return cast("Kernel", numba.njit(cache=True, nogil=True, error_model="numpy")(kernel))
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(max_workers=os.cpu_count(), thread_name_prefix="kernel")
+
+
+def in_blocks(kernel: Callable[[int, int], None], count: int) -> None:
+    """Call `kernel(start, stop)` for blocks that cover `range(count)`, on all cores where that pays."""
+    workers = min(os.cpu_count() or 1, count // SMALLEST_BLOCK)
+    if workers <= 1:
+        kernel(0, count)
+        return
+    edges = [count * worker // workers for worker in range(workers + 1)]
+    blocks = [_pool().submit(kernel, start, stop) for start, stop in pairwise(edges)]
+    for block in blocks:
+        block.result()

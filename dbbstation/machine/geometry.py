@@ -1,0 +1,90 @@
+"""What a hexapod is: its joints, its travel, its screws and masses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.rotation import Rotation
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+STRUTS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Hexapod:
+    """Joints of a Stewart platform [CAL Fig 1], either as designed or as a particular machine has them.
+
+    Attributes:
+        base_joints_mm: Q, machine frame, shape (6, 3), or (n, 6, 3) where they move from sample to sample [mm].
+        platform_joints_mm: P, platform frame with its origin at the tool tip, shape (6, 3) or (n, 6, 3) [mm].
+        rotation: convention of the tilt angles.
+    """
+
+    base_joints_mm: NDArray[np.float64]
+    platform_joints_mm: NDArray[np.float64]
+    rotation: Rotation = Rotation.XYZ
+
+    def moved(self, base_mm: NDArray[np.float64], platform_mm: NDArray[np.float64]) -> Hexapod:
+        """Return the same hexapod with joints shifted by these amounts, shapes (6, 3) or (n, 6, 3) [mm]."""
+        return replace(
+            self,
+            base_joints_mm=self.base_joints_mm + base_mm,
+            platform_joints_mm=self.platform_joints_mm + platform_mm,
+        )
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Limits of the machine, each a pair (least, greatest)."""
+
+    xy_radius_mm: float
+    x_mm: tuple[float, float]
+    y_mm: tuple[float, float]
+    z_mm: tuple[float, float]
+    a_deg: tuple[float, float]
+    b_deg: tuple[float, float]
+    c_deg: tuple[float, float]
+    strut_mm: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Masses:
+    """What gravity acts on; a part that is not known is None.
+
+    Attributes:
+        platform_kg: platform with spindle [kg].
+        centre_of_gravity_above_tip_mm: on the platform's axis, from the tool tip [mm].
+    """
+
+    platform_kg: float
+    centre_of_gravity_above_tip_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """The nominal machine: what its controller believes.
+
+    Attributes:
+        name: as the machine file has it.
+        hexapod: nominal joints.
+        travel: limits.
+        reference_length_error_mm: already corrected by the controller, which drives strut i to
+            F_i(T) minus this, shape (6,) [mm].
+        screw_lead_mm: travel of a strut per turn of its screw [mm]; None where not known.
+        masses: what gravity acts on; None where not known.
+        joint_tolerance_mm: standard deviation of a base-joint coordinate after assembly [mm]; None
+            where not known.
+    """
+
+    name: str
+    hexapod: Hexapod
+    travel: Travel
+    reference_length_error_mm: NDArray[np.float64] = field(default_factory=lambda: np.zeros(STRUTS))
+    screw_lead_mm: float | None = None
+    masses: Masses | None = None
+    joint_tolerance_mm: float | None = None

@@ -1,0 +1,216 @@
+"""Inverse and forward kinematics of the hexapod, and how a bar reading answers to every strut."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import KinematicsError
+from dbbstation.machine import kernels
+from dbbstation.machine.compiled import in_blocks
+from dbbstation.machine.geometry import STRUTS, Hexapod
+from dbbstation.machine.rotation import Frames
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+TOLERANCE_MM = 1e-10
+"""Strut length residual at which the forward kinematics is content."""
+
+MOST_STEPS = 25
+"""Newton steps: three do from a commanded pose; more than ten mean that there is no pose nearby."""
+
+
+@dataclass(frozen=True)
+class Struts:
+    """Struts at given poses.
+
+    Attributes:
+        length_mm: distances between the joints, shape (n, 6) [mm].
+        unit: vectors from base joint to platform joint, machine frame, shape (n, 6, 3) [1].
+        arm_mm: R P, from tool tip to platform joint in machine axes, shape (n, 6, 3) [mm].
+    """
+
+    length_mm: NDArray[np.float64]
+    unit: NDArray[np.float64]
+    arm_mm: NDArray[np.float64]
+
+
+def inverse(hexapod: Hexapod, frames: Frames) -> Struts:
+    """Strut lengths and directions at the poses `frames` [CAL eq 1]."""
+    count = len(frames)
+    struts = Struts(np.empty((count, STRUTS)), np.empty((count, STRUTS, 3)), np.empty((count, STRUTS, 3)))
+    base, platform = _joints(hexapod, count)
+
+    def block(start: int, stop: int) -> None:
+        kernels.strut_vectors(
+            start,
+            stop,
+            frames.position_mm,
+            frames.rotation,
+            base,
+            platform,
+            struts.length_mm,
+            struts.unit,
+            struts.arm_mm,
+        )
+
+    in_blocks(block, count)
+    return struts
+
+
+def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> Frames:
+    """Poses at which the struts have these lengths [CAL eq 2].
+
+    Args:
+        hexapod: joints.
+        length_mm: strut lengths, shape (n, 6) [mm].
+        near: where Newton-Raphson starts, usually the commanded poses.
+
+    Returns:
+        Frames that reproduce `length_mm` within 1e-10 mm.
+
+    Raises:
+        KinematicsError: no pose found; names the first such pose.
+    """
+    count = len(near)
+    position, rotation = near.position_mm.copy(), near.rotation.copy()
+    target = np.ascontiguousarray(length_mm)
+    outcome = np.empty(count, dtype=np.int64)
+    base, platform = _joints(hexapod, count)
+
+    def block(start: int, stop: int) -> None:
+        kernels.forward(
+            start,
+            stop,
+            target,
+            base,
+            platform,
+            TOLERANCE_MM,
+            MOST_STEPS,
+            position,
+            rotation,
+            outcome,
+        )
+
+    in_blocks(block, count)
+    failed = (outcome != kernels.CONVERGED) | ~np.isfinite(position).all(axis=1) | ~np.isfinite(target).all(axis=1)
+    if failed.any():
+        _refuse(int(np.argmax(failed)), near, hexapod, target, singular=bool(outcome[failed][0] == kernels.SINGULAR))
+    return Frames(position, rotation)
+
+
+def strut_jacobian(struts: Struts) -> NDArray[np.float64]:
+    """J = dL / d(t, w) = [u, (R P) x u], shape (n, 6, 6): columns [mm/mm] three times, [mm/rad] three times."""
+    return np.concatenate([struts.unit, np.cross(struts.arm_mm, struts.unit)], axis=2)
+
+
+@dataclass(frozen=True)
+class BarSensitivity:
+    """A bar's length and its derivatives at given poses, per unit of each machine error.
+
+    Attributes:
+        length_mm: distance between the ball centres, shape (n,) [mm].
+        direction: unit vector from the fixed to the moving ball, shape (n, 3) [1].
+        per_strut: dl/dL, shape (n, 6) [mm/mm].
+        per_base_joint: dl/dQ, shape (n, 6, 3) [mm/mm].
+        per_platform_joint: dl/dP, platform axes, shape (n, 6, 3) [mm/mm].
+        per_tool_ball: dl/do, platform axes, with the platform held, shape (n, 3) [mm/mm].
+    """
+
+    length_mm: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    per_strut: NDArray[np.float64]
+    per_base_joint: NDArray[np.float64]
+    per_platform_joint: NDArray[np.float64]
+    per_tool_ball: NDArray[np.float64]
+
+
+def bar_sensitivity(
+    hexapod: Hexapod,
+    frames: Frames,
+    fixed_ball_mm: NDArray[np.float64],
+    tool_ball_mm: NDArray[np.float64] | None = None,
+) -> BarSensitivity:
+    """Length of the bar and its analytic derivatives by the adjoint: one 6x6 solve per pose.
+
+    [CAL II-D] says that the sensitivity matrix "can be computed only numerically"; by the implicit function
+    theorem it is analytic: a strut error dL moves the pose by J^-1 dL, so with n the bar's direction and
+    J^T g = [n, (R o) x n] the bar feels g dL, and joint shifts enter as strut errors u dQ and -u R dP.
+
+    Args:
+        hexapod: the actual joints.
+        frames: the actual poses.
+        fixed_ball_mm: centre of the ball on the table, machine frame, shape (3,) or (n, 3) [mm].
+        tool_ball_mm: centre of the moving ball in the platform frame, shape (3,) or (n, 3) [mm];
+            the tool tip by default.
+
+    Raises:
+        KinematicsError: a pose where the platform can move with its struts locked.
+    """
+    count = len(frames)
+    tool = np.zeros(3) if tool_ball_mm is None else tool_ball_mm
+    lever = np.einsum("nij,...j->ni", frames.rotation, tool) if tool.ndim == 1 else _turned(frames.rotation, tool)
+    span = frames.position_mm + lever - fixed_ball_mm
+    length = np.linalg.norm(span, axis=1)
+    direction = span / length[:, None]
+    moment = np.cross(lever, direction)
+    struts = inverse(hexapod, frames)
+    gain = np.empty((count, STRUTS))
+    outcome = np.empty(count, dtype=np.int64)
+
+    def block(start: int, stop: int) -> None:
+        kernels.adjoint(start, stop, struts.unit, struts.arm_mm, direction, moment, gain, outcome)
+
+    in_blocks(block, count)
+    if (outcome != kernels.CONVERGED).any():
+        where = int(np.argmax(outcome != kernels.CONVERGED))
+        _refuse(where, frames, hexapod, struts.length_mm, singular=True)
+    per_base = gain[:, :, None] * struts.unit
+    return BarSensitivity(
+        length_mm=length,
+        direction=direction,
+        per_strut=gain,
+        per_base_joint=per_base,
+        per_platform_joint=-per_base @ frames.rotation,
+        per_tool_ball=_turned(np.swapaxes(frames.rotation, 1, 2), direction),
+    )
+
+
+def _turned(rotation: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Each vector, shape (n, 3), turned by its own matrix, shape (n, 3, 3)."""
+    turned: NDArray[np.float64] = np.einsum("nij,nj->ni", rotation, vector)
+    return turned
+
+
+def _joints(hexapod: Hexapod, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Joints as the kernels take them: shape (1, 6, 3) or (n, 6, 3), contiguous."""
+    base, platform = (
+        np.ascontiguousarray(joints if joints.ndim > 2 else joints[None], dtype=np.float64)  # noqa: PLR2004
+        for joints in (hexapod.base_joints_mm, hexapod.platform_joints_mm)
+    )
+    for joints in (base, platform):
+        if joints.shape not in {(1, STRUTS, 3), (count, STRUTS, 3)}:
+            raise ValueError(f"joints of shape {joints.shape} do not fit {count} poses")
+    return base, platform
+
+
+def _refuse(
+    where: int,
+    frames: Frames,
+    hexapod: Hexapod,
+    length_mm: NDArray[np.float64],
+    *,
+    singular: bool,
+) -> None:
+    pose = frames.to_poses(hexapod.rotation)[where]
+    lengths = ", ".join(f"{length:.3f}" for length in length_mm[where])
+    why = "the platform is loose there (singular pose)" if singular else "no pose has these strut lengths"
+    raise KinematicsError(
+        f"{why}: struts {lengths} mm, searched from X {pose[0]:.3f} Y {pose[1]:.3f} Z {pose[2]:.3f} mm "
+        f"A {pose[3]:.4f} B {pose[4]:.4f} C {pose[5]:.4f} deg",
+        where=f"pose {where + 1}",
+        remedy="check the machine file's joints and the commanded pose",
+    )

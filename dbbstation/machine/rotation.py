@@ -1,0 +1,69 @@
+"""Orientation of the platform: the two conventions for the tilt angles A, B, C, and frames made of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+class Rotation(StrEnum):
+    """How A, B and C make the rotation matrix R that turns platform vectors into machine vectors."""
+
+    XYZ = "Rx(A) Ry(B) Rz(C)"
+    ZYX = "Rz(C) Ry(B) Rx(A)"
+    """As LinuxCNC's `genhexkins` has it."""
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Poses as position and rotation matrix, the form that kinematics works in.
+
+    Attributes:
+        position_mm: tool tip in the machine frame, shape (n, 3) [mm].
+        rotation: platform axes in the machine frame, shape (n, 3, 3) [1].
+    """
+
+    position_mm: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.position_mm)
+
+    @classmethod
+    def from_poses(cls, poses: NDArray[np.float64], convention: Rotation) -> Frames:
+        """Frames of poses `[X, Y, Z, A, B, C]`, shape (n, 6) [mm, deg]."""
+        return cls(np.ascontiguousarray(poses[:, :3]), rotation_matrices(poses[:, 3:], convention))
+
+    def to_poses(self, convention: Rotation) -> NDArray[np.float64]:
+        """Poses `[X, Y, Z, A, B, C]`, shape (n, 6) [mm, deg]; A and C within ±180, B within ±90 degrees."""
+        return np.hstack([self.position_mm, tilt_angles(self.rotation, convention)])
+
+
+def rotation_matrices(tilt_deg: NDArray[np.float64], convention: Rotation) -> NDArray[np.float64]:
+    """Rotation matrices, shape (n, 3, 3), of the angles A, B, C, shape (n, 3) [deg]."""
+    a, b, c = np.radians(tilt_deg.T)
+    zero, one = np.zeros_like(a), np.ones_like(a)
+    about_x = np.array([[one, zero, zero], [zero, np.cos(a), -np.sin(a)], [zero, np.sin(a), np.cos(a)]])
+    about_y = np.array([[np.cos(b), zero, np.sin(b)], [zero, one, zero], [-np.sin(b), zero, np.cos(b)]])
+    about_z = np.array([[np.cos(c), -np.sin(c), zero], [np.sin(c), np.cos(c), zero], [zero, zero, one]])
+    factors = [np.moveaxis(factor, -1, 0) for factor in (about_x, about_y, about_z)]
+    if convention is Rotation.ZYX:
+        factors.reverse()
+    return np.ascontiguousarray(factors[0] @ factors[1] @ factors[2])
+
+
+def tilt_angles(rotation: NDArray[np.float64], convention: Rotation) -> NDArray[np.float64]:
+    """Angles A, B, C, shape (n, 3) [deg], of rotation matrices, shape (n, 3, 3)."""
+    # Rx Ry Rz is the transpose of Rz(-C) Ry(-B) Rx(-A), so one extraction serves both conventions.
+    sign = -1.0 if convention is Rotation.XYZ else 1.0
+    r = np.swapaxes(rotation, 1, 2) if convention is Rotation.XYZ else rotation
+    a = np.arctan2(r[:, 2, 1], r[:, 2, 2])
+    b = np.arctan2(-r[:, 2, 0], np.hypot(r[:, 2, 1], r[:, 2, 2]))
+    c = np.arctan2(r[:, 1, 0], r[:, 0, 0])
+    return sign * np.degrees(np.column_stack([a, b, c]))

@@ -1,0 +1,62 @@
+"""Whether the machine can reach a pose: limits of axes, tilt angles and struts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import TravelError
+from dbbstation.machine.geometry import STRUTS, Machine
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+ROUNDING = 1e-9
+"""A pose on the limit itself is inside; rounding must not decide [mm or deg]."""
+
+
+def check_travel(machine: Machine, poses: NDArray[np.float64], *, where: str) -> None:
+    """Refuse poses, shape (n, 6) [mm, deg], that leave the travel of the nominal machine.
+
+    Raises:
+        TravelError: names `where`, the first pose outside, the limit that it breaks most and by how much.
+    """
+    quantities = _limited_quantities(machine, poses)
+    excess = np.stack([np.maximum(low - value, value - high) for _, _, value, low, high in quantities])
+    # A quantity that is not a number is outside as well.
+    outside = ~(excess <= ROUNDING)
+    if not outside.any():
+        return
+    pose_number = int(np.argmax(outside.any(axis=0)))
+    worst = int(np.argmax(np.where(np.isnan(excess[:, pose_number]), np.inf, excess[:, pose_number])))
+    name, unit, value, low, high = quantities[worst]
+    pose = " ".join(f"{axis} {coordinate:.3f}" for axis, coordinate in zip("XYZABC", poses[pose_number], strict=True))
+    raise TravelError(
+        f"{name} is {value[pose_number]:.3f} {unit}, its travel {low:g} to {high:g} {unit} (at {pose})",
+        where=f"{where}, pose {pose_number + 1} of {len(poses)}",
+        remedy="move the circle, make it smaller or tilt it less",
+    )
+
+
+def _limited_quantities(
+    machine: Machine,
+    poses: NDArray[np.float64],
+) -> list[tuple[str, str, NDArray[np.float64], float, float]]:
+    """Name, unit, value per pose and limits of everything that has limits."""
+    travel = machine.travel
+    radius = np.hypot(poses[:, 0], poses[:, 1])
+    lengths = inverse(machine.hexapod, Frames.from_poses(poses, machine.hexapod.rotation)).length_mm
+    driven = lengths - machine.reference_length_error_mm
+    return [
+        ("the distance from the Z axis", "mm", radius, 0.0, travel.xy_radius_mm),
+        ("X", "mm", poses[:, 0], *travel.x_mm),
+        ("Y", "mm", poses[:, 1], *travel.y_mm),
+        ("Z", "mm", poses[:, 2], *travel.z_mm),
+        ("A", "deg", poses[:, 3], *travel.a_deg),
+        ("B", "deg", poses[:, 4], *travel.b_deg),
+        ("C", "deg", poses[:, 5], *travel.c_deg),
+        *((f"strut {i + 1}", "mm", driven[:, i], *travel.strut_mm) for i in range(STRUTS)),
+    ]

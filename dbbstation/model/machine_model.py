@@ -1,0 +1,159 @@
+"""The machine as it is: from what is commanded to where the tool goes and what a ball bar reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import BarSensitivity, bar_sensitivity, forward, inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.contract import Effect, Fitted, Motion, Owner
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Hexapod, Machine
+
+
+@dataclass(frozen=True, eq=False)
+class MachineModel:
+    """Nominal geometry plus error sources.
+
+    Attributes:
+        machine: what the controller believes.
+        sources: what is different, with its size; sources of every owner may stand here, and each acts on
+            the motions that share its set.
+    """
+
+    machine: Machine
+    sources: tuple[Fitted, ...] = ()
+
+    def of_the_machine(self) -> MachineModel:
+        """Return the model with the machine's own sources only: what holds for any program."""
+        return replace(self, sources=tuple(f for f in self.sources if f.source.belongs_to is Owner.MACHINE))
+
+    def effect(self, motion: Motion) -> Effect:
+        """All sources together.
+
+        Raises:
+            ModelError: a source needs what the motion does not give.
+        """
+        total = Effect()
+        for fitted in self.sources:
+            if fitted.shared == fitted.source.shared_by(motion):
+                fitted.source.require(motion)
+                total += fitted.source.effect(motion, self.machine, fitted.values)
+        return total
+
+    def driven_mm(self, frames: Frames) -> NDArray[np.float64]:
+        """Strut lengths that the controller drives to for commanded poses, shape (n, 6) [mm]."""
+        return inverse(self.machine.hexapod, frames).length_mm - self.machine.reference_length_error_mm
+
+    def actual(self, motion: Motion) -> Actual:
+        """Where the platform really goes: F^-1(driven + strut errors; actual joints) [CAL eq 2].
+
+        Raises:
+            KinematicsError: names the first pose that the actual machine cannot take.
+            ModelError: a source needs what the motion does not give.
+        """
+        commanded = Frames.from_poses(motion.poses, self.machine.hexapod.rotation)
+        effect = self.effect(motion)
+        hexapod = actual_hexapod(self.machine.hexapod, effect)
+        frames = forward(hexapod, self.driven_mm(commanded) + _strut_errors(effect), commanded)
+        return Actual(hexapod, frames, effect)
+
+    def actual_poses(self, motion: Motion) -> NDArray[np.float64]:
+        """Poses of the real tool tip, shape (n, 6) [mm, deg], for the rows that count."""
+        return self.actual(motion).tool_frames().to_poses(self.machine.hexapod.rotation)[motion.kept]
+
+    def bar(self, motion: Motion) -> BarReading:
+        """What a bar about the motion's fixed ball reads, and how that answers to every error, kept rows only."""
+        if motion.setup is None:
+            raise ValueError("a motion without a set-up has no bar")
+        actual = self.actual(motion)
+        ball = motion.setup.fixed_ball_mm
+        if actual.effect.fixed_ball_mm is not None:
+            ball = ball + actual.effect.fixed_ball_mm
+        sensitivity = bar_sensitivity(actual.hexapod, actual.frames, ball, actual.effect.tool_tip_mm)
+        reading = np.zeros(1) if actual.effect.reading_mm is None else actual.effect.reading_mm
+        length = sensitivity.length_mm + reading
+        return BarReading(motion, length[motion.kept], sensitivity)
+
+
+@dataclass(frozen=True, eq=False)
+class Actual:
+    """Joints, platform poses and effects of the real machine along a motion."""
+
+    hexapod: Hexapod
+    frames: Frames
+    effect: Effect
+
+    def tool_frames(self) -> Frames:
+        """Frames of the real tool tip: the platform's, shifted by what sits between platform and tip."""
+        tip = self.effect.tool_tip_mm
+        if tip is None:
+            return self.frames
+        shift = np.einsum("nij,nj->ni", self.frames.rotation, np.broadcast_to(tip, (len(self.frames), 3)))
+        return Frames(self.frames.position_mm + shift, self.frames.rotation)
+
+
+@dataclass(frozen=True, eq=False)
+class BarReading:
+    """Predicted readings of one run.
+
+    Attributes:
+        motion: the run.
+        length_mm: predicted reading at the rows that count, shape (n,) [mm].
+        sensitivity: at all rows of the motion.
+    """
+
+    motion: Motion
+    length_mm: NDArray[np.float64]
+    sensitivity: BarSensitivity
+
+    def by_parameters(self, derivative: Effect) -> NDArray[np.float64]:
+        """Derivative of the reading by p parameters, shape (n, p), from that of an effect; kept rows only."""
+        s, kept = self.sensitivity, self.motion.kept
+        channels = (
+            (derivative.strut_mm, s.per_strut, 1),
+            (derivative.base_joint_mm, s.per_base_joint, 2),
+            (derivative.platform_joint_mm, s.per_platform_joint, 2),
+            (derivative.tool_tip_mm, s.per_tool_ball, 1),
+            (derivative.fixed_ball_mm, -s.direction, 1),
+        )
+        total: NDArray[np.float64] | float = 0.0
+        for array, gain, axes in channels:
+            if array is not None:
+                total = total + _contract(gain[kept], array if array.ndim == axes + 1 else array[kept], axes)
+        if derivative.reading_mm is not None:
+            reading = derivative.reading_mm
+            total = total + (reading if reading.ndim == 1 else reading[kept])
+        count = len(self.length_mm)
+        parameters = np.shape(total)[-1] if np.ndim(total) else 0
+        return np.ascontiguousarray(np.broadcast_to(total, (count, parameters)))
+
+
+def _contract(gain: NDArray[np.float64], array: NDArray[np.float64], axes: int) -> NDArray[np.float64]:
+    """Sum gain times array over struts and coordinates; the array is constant or has one entry per sample."""
+    count, parameters = len(gain), array.shape[-1]
+    flat = gain.reshape(count, -1)
+    if array.ndim == axes + 1:
+        return flat @ array.reshape(-1, parameters)
+    per_sample: NDArray[np.float64] = np.einsum("ni,nip->np", flat, array.reshape(count, -1, parameters))
+    return per_sample
+
+
+def actual_hexapod(nominal: Hexapod, effect: Effect) -> Hexapod:
+    """Joints with the effect's joint errors on them."""
+    none = np.zeros((STRUTS, 3))
+    return nominal.moved(
+        none if effect.base_joint_mm is None else effect.base_joint_mm,
+        none if effect.platform_joint_mm is None else effect.platform_joint_mm,
+    )
+
+
+def _strut_errors(effect: Effect) -> NDArray[np.float64]:
+    return np.zeros(STRUTS) if effect.strut_mm is None else effect.strut_mm

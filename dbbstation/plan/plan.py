@@ -1,0 +1,81 @@
+"""A test plan: which balls stand where, which circles are run about them, how well their places are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from dbbstation.machine.travel import check_travel
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.circle import Circle, Direction
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball on the table, as the coordinate measuring machine (CMM) knows it.
+
+    Attributes:
+        name: its key in the plan.
+        bore: bore of the jig plate it stands in; None where it stands in no bore.
+        holder: what it stands on.
+        centre_mm: centre in the machine frame (x, y, z) [mm].
+        uncertainty_mm: of the CMM, one standard deviation per axis [mm].
+        repeatability_mm: of putting the holder up, one standard deviation per axis [mm].
+    """
+
+    name: str
+    bore: int | None
+    holder: str
+    centre_mm: tuple[float, float, float]
+    uncertainty_mm: float
+    repeatability_mm: float
+
+
+@dataclass(frozen=True)
+class PlannedTest:
+    """One test: a ball and the circle about it, run in one or both directions.
+
+    Attributes:
+        name: unique in the plan.
+        ball: the ball on the table.
+        circle: the circle in the first of its directions.
+        directions: senses of travel, in the order they are run.
+    """
+
+    name: str
+    ball: Ball
+    circle: Circle
+    directions: tuple[Direction, ...]
+
+    def run(self, direction: Direction) -> Circle:
+        """Return the circle of one run."""
+        return replace(self.circle, direction=direction)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Tests by name, in the order they are run.
+
+    Attributes:
+        name: as the plan file has it.
+        tests: by name.
+        repeat_at_end: tests measured a second time after all others, so that drift and height do not mix.
+    """
+
+    name: str
+    tests: Mapping[str, PlannedTest]
+    repeat_at_end: tuple[str, ...] = ()
+
+    def check(self, machine: Machine) -> None:
+        """Dry-run every circle, feed-in and feed-out included, against the machine's travel.
+
+        Raises:
+            TravelError: names test, direction, pose and limit.
+        """
+        for test in self.tests.values():
+            for direction in test.directions:
+                check_travel(machine, test.run(direction).envelope(), where=f"test {test.name} {direction}")

@@ -1,0 +1,280 @@
+"""The contract of an error source: what it is given, what it declares, what it answers.
+
+A machine model is its nominal geometry plus a list of error sources. A source is asked for its `effect` on a
+`Motion` and for the derivative of that effect by each of its parameters. It never sees a measured length, and
+never changes anything but struts, joints, the tool tip, the bar's reading or a motor's current.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+
+from dbbstation.errors import ModelError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+
+class Owner(StrEnum):
+    """What a source belongs to. Only what is the machine's is predicted and compensated elsewhere."""
+
+    MACHINE = "machine"
+    SESSION = "session"
+    MOUNTING = "mounting"
+    INSTRUMENT = "instrument"
+
+
+class Need(StrEnum):
+    """What a source must be given beside the machine."""
+
+    POSE = "pose"
+    PATH = "path"
+    TIME = "time"
+    TEMPERATURE = "temperature"
+    CURRENT = "current"
+
+
+@dataclass(frozen=True)
+class Setup:
+    """How a run was set up: which ball, which mounting, which bar, and how well each is known.
+
+    Names are unique over all sessions of a fit: runs that share a name share that error.
+
+    Attributes:
+        session: the session folder.
+        mounting: one putting-up of one ball.
+        ball: entry of the CMM sheet.
+        instrument: the bar.
+        fixed_ball_mm: centre of the fixed ball as the CMM knows it, machine frame, shape (3,) [mm].
+        mounting_repeatability_mm: of the holder, one standard deviation per axis [mm].
+        ball_uncertainty_mm: of the CMM, one standard deviation per axis [mm].
+        bar_uncertainty_mm: of the bar's calibrated length, one standard deviation [mm].
+    """
+
+    session: str
+    mounting: str
+    ball: str
+    instrument: str
+    fixed_ball_mm: NDArray[np.float64]
+    mounting_repeatability_mm: float
+    ball_uncertainty_mm: float
+    bar_uncertainty_mm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A whole run as commanded, in time order, with what was logged beside it.
+
+    Rows before `kept` are the way there: they give backlash, lag and friction their history and are not
+    compared with a recording.
+
+    Attributes:
+        poses: commanded [X, Y, Z, A, B, C], shape (n, 6) [mm, deg].
+        is_path: the rows follow each other on one path; otherwise they are poses without a history.
+        kept: the rows that count.
+        time_s: since the session's first sample, shape (n,) [s]; None where unknown.
+        temperature_degc: logged temperatures by column name without its unit (`bar`, `jig`, `machine`,
+            `strut1` ...), each of shape (n,) [degC].
+        motor_current_a: logged motor currents, shape (n, 6) [A]; None where not logged.
+        setup: None for poses that nobody measured.
+    """
+
+    poses: NDArray[np.float64]
+    is_path: bool = False
+    kept: slice = field(default_factory=lambda: slice(None))
+    time_s: NDArray[np.float64] | None = None
+    temperature_degc: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    motor_current_a: NDArray[np.float64] | None = None
+    setup: Setup | None = None
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @property
+    def provides(self) -> frozenset[Need]:
+        """What sources may ask of this motion."""
+        given = {Need.POSE: True, Need.PATH: self.is_path, Need.TIME: self.time_s is not None}
+        given |= {Need.TEMPERATURE: bool(self.temperature_degc), Need.CURRENT: self.motor_current_a is not None}
+        return frozenset(need for need, there in given.items() if there)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a source.
+
+    Attributes:
+        name: unique within the source; its unit is its last part where it has one.
+        unit: as printed.
+        plausible: usual size, one standard deviation, in that unit.
+        meaning: one line with the sign.
+    """
+
+    name: str
+    unit: str
+    plausible: float
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Texts:
+    """What a source says of itself to people.
+
+    Attributes:
+        what: what it is.
+        shows: how it shows in circular tests.
+        confirm: how to confirm it on the machine.
+        cure: how to cure it.
+        equation: the equation, in words or symbols.
+        origin: where the equation comes from.
+    """
+
+    what: str
+    shows: str
+    confirm: str
+    cure: str
+    equation: str
+    origin: str
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a source does, or the derivative of that by its parameters (one further axis of length p, last).
+
+    An array without the sample axis holds for every sample. None is no effect.
+
+    Attributes:
+        strut_mm: actual minus believed strut length, shape (6,) or (n, 6) [mm].
+        base_joint_mm: actual minus nominal base joint, machine frame, shape (6, 3) or (n, 6, 3) [mm].
+        platform_joint_mm: actual minus nominal platform joint, platform frame, same shapes [mm].
+        tool_tip_mm: shift of tool tip and tool ball against the platform, platform frame, (3,) or (n, 3) [mm].
+        fixed_ball_mm: actual minus known centre of the fixed ball, machine frame, (3,) or (n, 3) [mm].
+        reading_mm: added to the bar's reading, shape () or (n,) [mm].
+        current_a: added to the motor currents, shape (6,) or (n, 6) [A].
+    """
+
+    strut_mm: NDArray[np.float64] | None = None
+    base_joint_mm: NDArray[np.float64] | None = None
+    platform_joint_mm: NDArray[np.float64] | None = None
+    tool_tip_mm: NDArray[np.float64] | None = None
+    fixed_ball_mm: NDArray[np.float64] | None = None
+    reading_mm: NDArray[np.float64] | None = None
+    current_a: NDArray[np.float64] | None = None
+
+    def __add__(self, other: Effect) -> Effect:
+        """Both effects together; arrays with and without the sample axis add up."""
+        return Effect(**{f.name: _sum(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)})
+
+    def times(self, values: NDArray[np.float64]) -> Effect:
+        """The effect of parameter values, where `self` is a derivative by p parameters, shape (p,)."""
+        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Effect(**{name: None if array is None else array @ values for name, array in arrays.items()})
+
+
+def _sum(a: NDArray[np.float64] | None, b: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
+    if a is None or b is None:
+        return b if a is None else a
+    return a + b
+
+
+class ErrorSource(ABC):
+    """One physical cause.
+
+    A source without parameters to fit at run time is still a source: its class is its identity, instances
+    carry no state. Where a source belongs to a session or a mounting there is one set of parameter values per
+    session or mounting; `shared_by` says which runs share a set.
+    """
+
+    name: ClassVar[str]
+    belongs_to: ClassVar[Owner]
+    needs: ClassVar[frozenset[Need]] = frozenset({Need.POSE})
+    texts: ClassVar[Texts]
+
+    @abstractmethod
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Parameters in the order of every `values` array.
+
+        Raises:
+            ModelError: the machine file lacks what the source needs, such as masses.
+        """
+
+    @abstractmethod
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """What parameter values, shape (p,), do to a motion."""
+
+    @abstractmethod
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Derivative of `effect` by each parameter: arrays with one further axis of length p, last."""
+
+    def shared_by(self, motion: Motion) -> str:
+        """Name of the set of parameter values that this motion takes; motions with one name share the set."""
+        if self.belongs_to is Owner.MACHINE or motion.setup is None:
+            return ""
+        if self.belongs_to is Owner.SESSION:
+            return motion.setup.session
+        return motion.setup.mounting if self.belongs_to is Owner.MOUNTING else motion.setup.instrument
+
+    def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:  # noqa: ARG002
+        """Standard deviations, shape (p,), that plan and session state for this motion's set; None: not stated.
+
+        A stated size makes the set a random effect of the fit.
+        """
+        return None
+
+    def require(self, motion: Motion) -> None:
+        """Refuse a motion that lacks what the source needs.
+
+        Raises:
+            ModelError: names the source and what is missing.
+        """
+        missing = self.needs - motion.provides
+        if missing:
+            raise ModelError(
+                f"the error source {self.name} needs {', '.join(sorted(missing))}, which is not given here",
+                remedy=_HOW_TO_GIVE[min(missing)],
+            )
+
+
+_HOW_TO_GIVE = {
+    Need.POSE: "give poses",
+    Need.PATH: "give a program or a recording instead of single poses, or a model without this source",
+    Need.TIME: "give a recording with times, or a model without this source",
+    Need.TEMPERATURE: "give recordings with a temperature column, or a model without this source",
+    Need.CURRENT: "give recordings with motor currents, or a model without this source",
+}
+
+
+class LinearSource(ErrorSource):
+    """A source whose effect is proportional to its parameters: only the derivative has to be written."""
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Derivative times values."""
+        return self.derivative(motion, machine, values).times(values)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A source with values for one of its sets, as a model carries it.
+
+    Attributes:
+        source: the cause.
+        values: parameter values in the order of `source.parameters`, shape (p,).
+        shared: name of the set, empty for the machine's own sources.
+    """
+
+    source: ErrorSource
+    values: NDArray[np.float64]
+    shared: str = ""
+
+    @classmethod
+    def zero(cls, source: ErrorSource, machine: Machine, shared: str = "") -> Self:
+        """Return the source with all its parameters at zero."""
+        return cls(source, np.zeros(len(source.parameters(machine))), shared)

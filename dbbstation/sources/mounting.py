@@ -1,0 +1,44 @@
+"""Error source: how a holder came to sit when it was put up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+
+class Mounting(LinearSource):
+    """The ball stands off its place by a different amount each time its holder is put up [CAL III-B].
+
+    The usual scatter and a badly seated holder are the same cause with a usual and an outlying size.
+    """
+
+    name = "mounting"
+    belongs_to = Owner.MOUNTING
+    texts = Texts(
+        what="A ball holder does not seat in its bore twice in the same way; dirt or a burr makes it worse.",
+        shows="All circles of one mounting are shifted together by one to three µm, a badly seated one by far more.",
+        confirm="Take the holder out, clean bore and taper, put it back and repeat the test: the shift changes.",
+        cure="Clean and tighten; mount a ball more than once and let the fit average.",
+        equation="b = CMM centre + shift of this mounting",
+        origin="[CAL III-B]: 1.0 µm (short holder) and 3.2 µm (long holder) repeatability",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Three coordinates."""
+        return tuple(Parameter(f"{axis}_mm", "mm", 0.002, f"ball actual minus CMM {axis.upper()}") for axis in "xyz")
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each coordinate its own parameter."""
+        return Effect(fixed_ball_mm=np.eye(3))
+
+    def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
+        """Repeatability of the holder in every axis."""
+        return None if motion.setup is None else np.full(3, motion.setup.mounting_repeatability_mm)

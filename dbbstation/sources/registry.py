@@ -1,0 +1,45 @@
+"""Every error source by name: one file each in this folder, found by looking, not by a list."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from functools import cache
+from inspect import getmembers, isabstract, isclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import dbbstation.sources
+from dbbstation.errors import ModelError
+from dbbstation.sources.contract import ErrorSource
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+
+@cache
+def known_sources() -> Mapping[str, ErrorSource]:
+    """All error sources of the package, sorted by name."""
+    found: dict[str, ErrorSource] = {}
+    for module in pkgutil.iter_modules(dbbstation.sources.__path__):
+        content = importlib.import_module(f"dbbstation.sources.{module.name}")
+        for _, member in getmembers(content, isclass):
+            own = member.__module__ == content.__name__
+            if own and issubclass(member, ErrorSource) and not isabstract(member):
+                found[member.name] = member()
+    return MappingProxyType(dict(sorted(found.items())))
+
+
+def sources_named(names: Iterable[str]) -> tuple[ErrorSource, ...]:
+    """Sources by their names.
+
+    Raises:
+        ModelError: a name that no source has.
+    """
+    known = known_sources()
+    chosen = []
+    for name in names:
+        if name not in known:
+            raise ModelError(f"no error source is called {name!r}", remedy=f"known are {', '.join(known)}")
+        chosen.append(known[name])
+    return tuple(chosen)

@@ -1,0 +1,104 @@
+"""Figures of one circle: centre, mean radial error, circularity [CAL III-A, Table III]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import TraceError
+from dbbstation.trace.circle import CentredCircle, RawCircle
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+MOST_STEPS = 20
+CENTRE_TOLERANCE_MM = 1e-12
+
+
+@dataclass(frozen=True)
+class CircleFigures:
+    """What a circular test says in three numbers [CAL Table III].
+
+    Attributes:
+        centre_mm: centre of the least-squares circle from the fixed ball, in X and Y [mm].
+        mean_radial_error_um: mean of bar length minus nominal bar length, about the commanded centre [µm].
+        circularity_um: greatest minus least radial deviation after least-squares centring [µm].
+    """
+
+    centre_mm: tuple[float, float]
+    mean_radial_error_um: float
+    circularity_um: float
+
+    @property
+    def centre_deviation_um(self) -> float:
+        """Length of the centre offset [µm]."""
+        return 1e3 * float(np.hypot(*self.centre_mm))
+
+
+def best_circle(
+    theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float, NDArray[np.float64]]:
+    """Least-squares circle through points given in polar coordinates [CAL eq 6], by Gauss-Newton.
+
+    Args:
+        theta_deg: angles, shape (n,) [deg].
+        radius_mm: distances from the origin, shape (n,) [mm].
+
+    Returns:
+        Centre (x, y), shape (2,) [mm]; radius [mm]; radial deviations of the points, shape (n,) [mm].
+
+    Raises:
+        TraceError: the points do not determine a circle.
+    """
+    theta = np.radians(theta_deg)
+    points = radius_mm[:, None] * np.column_stack([np.cos(theta), np.sin(theta)])
+    centre, radius = np.zeros(2), float(radius_mm.mean())
+    for _ in range(MOST_STEPS):
+        spokes = points - centre
+        distance = np.linalg.norm(spokes, axis=1)
+        columns = np.column_stack([spokes / distance[:, None], np.ones(len(theta))])
+        step, _, rank, _ = np.linalg.lstsq(columns, distance - radius, rcond=1e-9)
+        if rank < columns.shape[1]:
+            break
+        centre += step[:2]
+        radius += step[2]
+        if np.abs(step).max() < CENTRE_TOLERANCE_MM:
+            deviation = np.linalg.norm(points - centre, axis=1) - radius
+            return centre, radius, deviation
+    raise TraceError(
+        "its points do not determine a circle",
+        remedy="record more of the turn",
+    )
+
+
+def horizontal_radius_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of the moving ball from the vertical through the fixed ball, where the bar is raised [mm]."""
+    height = raw.circle.bar_mm * np.sin(np.radians(raw.circle.elevation_deg))
+    return np.sqrt(length_mm**2 - height**2)
+
+
+def figures(raw: RawCircle, length_mm: NDArray[np.float64] | None = None) -> CircleFigures:
+    """Figures of a raw circle, or of other lengths at the same angles, shape (n,) [mm].
+
+    Raises:
+        TraceError: the points do not determine a circle.
+    """
+    length = raw.length_mm if length_mm is None else length_mm
+    centre, _, deviation = best_circle(raw.theta_deg, horizontal_radius_mm(raw, length))
+    return CircleFigures(
+        centre_mm=(float(centre[0]), float(centre[1])),
+        mean_radial_error_um=1e3 * float((length - raw.circle.bar_mm).mean()),
+        circularity_um=1e3 * float(np.ptp(deviation)),
+    )
+
+
+def centred(raw: RawCircle) -> CentredCircle:
+    """Remove the centre, as the standard circular test does [CAL III-A step 4].
+
+    Raises:
+        TraceError: the points do not determine a circle.
+    """
+    _, radius, deviation = best_circle(raw.theta_deg, horizontal_radius_mm(raw, raw.length_mm))
+    return CentredCircle(raw.name, raw.circle, raw.theta_deg, deviation, radius)

@@ -1,0 +1,173 @@
+"""Cutting the full turn out of a recording that also holds feed-in, overshoot and feed-out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import TraceError
+from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.trace.circle import RawCircle
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.plan.circle import Circle
+    from dbbstation.trace.recording import Recording
+
+LARGEST_GAP_DEG = 10.0
+"""A wider stretch without a sample is not a full circle any more."""
+
+FEED_SEARCH = 0.2
+"""The feed that a trace shows is looked for within this share of the programmed one."""
+
+FEED_TOLERANCE = 5e-3
+"""Share of the feed that a recording may be off; one per thousand costs 0.3 µm at 100 µm of error per radian,
+and real overlaps, which friction and warming keep from agreeing exactly, scatter by up to four."""
+
+FEED_SIGMAS = 6.0
+"""A disagreement counts only where the overlap shows it this clearly above its noise."""
+
+
+def cut(recording: Recording, circle: Circle) -> RawCircle:
+    """Return the full turn of a recording.
+
+    Rows with angles are taken as they are: they are cut already. Otherwise the turn is anchored midway between
+    feed-in and feed-out, and angles follow from the programmed feed: controls dwell at the corners, so the
+    trace's duration says little.
+
+    Raises:
+        TraceError: no feed-in or feed-out, a gap, a bar that left the circle, or a feed that is not the
+            programmed one.
+    """
+    if recording.theta_deg is not None:
+        return _selected(recording, circle, circle.phi_deg(recording.theta_deg), np.ones(len(recording), dtype=bool))
+    middle = _middle(recording, circle)
+    phi = FULL_TURN_DEG / 2.0 + (recording.t_s - middle) * circle.turning_deg_s
+    _check_feed(recording, circle, middle)
+    return _selected(recording, circle, phi, (phi >= 0.0) & (phi < FULL_TURN_DEG))
+
+
+def _middle(recording: Recording, circle: Circle) -> float:
+    """Time midway between the edges where the length crosses half the feed-in [s]."""
+    threshold = circle.bar_mm + circle.feed_in_mm / 2.0
+    inside = np.flatnonzero(recording.length_mm < threshold)
+    if len(inside) == 0 or inside[0] == 0 or inside[-1] == len(recording) - 1:
+        missing = "feed-out" if len(inside) and inside[0] > 0 else "feed-in"
+        low, high = recording.length_mm.min(), recording.length_mm.max()
+        raise TraceError(
+            f"no {missing} found: the length, {low:.3f} to {high:.3f} mm, never crosses {threshold:.3f} mm there",
+            where=recording.name,
+            remedy="record from before the feed-in until after the feed-out, and check bar length and feed-in of the "
+            "plan",
+        )
+    first, last = int(inside[0]), int(inside[-1])
+    t, length = recording.t_s, recording.length_mm
+    edge_in = _crossing(t[first - 1 : first + 1], length[first - 1 : first + 1], threshold)
+    edge_out = _crossing(t[last : last + 2], length[last : last + 2], threshold)
+    travelled = (edge_out - edge_in) * circle.turning_deg_s
+    if travelled < circle.swept_deg * (1.0 - FEED_SEARCH):
+        raise TraceError(
+            f"only {travelled:.0f} of {circle.swept_deg:.0f} degrees lie between feed-in and feed-out at the programmed "
+            f"feed of {circle.feed_mm_min:g} mm/min",
+            where=recording.name,
+            remedy="record the whole path, or correct feed and overshoot in the plan",
+        )
+    return (edge_in + edge_out) / 2.0
+
+
+def _crossing(t: NDArray[np.float64], length: NDArray[np.float64], threshold: float) -> float:
+    """Time at which the line through two samples reaches the threshold [s]."""
+    return float(t[0] + (t[1] - t[0]) * (threshold - length[0]) / (length[1] - length[0]))
+
+
+def _check_feed(recording: Recording, circle: Circle, middle: float) -> None:
+    """Compare the feed with the one that the overlap shows: the same places are passed twice, a turn apart."""
+    found = overlap_feed(recording, circle, middle)
+    if found is None:
+        return
+    feed, uncertainty = found
+    off = abs(feed - circle.feed_mm_min)
+    if off > max(FEED_TOLERANCE * circle.feed_mm_min, FEED_SIGMAS * uncertainty):
+        raise TraceError(
+            f"the overlap shows a feed of {feed:.1f} ± {uncertainty:.1f} mm/min, the plan says {circle.feed_mm_min:g}",
+            where=recording.name,
+            remedy="set the feed of this test in the plan to the one that was run",
+        )
+
+
+def overlap_feed(recording: Recording, circle: Circle, middle: float) -> tuple[float, float] | None:
+    """Feed and its standard deviation [mm/min] that make both passes of the overlap agree.
+
+    Returns:
+        None where the overlap cannot tell: too few samples, or a trace too round to show a shift.
+    """
+    overlap = circle.overshoot_deg
+    turn_s = FULL_TURN_DEG / circle.turning_deg_s
+    half_s = overlap / circle.turning_deg_s
+    t, length = recording.t_s - middle, recording.length_mm
+    # The first pass lies about half a turn before the middle; a wrong feed moves it, so its inner part is used.
+    first = np.abs(t + turn_s / 2.0) < half_s * (1.0 - FEED_SEARCH)
+    if np.count_nonzero(first) < 10:  # noqa: PLR2004 - fewer samples show no shape
+        return None
+    turns = turn_s * np.linspace(
+        1.0 - FEED_SEARCH * overlap / FULL_TURN_DEG, 1.0 + FEED_SEARCH * overlap / FULL_TURN_DEG, 401
+    )
+    smooth = _smoothed(length, max(3, int(np.count_nonzero(first)) // 40))
+    misfit = np.array([np.var(np.interp(t[first] + turn, t, smooth) - smooth[first]) for turn in turns])
+    best = int(np.argmin(misfit))
+    if best in {0, len(turns) - 1}:
+        return None
+    a, b, c = misfit[best - 1 : best + 2]
+    step = turns[1] - turns[0]
+    curvature = (a - 2.0 * b + c) / step**2
+    if curvature <= 0.0:
+        return None
+    turn = turns[best] + step * 0.5 * (a - c) / (a - 2.0 * b + c)
+    # The misfit is a mean square: its curvature is twice the mean square slope, its value twice the noise.
+    noise = np.var(np.diff(length[first])) / 2.0 + misfit[best] / 2.0
+    uncertainty_s = np.sqrt(2.0 * noise / (curvature / 2.0) / np.count_nonzero(first))
+    feed = circle.feed_mm_min * turn_s / turn
+    return float(feed), float(feed * uncertainty_s / turn)
+
+
+def _smoothed(length: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+    """Running mean over an odd number of samples."""
+    width |= 1
+    padded = np.pad(length, width // 2, mode="edge")
+    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+
+
+def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64], rows: NDArray[np.bool_]) -> RawCircle:
+    """Rows of the turn that the instrument called usable, refused where the turn has holes or the bar left it."""
+    if recording.usable is not None:
+        rows = rows & recording.usable
+    phi = phi_deg[rows]
+    gaps = np.diff(np.sort(phi), prepend=0.0, append=FULL_TURN_DEG)
+    if gaps.max() > LARGEST_GAP_DEG:
+        start = float(np.concatenate([[0.0], np.sort(phi)])[int(np.argmax(gaps))])
+        raise TraceError(
+            f"no sample over {gaps.max():.1f} degrees, from {start:.1f} degrees after the start of the turn",
+            where=recording.name,
+            remedy="repeat the run",
+        )
+    length = recording.length_mm[rows]
+    off = np.abs(length - circle.bar_mm)
+    if off.max() > circle.feed_in_mm / 2.0:
+        worst = int(np.argmax(off))
+        raise TraceError(
+            f"the length is {length[worst]:.3f} mm, {off[worst]:.3f} mm off the bar's {circle.bar_mm:g} mm, at "
+            f"{circle.theta_deg(phi)[worst] % FULL_TURN_DEG:.1f} degrees",
+            where=recording.name,
+            remedy="check bar length, units and plan; a ball that left its seat means repeating the run",
+        )
+    return RawCircle(
+        name=recording.name,
+        circle=circle,
+        t_s=recording.t_s[rows],
+        phi_deg=phi,
+        length_mm=length,
+        temperature_degc={sensor: values[rows] for sensor, values in recording.temperature_degc.items()},
+        motor_current_a=None if recording.motor_current_a is None else recording.motor_current_a[rows],
+    )

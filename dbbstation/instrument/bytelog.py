@@ -1,0 +1,131 @@
+"""The byte log: everything that went over a line, with times, as text that a person can read and `replay` can send again.
+
+    # dbb-byte-log/1
+    # instrument: heidenhain-nd281b
+    # port: /dev/ttyUSB0
+           0.000000 > 02
+           0.070721 < 2b 20 20 31 35 30 2e 30 30 30 33 20 20 20 20 0d 0a  | +  150.0003    ..
+
+Times are seconds since the log was opened; `>` went to the device, `<` came from it; what follows the bar is for people.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from dbbstation.errors import InputError, OutputError, Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+    from typing import Self
+
+_HEAD = "# dbb-byte-log/1"
+_LINE = re.compile(r"\s*(\d+(?:\.\d*)?) ([<>]) ([0-9a-f]{2}(?: [0-9a-f]{2})*)(?:  \|.*)?")
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Bytes that went over the line together at `t_s` seconds after the log was opened."""
+
+    t_s: float
+    direction: Literal["<", ">"]
+    raw: bytes
+
+
+class ByteLog:
+    """A byte log that is being written.
+
+    Args:
+        path: the file; it must not exist yet.
+        instrument: name of the protocol.
+        port: name of the port.
+        force: overwrite the file.
+        clock: monotonic clock in s.
+
+    Raises:
+        OutputError: the file exists, or cannot be written.
+    """
+
+    def __init__(
+        self, path: Path, *, instrument: str, port: str, force: bool = False, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        try:
+            # Line buffered: after a crash everything but the last line stands in the file.
+            self._file = path.open("w" if force else "x", encoding="utf-8", buffering=1, newline="\n")
+        except FileExistsError:
+            raise OutputError("the byte log exists already", where=str(path), remedy="give another name or --force") from None
+        except OSError as error:
+            raise OutputError(f"cannot write the byte log: {error.strerror}", where=str(path)) from None
+        self._path = path
+        self._clock = clock
+        self._opened_s = clock()
+        self._file.write(f"{_HEAD}\n# instrument: {instrument}\n# port: {port}\n")
+
+    def note(self, direction: Literal["<", ">"], raw: bytes) -> None:
+        """Write down bytes that just went over the line.
+
+        Raises:
+            OutputError: the file cannot be written any more.
+        """
+        shown = "".join(chr(byte) if 32 <= byte < 127 else "." for byte in raw)  # noqa: PLR2004 (printable ASCII)
+        try:
+            self._file.write(f"{self._clock() - self._opened_s:15.6f} {direction} {raw.hex(' ')}  | {shown}\n")
+        except OSError as error:
+            raise OutputError(f"cannot write the byte log: {error.strerror}", where=str(self._path)) from None
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def logged_instrument(path: Path) -> str:
+    """Return the name of the instrument in the head of a byte log, empty where it has none.
+
+    Raises:
+        InputError: the file cannot be read or is no byte log.
+    """
+    for line in _lines(path)[1:]:
+        if line.startswith("# instrument:"):
+            return line.partition(":")[2].strip()
+    return ""
+
+
+def read_byte_log(path: Path) -> Iterator[Chunk]:
+    """Yield the chunks of a byte log in time order; a last line that a crash cut off is left out.
+
+    Raises:
+        InputError: the file cannot be read, is no byte log, or has a line that is none of its.
+    """
+    lines = _lines(path)
+    # What follows the last line end is empty, or a line that a crash cut off.
+    for number, line in enumerate(lines[1:-1], start=2):
+        if line.startswith("#") or not line:
+            continue
+        match = _LINE.fullmatch(line)
+        if match is None:
+            remedy = "every line is: seconds, < or >, bytes in hexadecimal"
+            raise InputError([Problem(str(path), number, 1, "this line of the byte log cannot be read", remedy)])
+        direction: Literal["<", ">"] = "<" if match[2] == "<" else ">"
+        yield Chunk(float(match[1]), direction, bytes.fromhex(match[3]))
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        lines = path.read_text(encoding="utf-8").split("\n")
+    except OSError as error:
+        raise InputError([Problem(str(path), 0, 0, error.strerror or str(error))]) from None
+    except UnicodeDecodeError:
+        raise InputError([Problem(str(path), 0, 0, "not UTF-8 text, so no byte log")]) from None
+    if lines[0].strip() != _HEAD:
+        raise InputError([Problem(str(path), 1, 1, f"not a byte log: the first line is not {_HEAD!r}")])
+    return lines

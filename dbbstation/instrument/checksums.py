@@ -1,0 +1,67 @@
+"""Checksums that measuring instruments close their frames with.
+
+A CRC is given by the parameters of the Rocksoft model (width, polynomial, start value, reflected or not, final XOR); the
+check values over the digits 1 to 9 stand in the tests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+from operator import xor
+from typing import Literal, TypeAlias
+
+Algorithm: TypeAlias = Literal[
+    "xor8", "sum8", "negated-sum8", "sum16", "crc8", "crc16-modbus", "crc16-ccitt", "crc16-xmodem", "crc32"
+]
+
+
+@dataclass(frozen=True, slots=True)
+class _Crc:
+    """One CRC of the Rocksoft model; the reflected ones shift towards the low bit."""
+
+    bits: int
+    polynomial: int
+    start: int
+    reflected: bool
+    final_xor: int
+
+    def of(self, data: bytes) -> int:
+        top, mask = 1 << (self.bits - 1), (1 << self.bits) - 1
+        value = self.start
+        for byte in data:
+            value ^= _reversed_bits(byte, 8) << (self.bits - 8) if self.reflected else byte << (self.bits - 8)
+            for _ in range(8):
+                value = ((value << 1) ^ self.polynomial if value & top else value << 1) & mask
+        return (_reversed_bits(value, self.bits) if self.reflected else value) ^ self.final_xor
+
+
+_CRCS: dict[str, _Crc] = {
+    "crc8": _Crc(8, 0x07, 0x00, reflected=False, final_xor=0),
+    "crc16-modbus": _Crc(16, 0x8005, 0xFFFF, reflected=True, final_xor=0),
+    "crc16-ccitt": _Crc(16, 0x1021, 0xFFFF, reflected=False, final_xor=0),
+    "crc16-xmodem": _Crc(16, 0x1021, 0x0000, reflected=False, final_xor=0),
+    "crc32": _Crc(32, 0x04C11DB7, 0xFFFFFFFF, reflected=True, final_xor=0xFFFFFFFF),
+}
+
+_BYTES: dict[str, int] = {"sum16": 2, "crc16-modbus": 2, "crc16-ccitt": 2, "crc16-xmodem": 2, "crc32": 4}
+
+
+def checksum_bytes(algorithm: Algorithm) -> int:
+    """Return how many bytes the checksum has before it is written as hexadecimal text or not."""
+    return _BYTES.get(algorithm, 1)
+
+
+def checksum(algorithm: Algorithm, data: bytes) -> int:
+    """Return the checksum of `data` as an unsigned integer."""
+    if algorithm == "xor8":
+        return reduce(xor, data, 0)
+    if algorithm in {"sum8", "sum16"}:
+        return sum(data) % (1 << 8 * checksum_bytes(algorithm))
+    if algorithm == "negated-sum8":
+        return -sum(data) % 256
+    return _CRCS[algorithm].of(data)
+
+
+def _reversed_bits(value: int, bits: int) -> int:
+    return int(format(value, f"0{bits}b")[::-1], 2)

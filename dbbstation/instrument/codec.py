@@ -1,0 +1,237 @@
+"""Bytes to readings and back, by the grammar of a protocol. Knows no port and no clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from dbbstation.errors import InstrumentError
+from dbbstation.instrument.fields import Content, Found, NotRepresentable, NotUnderstood
+from dbbstation.instrument.reading import Reading, Status
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.protocol import Frame, Protocol
+
+_LONGEST_LINE = 256
+"""Bytes without a line end after which they count as garbage; no known length gauge sends longer lines."""
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A reading (`lost` not yet counted, no time) with its bytes; `after` bytes of the same chunk follow it."""
+
+    reading: Reading
+    raw: bytes
+    after: int
+
+
+@dataclass(frozen=True, slots=True)
+class Garbage:
+    """Bytes that are not understood.
+
+    Attributes:
+        raw: the bytes.
+        why: what was wrong with them, empty where they simply do not fit the grammar.
+        joining: they are the rest of a frame that was under way when listening began: nothing is wrong.
+    """
+
+    raw: bytes
+    why: str = ""
+    joining: bool = False
+
+
+Heard: TypeAlias = Piece | Garbage
+
+
+def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, status: Status = "ok") -> bytes:
+    """Return the bytes with which the device tells one sample.
+
+    Args:
+        protocol: the wire.
+        length_mm: length in mm; None: the device has none, which it tells as `fault` unless `status` says otherwise.
+        counter: sample counter, taken modulo what the wire has.
+        status: what the device says of the sample. A length that does not fit is told as `overrange`; a device that
+            cannot say `overrange` says `fault`.
+
+    Raises:
+        InstrumentError: the wire has no way to say it.
+    """
+    if length_mm is None and status == "ok":
+        status = "fault"
+    value = 0.0 if length_mm is None else length_mm / protocol.length.mm_per_unit()
+    if status == "ok":
+        try:
+            return protocol.frames[0].write(Content(value, counter))
+        except NotRepresentable:
+            status, value = "overrange", 0.0
+    for wanted in ("overrange", "fault") if status == "overrange" else ("fault",):
+        voice = protocol.voice(wanted)  # type: ignore[arg-type]  # the tuples hold statuses, which mypy widens to str
+        if voice is not None:
+            return _told(voice[0], Content(value, counter, voice[1]))
+    raise InstrumentError(
+        f"its wire has no way to say {status!r}",
+        where=protocol.name,
+        remedy="give a code, a special or a message frame of the protocol file that status",
+    )
+
+
+def decode(protocol: Protocol, raw: bytes) -> Reading:
+    """Return the reading that exactly these bytes tell, without a time and without losses.
+
+    Raises:
+        NotUnderstood: they are no whole frame of this protocol.
+    """
+    why = "no frame of this protocol"
+    for frame in protocol.frames:
+        match = frame.pattern.fullmatch(raw)
+        if match is not None:
+            try:
+                return _reading(protocol, frame.read(match))
+            except NotUnderstood as error:
+                why = str(error)
+    raise NotUnderstood(why)
+
+
+class Decoder:
+    """Cuts a stream of bytes into frames and decodes them; chunks may end anywhere.
+
+    Args:
+        protocol: the wire.
+        joining: listening begins in the middle of a stream, so that the first line may be half of one.
+    """
+
+    def __init__(self, protocol: Protocol, *, joining: bool) -> None:
+        self._protocol = protocol
+        self._joining = joining
+        self._in_step = not joining
+        self._pending = b""
+
+    @property
+    def pending(self) -> bytes:
+        """Bytes that are the beginning of a frame, or garbage that nothing has followed yet."""
+        return self._pending
+
+    def take_pending(self) -> bytes:
+        """Return the pending bytes and forget them."""
+        raw, self._pending = self._pending, b""
+        return raw
+
+    def feed(self, chunk: bytes) -> list[Heard]:
+        """Return what became complete with `chunk`, in wire order."""
+        self._pending += chunk
+        return self._cut_by_width() if self._protocol.by_width else self._cut_by_line_end()
+
+    def _cut_by_line_end(self) -> list[Heard]:
+        end = self._protocol.terminator
+        *lines, self._pending = self._pending.split(end)
+        after = sum(len(line) + len(end) for line in lines) + len(self._pending)
+        heard: list[Heard] = []
+        for line in lines:
+            raw = line + end
+            after -= len(raw)
+            joining, self._joining = self._joining, False
+            if joining:
+                # Its beginning is unknown: where widths vary, "23.4" may be the rest of "123.4".
+                heard.append(Garbage(raw, joining=True))
+                continue
+            try:
+                heard.append(Piece(decode(self._protocol, raw), raw, after))
+            except NotUnderstood as error:
+                heard.append(Garbage(raw, str(error)))
+        if len(self._pending) > _LONGEST_LINE:
+            heard.append(Garbage(self.take_pending(), f"no line end in {_LONGEST_LINE} bytes"))
+        return heard
+
+    def _cut_by_width(self) -> list[Heard]:
+        """Slide to the next place where a frame fits; out of step, one must be followed by a second to be believed."""
+        longest = max(frame.width or 0 for frame in self._protocol.frames)
+        heard: list[Heard] = []
+        start = skipped = 0
+        while len(self._pending) - start - skipped >= longest:
+            here = start + skipped
+            found = self._frame_at(here)
+            if found is not None and not self._in_step:
+                follower = here + len(found.raw)
+                if len(self._pending) - follower < longest:
+                    break
+                found = found if self._frame_at(follower) else None
+            if found is None:
+                self._in_step = False
+                skipped += 1
+                continue
+            if skipped:
+                heard.append(Garbage(self._pending[start:here], joining=self._joining))
+            heard.append(found)
+            start, skipped = here + len(found.raw), 0
+            self._in_step, self._joining = True, False
+        if skipped and not self._joining:
+            heard.append(Garbage(self._pending[start : start + skipped]))
+            start += skipped
+        self._pending = self._pending[start:]
+        return heard
+
+    def _frame_at(self, start: int) -> Piece | None:
+        for frame in self._protocol.frames:
+            match = frame.pattern.match(self._pending, start)
+            if match is not None:
+                try:
+                    reading = _reading(self._protocol, frame.read(match))
+                except NotUnderstood:
+                    continue
+                return Piece(reading, match[0], len(self._pending) - match.end())
+        return None
+
+
+class GapCounter:
+    """Counts lost samples by the device's counter.
+
+    Args:
+        modulus: where the counter starts again from 0; None: the wire has no counter, and nothing is counted.
+    """
+
+    def __init__(self, modulus: int | None) -> None:
+        self._modulus = modulus
+        self._last: int | None = None
+
+    def lost_before(self, counter: int | None, where: str) -> int:
+        """Return how many samples are missing between the last one and this.
+
+        Raises:
+            InstrumentError: the counter went back or stood still: the device restarted, or two programs read the port.
+        """
+        if self._modulus is None or counter is None:
+            return 0
+        last, self._last = self._last, counter
+        if last is None:
+            return 0
+        step = (counter - last) % self._modulus
+        if step == 0 or step > self._modulus // 2:
+            raise InstrumentError(
+                f"the sample counter went from {last} to {counter}",
+                where=where,
+                remedy="the instrument was restarted, or another program reads the same port: start the measurement again",
+            )
+        return step - 1
+
+
+def _reading(protocol: Protocol, found: Found) -> Reading:
+    length_mm: float | None = None
+    if found.value is not None and found.status != "fault":
+        length_mm = found.sign * found.value * protocol.length.mm_per_unit(found.unit) + 0.0
+        low_mm, high_mm = protocol.length.range_mm
+        if not low_mm <= length_mm <= high_mm:
+            found.report(
+                "overrange",
+                f"{length_mm:g} mm is outside its range {low_mm:g} to {high_mm:g} mm",
+                "check unit and preset of the instrument, and the bar's working length",
+            )
+    if length_mm is None and found.status == "ok":
+        raise NotUnderstood("no number and no status")
+    return Reading(0.0, length_mm, found.status, 0, found.counter, found.said, found.remedy)
+
+
+def _told(frame: Frame, content: Content) -> bytes:
+    try:
+        return frame.write(content)
+    except NotRepresentable:
+        return frame.write(Content(0.0, content.counter, content.voice))

@@ -1,0 +1,280 @@
+"""The parts that a frame on the wire is made of.
+
+Every part knows both directions: `pattern` and `read` take it from bytes, `write` makes the bytes. Driver and virtual
+instrument therefore cannot disagree about a protocol.
+
+    literal    fixed bytes: head, separator, line end
+    sign       the sign of the length, apart from its digits
+    decimal    a number in text
+    integer    a whole number: binary, tagged bytes, packed BCD, or hexadecimal text
+    float      IEEE 754
+    choice     one of several codes, each with a unit or a status
+    flags      one byte of status bits
+    checksum   over what precedes it
+    skip       bytes that say nothing of the length
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
+
+from dbbstation.instrument.checksums import Algorithm, checksum, checksum_bytes
+from dbbstation.instrument.reading import SEVERITY, Status
+
+Unit: TypeAlias = Literal["mm", "um", "nm", "m", "inch", "count"]
+
+
+class NotUnderstood(ValueError):  # noqa: N818 (it is no error of the program: most garbled bytes end here)
+    """These bytes are not what the grammar says."""
+
+
+class NotRepresentable(ValueError):  # noqa: N818 (the device meets this too, and reports overrange)
+    """This value does not fit into the field."""
+
+
+def _as_bytes(value: object) -> object:
+    if not isinstance(value, str):
+        return value
+    try:
+        return value.encode("latin-1")
+    except UnicodeEncodeError:
+        raise ValueError("characters on a wire are bytes: nothing above \\xff") from None
+
+
+Bytes: TypeAlias = Annotated[
+    bytes, BeforeValidator(_as_bytes), PlainSerializer(lambda raw: raw.decode("latin-1"), return_type=str)
+]
+"""Bytes, written in the file as a quoted string with escapes: `"\\x02"`, `"\\r\\n"`, `"M1"`."""
+
+
+class Strict(BaseModel):
+    """Unknown keys and converted types are errors; nothing changes after loading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+@dataclass(slots=True)
+class Found:
+    """What the parts of one frame have said so far.
+
+    Attributes:
+        value: the number of the length, in device units, without the sign of a `sign` part.
+        sign: 1 or -1.
+        unit: None: the unit that the protocol declares.
+        counter: sample counter.
+        status, said, remedy: the worst status that a part reported.
+    """
+
+    value: float | None = None
+    sign: int = 1
+    unit: Unit | None = None
+    counter: int | None = None
+    status: Status = "ok"
+    said: str = ""
+    remedy: str = ""
+
+    def report(self, status: Status, said: str, remedy: str) -> None:
+        """Keep the worst of the statuses."""
+        if SEVERITY[status] > SEVERITY[self.status]:
+            self.status, self.said, self.remedy = status, said, remedy
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What a frame is to say: a signed value in device units, a counter, and the code or bit that speaks of a status."""
+
+    value: float
+    counter: int = 0
+    voice: Code | Bit | None = None
+
+
+class Code(Strict):
+    """One code and its meaning; `remedy` says what the operator does about a status that is not ok."""
+
+    code: Bytes
+    means: str
+    status: Status = "ok"
+    unit: Unit | None = None
+    remedy: str = ""
+
+
+class Bit(Strict):
+    """One status bit, counted from the lowest, 0."""
+
+    bit: int = Field(ge=0, le=7)
+    means: str
+    status: Status
+    remedy: str = ""
+
+
+class Literally(Strict):
+    """Fixed bytes."""
+
+    kind: Literal["literal"]
+    value: Bytes = Field(min_length=1)
+
+    @property
+    def width(self) -> int:
+        """Bytes."""
+        return len(self.value)
+
+    def pattern(self) -> bytes:
+        """Return the regular expression of these bytes."""
+        return re.escape(self.value)
+
+    def read(self, raw: bytes, found: Found) -> None:
+        """Say nothing: the pattern matched."""
+
+    def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)
+        """Return the bytes."""
+        return self.value
+
+
+class Sign(Strict):
+    """The sign as a part of its own; the first of `plus` and of `minus` is what the device writes."""
+
+    kind: Literal["sign"]
+    plus: tuple[Bytes, ...] = (b"+",)
+    minus: tuple[Bytes, ...] = (b"-",)
+
+    @model_validator(mode="after")
+    def _one_byte_each(self) -> Sign:
+        if not self.plus or not self.minus or any(len(code) != 1 for code in self.plus + self.minus):
+            raise ValueError("plus and minus list single characters, at least one each")
+        return self
+
+    @property
+    def width(self) -> int:
+        """Bytes."""
+        return 1
+
+    def pattern(self) -> bytes:
+        """Return the regular expression of any of the signs."""
+        return b"[" + re.escape(b"".join(self.plus + self.minus)) + b"]"
+
+    def read(self, raw: bytes, found: Found) -> None:
+        """Take the sign."""
+        found.sign = -1 if raw in self.minus else 1
+
+    def write(self, content: Content) -> bytes:
+        """Return the sign of the value."""
+        return self.minus[0] if content.value < 0 else self.plus[0]
+
+
+class Choice(Strict):
+    """One of several codes; without a status to report the device writes the first."""
+
+    kind: Literal["choice"]
+    codes: tuple[Code, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _codes_differ(self) -> Choice:
+        if len({code.code for code in self.codes}) < len(self.codes):
+            raise ValueError("two codes are the same bytes")
+        if self.codes[0].status != "ok":
+            raise ValueError("the first code is what the device writes when all is well: its status must be ok")
+        return self
+
+    @property
+    def width(self) -> int | None:
+        """Bytes, None where the codes differ in length."""
+        widths = {len(code.code) for code in self.codes}
+        return widths.pop() if len(widths) == 1 else None
+
+    def pattern(self) -> bytes:
+        """Return the regular expression of any of the codes, the longest first."""
+        return b"(?:" + b"|".join(re.escape(raw) for raw in sorted((c.code for c in self.codes), key=len, reverse=True)) + b")"
+
+    def read(self, raw: bytes, found: Found) -> None:
+        """Take unit and status of the code."""
+        code = next(code for code in self.codes if code.code == raw)
+        found.unit = code.unit or found.unit
+        found.report(code.status, code.means, code.remedy)
+
+    def write(self, content: Content) -> bytes:
+        """Return the code of the status to report, or the first."""
+        return next((code.code for code in self.codes if code is content.voice), self.codes[0].code)
+
+
+class Flags(Strict):
+    """One byte of status bits over a fixed base."""
+
+    kind: Literal["flags"]
+    base: int = Field(default=0, ge=0, le=255)
+    bits: tuple[Bit, ...] = Field(min_length=1)
+
+    @property
+    def width(self) -> int:
+        """Bytes."""
+        return 1
+
+    def pattern(self) -> bytes:
+        """Return the regular expression of the base with any of the bits."""
+        free = sum(1 << bit.bit for bit in self.bits)
+        allowed = sorted({value for value in range(256) if value & ~free == self.base & ~free})
+        return b"[" + b"".join(re.escape(bytes([value])) for value in allowed) + b"]"
+
+    def read(self, raw: bytes, found: Found) -> None:
+        """Report every bit that differs from the base."""
+        for bit in self.bits:
+            if (raw[0] ^ self.base) >> bit.bit & 1:
+                found.report(bit.status, bit.means, bit.remedy)
+
+    def write(self, content: Content) -> bytes:
+        """Return the base, with the bit of the status to report turned over."""
+        return bytes([self.base ^ sum(1 << bit.bit for bit in self.bits if bit is content.voice)])
+
+
+class Checksum(Strict):
+    """A checksum over everything before it, less the first `after` bytes of the frame."""
+
+    kind: Literal["checksum"]
+    algorithm: Algorithm
+    after: int = Field(default=0, ge=0)
+    written: Literal["binary", "hex", "HEX"] = "binary"
+    order: Literal["big", "little"] = "big"
+
+    @property
+    def width(self) -> int:
+        """Bytes."""
+        return checksum_bytes(self.algorithm) * (1 if self.written == "binary" else 2)
+
+    def pattern(self) -> bytes:
+        """Return the regular expression of any checksum."""
+        digit = {"binary": b"[\\x00-\\xff]", "hex": b"[0-9a-f]", "HEX": b"[0-9A-F]"}[self.written]
+        return digit + b"{%d}" % self.width
+
+    def over(self, before: bytes) -> bytes:
+        """Return the checksum as it stands on the wire, `before` being all that precedes it in the frame."""
+        raw = checksum(self.algorithm, before[self.after :]).to_bytes(checksum_bytes(self.algorithm), self.order)
+        if self.written == "binary":
+            return raw
+        text = raw.hex().encode()
+        return text.upper() if self.written == "HEX" else text
+
+
+class Skip(Strict):
+    """Bytes of fixed number that say nothing of the length; the virtual instrument writes `written`."""
+
+    kind: Literal["skip"]
+    written: Bytes = Field(min_length=1)
+
+    @property
+    def width(self) -> int:
+        """Bytes."""
+        return len(self.written)
+
+    def pattern(self) -> bytes:
+        """Return the regular expression of any bytes."""
+        return b"[\\x00-\\xff]{%d}" % self.width
+
+    def read(self, raw: bytes, found: Found) -> None:
+        """Pass over it."""
+
+    def write(self, content: Content) -> bytes:  # noqa: ARG002 (every part has this signature)
+        """Return the filling."""
+        return self.written

@@ -1,0 +1,282 @@
+"""The parts of a frame that are numbers: text, integers of every kind, IEEE floats.
+
+A number is the length (in device units) or the sample counter. `specials` are whole field contents that stand for a
+status, for example `+FFFFFFF` where a device writes that in place of digits.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+from typing import TYPE_CHECKING, Literal
+
+from pydantic import Field, model_validator
+
+from dbbstation.instrument.fields import Code, Content, Found, NotRepresentable, NotUnderstood, Strict
+
+if TYPE_CHECKING:
+    from typing import Self
+
+
+class Number(Strict):
+    """What all numbers share.
+
+    Attributes:
+        of: what it counts.
+        modulus: of a counter: it starts again from 0 there.
+        specials: contents that are no number.
+    """
+
+    of: Literal["length", "counter"] = "length"
+    modulus: int | None = Field(default=None, ge=2)
+    specials: tuple[Code, ...] = ()
+
+    @model_validator(mode="after")
+    def _modulus_with_counter(self) -> Self:
+        if (self.of == "counter") != (self.modulus is not None):
+            raise ValueError("a counter, and only a counter, has a modulus")
+        return self
+
+    def pattern(self) -> bytes:
+        """Return the regular expression of the number or one of its specials."""
+        specials = b"".join(re.escape(special.code) + b"|" for special in self.specials)
+        return b"(?:" + specials + self._digits() + b")"
+
+    def read(self, raw: bytes, found: Found) -> None:
+        """Take the number.
+
+        Raises:
+            NotUnderstood: the right characters, but no number.
+        """
+        for special in self.specials:
+            if special.code == raw:
+                found.report(special.status, special.means, special.remedy)
+                return
+        value = self._parsed(raw)
+        if self.of == "length":
+            found.value = value
+        else:
+            found.counter = int(value)
+
+    def write(self, content: Content) -> bytes:
+        """Return the number, or the special of the status to report.
+
+        Raises:
+            NotRepresentable: it does not fit.
+        """
+        for special in self.specials:
+            if special is content.voice:
+                return special.code
+        return self._written(content.value if self.of == "length" else content.counter % (self.modulus or 1))
+
+    def rounded(self, value: float) -> float:
+        """Return what is left of `value` after writing and reading it, so that a sign can be written before it."""
+        return value
+
+    def _digits(self) -> bytes:
+        raise NotImplementedError
+
+    def _parsed(self, raw: bytes) -> float:
+        raise NotImplementedError
+
+    def _written(self, value: float) -> bytes:
+        raise NotImplementedError
+
+
+class DecimalText(Number):
+    """A number in text.
+
+    Attributes:
+        width: characters, sign and decimal point included; None: as many as it takes, at most `max_width`.
+        decimals: decimals that the device writes; others are understood only with `decimals_vary`.
+        point: the decimal point.
+        pad: what fills the width on the left.
+        signed: the sign stands in this field; `plus` is what a positive number has there.
+    """
+
+    kind: Literal["decimal"]
+    width: int | None = Field(default=None, ge=1)
+    max_width: int = Field(default=16, ge=1)
+    decimals: int = Field(default=0, ge=0, le=9)
+    decimals_vary: bool = False
+    point: Literal[".", ","] = "."
+    pad: Literal[" ", "0"] = " "
+    signed: bool = False
+    plus: Literal["", "+", " "] = ""
+
+    @model_validator(mode="after")
+    def _specials_fit(self) -> Self:
+        if self.width and any(len(special.code) != self.width for special in self.specials):
+            raise ValueError("a special is as wide as the field that it stands in")
+        return self
+
+    @property
+    def binary(self) -> bool:
+        """Whether a line end can stand inside by chance."""
+        return False
+
+    def rounded(self, value: float) -> float:
+        """Round to the decimals; never minus zero."""
+        return round(value, self.decimals) + 0.0
+
+    def _digits(self) -> bytes:
+        characters = b"[ 0-9+-" + re.escape(self.point.encode()) + b"]"
+        return characters + (b"{%d}" % self.width if self.width else b"{1,%d}" % self.max_width)
+
+    def _parsed(self, raw: bytes) -> float:
+        blanks = " *" if self.pad == " " or self.plus == " " else ""
+        sign = "[+-]?" if self.signed else ""
+        match = re.fullmatch(rf"{blanks}({sign}){blanks}(\d*)(?:{re.escape(self.point)}(\d*))?", raw.decode("latin-1"))
+        if match is None or not (match[2] or match[3]):
+            raise NotUnderstood(f"{raw!r} is no number")
+        if not self.decimals_vary and len(match[3] or "") != self.decimals:
+            raise NotUnderstood(f"{raw!r} has not {self.decimals} decimals")
+        return float(f"{match[1]}{match[2] or '0'}.{match[3] or '0'}")
+
+    def _written(self, value: float) -> bytes:
+        if value < 0 and not self.signed:
+            raise NotRepresentable("the wire has no sign for a negative number")
+        body = f"{abs(value):.{self.decimals}f}".replace(".", self.point)
+        sign = ("-" if value < 0 else self.plus) if self.signed else ""
+        width = self.width or 0
+        text = sign + body.rjust(width - len(sign), "0") if self.pad == "0" else (sign + body).rjust(width)
+        if len(text) > (self.width or self.max_width):
+            raise NotRepresentable(f"{text} is wider than {self.width or self.max_width} characters")
+        return text.encode("latin-1")
+
+
+class Integer(Number):
+    """A whole number.
+
+    Attributes:
+        size: bytes of the number (in hexadecimal text: half the characters).
+        order: of the bytes.
+        signed: two's complement.
+        written: `binary`, `bcd` (two decimal digits in a byte), `hex` or `HEX` (text).
+        tags: upper bits of each byte, in wire order, where a device marks its bytes so that a listener can find the
+            start; the other `payload_bits` carry the number.
+        payload_bits: bits of each byte that carry the number.
+    """
+
+    kind: Literal["integer"]
+    size: int = Field(ge=1, le=8)
+    order: Literal["big", "little"] = "big"
+    signed: bool = False
+    written: Literal["binary", "bcd", "hex", "HEX"] = "binary"
+    tags: tuple[int, ...] = ()
+    payload_bits: int = Field(default=8, ge=1, le=8)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if bool(self.tags) != (self.payload_bits < 8):  # noqa: PLR2004 (bits of a byte)
+            raise ValueError("tags and payload_bits below 8 come together")
+        if self.tags and (len(self.tags) != self.size or self.written != "binary"):
+            raise ValueError("one tag per byte, and only for binary numbers")
+        if any(tag & ((1 << self.payload_bits) - 1) or not 0 <= tag <= 255 for tag in self.tags):  # noqa: PLR2004
+            raise ValueError("a tag uses only the bits above payload_bits")
+        if self.signed and self.written == "bcd":
+            raise ValueError("packed BCD has no sign of its own: use a sign part")
+        if any(len(special.code) != self.width for special in self.specials):
+            raise ValueError("a special is as wide as the field that it stands in")
+        return self
+
+    @property
+    def width(self) -> int:
+        """Bytes on the wire."""
+        return self.size * (2 if self.written in {"hex", "HEX"} else 1)
+
+    @property
+    def binary(self) -> bool:
+        """Whether a line end can stand inside by chance."""
+        return self.written in {"binary", "bcd"}
+
+    def rounded(self, value: float) -> float:
+        """Round to a whole number."""
+        return float(round(value))
+
+    def _digits(self) -> bytes:
+        if self.tags:
+            top = (1 << self.payload_bits) - 1
+            return b"".join(b"[\\x%02x-\\x%02x]" % (tag, tag | top) for tag in self.tags)
+        digit = {"hex": b"[0-9a-f]", "HEX": b"[0-9A-F]"}.get(self.written, b"[\\x00-\\xff]")
+        return digit + b"{%d}" % self.width
+
+    def _parsed(self, raw: bytes) -> float:
+        if self.written == "bcd":
+            text = (raw if self.order == "big" else raw[::-1]).hex()
+            if not text.isdecimal():
+                raise NotUnderstood(f"{raw.hex(' ')} is no packed decimal number")
+            return int(text)
+        if self.written != "binary":
+            raw = bytes.fromhex(raw.decode("ascii"))
+        mask, bits = (1 << self.payload_bits) - 1, self.payload_bits * self.size
+        value = 0
+        for byte in raw if self.order == "big" else raw[::-1]:
+            value = value << self.payload_bits | byte & mask
+        return value - (1 << bits) if self.signed and value >> (bits - 1) else value
+
+    def _written(self, value: float) -> bytes:
+        number = round(value)
+        if self.written == "bcd":
+            digits = str(abs(number)).rjust(2 * self.size, "0")
+            if len(digits) > 2 * self.size:
+                raise NotRepresentable(f"{number} has more than {2 * self.size} digits")
+            raw = bytes.fromhex(digits)
+            return raw if self.order == "big" else raw[::-1]
+        bits = self.payload_bits * self.size
+        low, high = (-(1 << (bits - 1)), (1 << (bits - 1)) - 1) if self.signed else (0, (1 << bits) - 1)
+        if not low <= number <= high:
+            raise NotRepresentable(f"{number} is outside {low} to {high}")
+        number %= 1 << bits
+        mask = (1 << self.payload_bits) - 1
+        pieces = [number >> self.payload_bits * place & mask for place in reversed(range(self.size))]
+        if self.order == "little":
+            pieces.reverse()
+        raw = bytes(piece | tag for piece, tag in zip(pieces, self.tags or (0,) * self.size, strict=True))
+        if self.written == "binary":
+            return raw
+        return raw.hex().upper().encode() if self.written == "HEX" else raw.hex().encode()
+
+
+class Ieee(Number):
+    """An IEEE 754 number of 4 or 8 bytes; not-a-number on the wire is no reading unless a special says so."""
+
+    kind: Literal["float"]
+    size: Literal[4, 8] = 4
+    order: Literal["big", "little"] = "big"
+
+    @property
+    def width(self) -> int:
+        """Bytes on the wire."""
+        return self.size
+
+    @property
+    def binary(self) -> bool:
+        """Whether a line end can stand inside by chance."""
+        return True
+
+    @property
+    def _format(self) -> str:
+        return (">" if self.order == "big" else "<") + ("f" if self.size == 4 else "d")  # noqa: PLR2004 (bytes)
+
+    def rounded(self, value: float) -> float:
+        """Round to what the format holds."""
+        return float(struct.unpack(self._format, struct.pack(self._format, value))[0])
+
+    def _digits(self) -> bytes:
+        return b"[\\x00-\\xff]{%d}" % self.size
+
+    def _parsed(self, raw: bytes) -> float:
+        value = float(struct.unpack(self._format, raw)[0])
+        if not math.isfinite(value):
+            raise NotUnderstood(f"{raw.hex(' ')} is not a finite number")
+        return value
+
+    def _written(self, value: float) -> bytes:
+        try:
+            return struct.pack(self._format, value)
+        except OverflowError as error:
+            raise NotRepresentable(str(error)) from None
+
+

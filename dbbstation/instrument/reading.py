@@ -1,0 +1,51 @@
+"""What an instrument says of one sample, whatever its wire looks like."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from dbbstation.errors import InstrumentError
+
+Status: TypeAlias = Literal["ok", "overrange", "fault"]
+"""`ok`: the length can be trusted. `overrange`: the device says (or its range says) that it cannot. `fault`: no length."""
+
+SEVERITY: dict[Status, int] = {"ok": 0, "overrange": 1, "fault": 2}
+"""Where several parts of a reply speak of the status, the worst is taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One sample.
+
+    Attributes:
+        t_s: host time of the sample, monotonic, in s; 0 where there is no clock (a codec alone).
+        length_mm: length in mm; None exactly when the device gave no number (`status` is then not `ok`).
+        status: see `Status`.
+        lost: samples lost immediately before this one (gap of the counter, or replies that could not be read).
+        counter: the device's own sample counter, None where its wire has none.
+        said: what the device said where `status` is not `ok`.
+        remedy: what to do about it.
+    """
+
+    t_s: float
+    length_mm: float | None
+    status: Status = "ok"
+    lost: int = 0
+    counter: int | None = None
+    said: str = ""
+    remedy: str = ""
+
+    def trusted_mm(self, where: str) -> float:
+        """Return the length in mm where it can be trusted.
+
+        Args:
+            where: port or run, for the message.
+
+        Raises:
+            InstrumentError: the device reports a fault or is out of its range.
+        """
+        if self.status == "ok" and self.length_mm is not None:
+            return self.length_mm
+        kind = "out of range" if self.status == "overrange" else "fault"
+        raise InstrumentError(f"the instrument reports {kind}: {self.said}", where=where, remedy=self.remedy)

@@ -1,0 +1,70 @@
+"""How a part of the machine warms over a session: bodies heated one through the other.
+
+Each stage follows the one before it, `τ dT/dt = T_before - T`. The first one follows the heat that the drives give off,
+scaled so that full heat for ever means `rise_k`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.signal import lfilter
+
+if TYPE_CHECKING:
+    from tests.plant.arrays import FloatArray
+    from tests.plant.run import Motion, Scene
+
+GRID_S = 1.0
+
+
+@dataclass(frozen=True)
+class Warming:
+    """A warm-up: final rise [K], time constants [s] of one or two stages, and the heat between runs.
+
+    `idle_share` is the heat while no run is on, relative to a run; with 1 the machine warms as a step response.
+    `head_start_s` is how long it had been warming when the first run began.
+    """
+
+    rise_k: float
+    time_constant_s: float
+    second_time_constant_s: float | None = None
+    idle_share: float = 1.0
+    head_start_s: float = 0.0
+
+    def excess_k(self, motion: Motion) -> FloatArray:
+        """Temperature `(n,)` above the cold machine [K] at the instants of a motion."""
+        times_s, excess_k = self.history(motion.scene, float(motion.session_s.max()))
+        return np.interp(motion.session_s, times_s, excess_k)
+
+    def history(self, scene: Scene, until_s: float) -> tuple[FloatArray, FloatArray]:
+        """Session times and temperatures, `(m,)` each, on a fine grid from the cold start on."""
+        times_s = np.arange(-self.head_start_s, max(until_s, scene.end_s) + 2 * GRID_S, GRID_S)
+        # What heats during the second that ends at a grid point is known at its middle.
+        heat = np.full(len(times_s), self.idle_share)
+        middles_s = times_s - GRID_S / 2
+        for slot in scene.slots:
+            heat[(middles_s >= slot.start_s) & (middles_s < slot.end_s)] = 1.0
+        excess_k = self.rise_k * _followed_steps(heat, self.time_constant_s)
+        if self.second_time_constant_s is not None:
+            excess_k = _followed_ramps(excess_k, self.second_time_constant_s)
+        return times_s, excess_k
+
+
+def _followed_steps(values: FloatArray, time_constant_s: float) -> FloatArray:
+    """Exact first-order response `(m,)` to an input `(m,)` constant within each second, from rest."""
+    kept = np.exp(-GRID_S / time_constant_s)
+    response = np.zeros_like(values)
+    response[1:] = lfilter([1.0 - kept], [1.0, -kept], values[1:])
+    return response
+
+
+def _followed_ramps(values: FloatArray, time_constant_s: float) -> FloatArray:
+    """Exact first-order response `(m,)` to an input `(m,)` that runs straight from second to second, from rest."""
+    kept = np.exp(-GRID_S / time_constant_s)
+    # For a ramp the response lags by τ: weights of the new and the old value of the input.
+    mean = (1.0 - kept) * time_constant_s / GRID_S
+    response = np.zeros_like(values)
+    response[1:] = lfilter([1.0], [1.0, -kept], (1.0 - mean) * values[1:] + (mean - kept) * values[:-1])
+    return response

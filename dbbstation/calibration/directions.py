@@ -1,0 +1,119 @@
+"""Directions of the parameters that recordings cannot see, said in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.layout import Layout
+
+RECOGNISED = 0.02
+"""Share of a known pattern that may lie outside the lost directions for it to count as lost."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """A way in which a machine can be wrong as a whole, by source and parameter order."""
+
+    text: str
+    strut_mm: NDArray[np.float64]
+    base_mm: NDArray[np.float64]
+
+
+def patterns(base_joints_mm: NDArray[np.float64], axis_of_strut: NDArray[np.float64]) -> list[Pattern]:
+    """Rigid motions of the base, common strut length and uniform size, in the order they are tried.
+
+    Args:
+        base_joints_mm: nominal base joints, shape (6, 3) [mm].
+        axis_of_strut: unit vectors of the struts in the middle of the travel, shape (6, 3).
+    """
+    none, still = np.zeros(STRUTS), np.zeros((STRUTS, 3))
+    found = [
+        Pattern(f"all six base joints together along {axis}", none, np.tile(np.eye(3)[k], (STRUTS, 1)))
+        for k, axis in enumerate("XYZ")
+    ]
+    found += [
+        Pattern(f"all six base joints turned together about {axis}", none, np.cross(np.eye(3)[k], base_joints_mm))
+        for k, axis in enumerate("XYZ")
+    ]
+    found.append(Pattern("all six struts together in length", np.ones(STRUTS), still))
+    found.append(Pattern("the base joints' circle in size", none, base_joints_mm * np.array([1.0, 1.0, 0.0])))
+    found += [
+        Pattern(
+            f"base joint {i + 1} along its strut together with that strut's length",
+            np.eye(STRUTS)[i],
+            np.eye(STRUTS)[i][:, None] * axis_of_strut[i],
+        )
+        for i in range(STRUTS)
+    ]
+    return found
+
+
+def in_words(layout: Layout, held: NDArray[np.float64]) -> tuple[str, ...]:
+    """One text for every direction that was held.
+
+    Args:
+        layout: columns of the fit.
+        held: orthonormal rows, fitted columns only, in units of the columns' scales, shape (h, f).
+    """
+    fitted = np.flatnonzero(~layout.known.random)
+    names = [layout.names[column] for column in fitted]
+    scale = layout.known.scale[fitted]
+    remaining = _orthonormal(held * scale)
+    texts: list[str] = []
+    for pattern in patterns(layout.machine.hexapod.base_joints_mm, _strut_axes(layout)):
+        vector = _as_columns(pattern, names)
+        if vector is None or len(remaining) == 0:
+            continue
+        outside = vector - remaining.T @ (remaining @ vector)
+        if np.linalg.norm(outside) < RECOGNISED * np.linalg.norm(vector):
+            texts.append(pattern.text)
+            inside = remaining @ vector
+            inside /= np.linalg.norm(inside)
+            # What is named is taken out of the space, and the rest is searched on.
+            remaining = _orthonormal(remaining - np.outer(inside, inside @ remaining))[: len(remaining) - 1]
+    texts += [_largest_parts(row, names) for row in remaining]
+    return tuple(texts)
+
+
+def _as_columns(pattern: Pattern, names: list[tuple[str, str, str]]) -> NDArray[np.float64] | None:
+    """Return the pattern as a vector over the fitted columns; None where the fit does not have them."""
+    parts = {"strut-reference-length": pattern.strut_mm, "base-joints": pattern.base_mm.ravel()}
+    present = {name for name, _, _ in names}
+    if any(np.any(part) and source not in present for source, part in parts.items()):
+        return None
+    vector = np.zeros(len(names))
+    for source, part in parts.items():
+        rows = [k for k, (name, _, _) in enumerate(names) if name == source]
+        if rows:
+            vector[rows] = part
+    return vector
+
+
+def _strut_axes(layout: Layout) -> NDArray[np.float64]:
+    """Unit vectors of the struts in the middle of the travel, shape (6, 3)."""
+    travel, hexapod = layout.machine.travel, layout.machine.hexapod
+    middle = np.array([0.0, 0.0, sum(travel.z_mm) / 2.0])
+    struts = hexapod.platform_joints_mm + middle - hexapod.base_joints_mm
+    return struts / np.linalg.norm(struts, axis=1, keepdims=True)
+
+
+def _largest_parts(row: NDArray[np.float64], names: list[tuple[str, str, str]]) -> str:
+    """Describe a direction without a name by its three largest parts."""
+    largest = np.argsort(-np.abs(row))[:3]
+    parts = [f"{row[k]:+.2f} {names[k][0]} {names[k][2].removesuffix('_mm').replace('_', ' ')}" for k in largest]
+    return "a combination, mostly " + ", ".join(parts)
+
+
+def _orthonormal(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    if len(rows) == 0:
+        return rows
+    _, s, vt = np.linalg.svd(rows, full_matrices=False)
+    return vt[s > 1e-9 * s[0]]

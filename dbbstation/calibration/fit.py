@@ -1,0 +1,201 @@
+"""The fit: Gauss-Newton on exact predictions with analytic sensitivities and random effects [CAL II-D]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.directions import in_words
+from dbbstation.calibration.layout import Layout, lay_out
+from dbbstation.errors import CalibrationError
+from dbbstation.inference.noise import Noise, noise_of
+from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve
+from dbbstation.sources.contract import Owner
+from dbbstation.sources.registry import sources_named
+from dbbstation.trace.circle import RawCircle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import BarReading, MachineModel
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource
+
+KINEMATIC_SOURCES = ("strut-reference-length", "base-joints")
+"""The 24 parameters of [CAL II-C]."""
+
+MEASUREMENT_SOURCES = ("mounting", "ball-coordinate", "bar-offset")
+"""Random effects that every session has, with the sizes that plan and session state."""
+
+FEWEST_TESTS = 3
+"""Fewer circles leave more directions open than they close."""
+
+MOST_STEPS = 20
+CONVERGED_MM = 1e-7
+FIRST_NOISE_MM = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What a fit found.
+
+    Attributes:
+        layout: its columns.
+        solution: values, covariance, directions and what was held, of all columns.
+        noise: of one bar reading.
+        observations: the runs that went in.
+        machine_residual_mm: per run, what the machine's own sources leave [mm].
+        residual_mm: per run, what is left after the measurement's effects too [mm].
+        directions_lost: what the recordings could not see, in words.
+    """
+
+    layout: Layout
+    solution: Solution
+    noise: Noise
+    observations: tuple[Observation, ...]
+    machine_residual_mm: tuple[NDArray[np.float64], ...]
+    residual_mm: tuple[NDArray[np.float64], ...]
+    directions_lost: tuple[str, ...]
+
+    @property
+    def model(self) -> MachineModel:
+        """Machine model with everything that was fitted."""
+        return self.layout.model(self.solution.x)
+
+    @property
+    def parameters_identified(self) -> int:
+        """Machine parameters less the directions that were held."""
+        return int(np.count_nonzero(~self.layout.known.random)) - len(self.solution.held)
+
+
+def default_sources() -> tuple[ErrorSource, ...]:
+    """Return the kinematic parameters of the paper and the random effects of every session."""
+    return sources_named(KINEMATIC_SOURCES + MEASUREMENT_SOURCES)
+
+
+def calibrate(
+    machine: Machine,
+    observations: Sequence[Observation],
+    sources: Sequence[ErrorSource] | None = None,
+) -> Calibration:
+    """Fit error sources to raw circles.
+
+    Directions that the runs cannot see are found at the nominal geometry, where they are lost exactly, judged by
+    the noise, and held at nominal. The fit looks for whole values, not for steps, so that nothing walks along a
+    direction that only the curvature of the model makes visible.
+
+    Args:
+        machine: nominal machine.
+        observations: raw runs; all share that machine.
+        sources: what to fit; the default sources if None.
+
+    Raises:
+        CalibrationError: centred circles, too few tests, or no convergence.
+        ModelError: a source lacks what it needs.
+    """
+    _check_raw(observations)
+    _check_enough(observations)
+    layout = lay_out(machine, default_sources() if sources is None else sources, observations)
+    x = np.zeros(len(layout.known.prior))
+    noise = Noise(FIRST_NOISE_MM, 1.0)
+    nominal, _ = linearise(layout, observations, x)
+    blocks = nominal
+    for _ in range(MOST_STEPS):
+        held = lost_directions(nominal, layout.known, noise.effective)
+        solution, noise = _settled(blocks, layout, noise, held)
+        change = float(np.abs(solution.x - x).max(initial=0.0))
+        x = solution.x
+        blocks, readings = linearise(layout, observations, x)
+        if change < CONVERGED_MM:
+            break
+        left = [o.raw.length_mm - reading.length_mm for o, reading in zip(observations, readings, strict=True)]
+        noise = noise_of(left, solution.freedom_used)
+    else:
+        raise CalibrationError(
+            f"the fit still moves by {1e3 * change:.3g} µm after {MOST_STEPS} steps",
+            remedy="check that machine, plan and recordings belong together; leave out doubtful tests with --exclude",
+        )
+    return Calibration(
+        layout=layout,
+        solution=solution,
+        noise=noise,
+        observations=tuple(observations),
+        machine_residual_mm=residuals(layout.model(x).of_the_machine(), observations),
+        residual_mm=residuals(layout.model(x), observations),
+        directions_lost=in_words(layout, held),
+    )
+
+
+def linearise(
+    layout: Layout, observations: Sequence[Observation], x: NDArray[np.float64]
+) -> tuple[list[Block], list[BarReading]]:
+    """Compress every run about the values x, shape (k,), so that a solution of the blocks is again a whole x."""
+    model = layout.model(x)
+    blocks, readings = [], []
+    for observation in observations:
+        motion = observation.motion()
+        reading = model.bar(motion)
+        terms = [term for term in layout.terms if term.acts_on(motion)]
+        jacobian = np.hstack(
+            [np.zeros((len(observation.raw), 0))]
+            + [reading.by_parameters(term.source.derivative(motion, layout.machine, x[term.columns])) for term in terms]
+        )
+        columns = np.concatenate([np.r_[term.columns] for term in terms])
+        target = observation.raw.length_mm - reading.length_mm + jacobian @ x[columns]
+        blocks.append(compress(columns, jacobian, target))
+        readings.append(reading)
+    return blocks, readings
+
+
+def _settled(
+    blocks: Sequence[Block], layout: Layout, noise: Noise, held: NDArray[np.float64]
+) -> tuple[Solution, Noise]:
+    """Solve with the noise that the solution itself leaves: three rounds settle it to a per mille."""
+    count = sum(block.count for block in blocks)
+    sigma = noise.sigma
+    for _ in range(3):
+        solution = solve(blocks, layout.known, sigma * np.sqrt(noise.correlation_samples), held)
+        square = (solution.chi2 - solution.prior_chi2) * sigma**2 * noise.correlation_samples
+        sigma = float(np.sqrt(max(square, 0.0) / max(count - solution.freedom_used, 1.0)))
+        sigma = max(sigma, SMALLEST_NOISE_MM)
+    return solution, Noise(sigma, noise.correlation_samples)
+
+
+SMALLEST_NOISE_MM = 1e-7
+"""No bar is better; keeps noise-free simulations from dividing by zero."""
+
+
+def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple[NDArray[np.float64], ...]:
+    """Measured minus predicted length of every run, shape (n,) each [mm]."""
+    return tuple(o.raw.length_mm - model.bar(o.motion()).length_mm for o in observations)
+
+
+def _check_raw(observations: Sequence[Observation]) -> None:
+    """Refuse anything but raw circles: a removed centre is the machine's position error [CAL III-A]."""
+    for observation in observations:
+        if not isinstance(observation.raw, RawCircle):
+            raise CalibrationError(
+                "is a centred circle: its position on the machine is gone",
+                where=observation.test,
+                remedy="calibrate from the raw recording",
+            )
+
+
+def _check_enough(observations: Sequence[Observation]) -> None:
+    tests = {(o.setup.session, o.test) for o in observations}
+    if len(tests) < FEWEST_TESTS:
+        raise CalibrationError(
+            f"{len(tests)} test{'s' if len(tests) != 1 else ''} cannot calibrate a machine: at least {FEWEST_TESTS} at "
+            "different places are needed, and the fifteen of the jig plan to see all it can",
+            remedy="measure more tests, or evaluate these under an existing model",
+        )
+
+
+def machine_sources(sources: Sequence[ErrorSource]) -> tuple[ErrorSource, ...]:
+    """Those that belong to the machine."""
+    return tuple(source for source in sources if source.belongs_to is Owner.MACHINE)

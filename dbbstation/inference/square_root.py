@@ -1,0 +1,205 @@
+"""Linear least squares with random effects, in square-root form.
+
+A channel of measurements is target = J x + noise, cut into blocks (runs) that each touch few of the columns
+of x. Every block is compressed to a small triangle by orthogonal transformation, which loses nothing of what it
+says about x and never squares the condition number; all further work is on the triangles. Columns with a
+stated standard deviation are random effects: their prior is one more row. [Bierman, Factorization Methods for
+Discrete Sequential Estimation, 1977, ch. II and V]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """All that one run says about its columns.
+
+    Attributes:
+        columns: which columns of x it touches, shape (k,).
+        triangle: upper triangle of J, shape (r, k), with r at most k + 1.
+        target: transformed right-hand side, shape (r,).
+        count: measurements that went into it.
+        square: sum of squares of the target, which bounds what any fit can explain.
+    """
+
+    columns: NDArray[np.int64]
+    triangle: NDArray[np.float64]
+    target: NDArray[np.float64]
+    count: int
+    square: float
+
+
+def compress(columns: NDArray[np.int64], jacobian: NDArray[np.float64], target: NDArray[np.float64]) -> Block:
+    """Compress a run, shapes (k,), (n, k) and (n,), to its triangle."""
+    stacked = np.column_stack([jacobian, target])
+    triangle = _triangle(stacked)[: jacobian.shape[1] + 1]
+    return Block(columns, triangle[:, :-1], triangle[:, -1], len(target), float(target @ target))
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """What is known of the columns of x before the measurement.
+
+    Attributes:
+        prior: standard deviation of each column about zero, infinite where nothing is known, shape (k,).
+        scale: size at which a column would matter, shape (k,): a direction is lost when the measurement
+            leaves it more uncertain than this.
+        random: True for random effects, which are averaged over rather than reported, shape (k,).
+    """
+
+    prior: NDArray[np.float64]
+    scale: NDArray[np.float64]
+    random: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Directions of the fitted columns, in units of their scales, from best seen to worst.
+
+    Attributes:
+        singular: information along each, one over its standard deviation, shape (f,).
+        vectors: orthonormal rows, shape (f, f).
+    """
+
+    singular: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Result of `solve`.
+
+    Attributes:
+        x: all columns, shape (k,).
+        covariance: of all columns, shape (k, k); zero along directions that were held.
+        directions: what the measurement sees of the fitted columns, the random ones averaged over.
+        held: orthonormal rows of directions, in units of the scales, that were held at zero, shape (h, f).
+        chi2: weighted sum of squares that remains, priors included.
+        prior_chi2: the priors' part of it.
+        freedom_used: degrees of freedom that the fit spent on the measurements.
+    """
+
+    x: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    directions: Directions
+    held: NDArray[np.float64]
+    chi2: float
+    prior_chi2: float
+    freedom_used: float
+
+
+def solve(
+    blocks: Sequence[Block],
+    known: Columns,
+    noise: float,
+    held: NDArray[np.float64] | None = None,
+) -> Solution:
+    """Best linear unbiased estimate of the fitted columns and best prediction of the random ones.
+
+    Args:
+        blocks: compressed runs.
+        known: priors and scales.
+        noise: standard deviation of one measurement.
+        held: orthonormal rows of fitted directions, in units of the scales, to keep at zero, shape (h, f).
+    """
+    random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
+    root, target, chi2_floor = _stacked(blocks, known, noise, np.concatenate([random, fitted]))
+    m = len(random)
+    inner, cross = root[:m, :m], root[:m, m:]
+    scale = known.scale[fitted]
+    seen = root[m:, m:] * scale
+    directions = directions_of(seen)
+    held = np.zeros((0, len(fitted))) if held is None else held
+    free = _complement(held)
+    u, s, vt = np.linalg.svd(seen @ free.T, full_matrices=False)
+    towards = free.T @ vt.T
+    x = np.zeros(len(known.prior))
+    x[fitted] = scale * (towards @ ((u.T @ target[m : m + len(fitted)]) / s))
+    x[random] = solve_triangular(inner, target[:m] - cross @ x[fitted]) if m else x[random]
+    spread = scale[:, None] * towards / s
+    inner_inverse = solve_triangular(inner, np.eye(m)) if m else np.zeros((0, 0))
+    pull = -inner_inverse @ (cross @ spread)
+    factor = np.zeros((len(known.prior), m + len(s)))
+    factor[random, :m] = inner_inverse
+    factor[random, m:] = pull
+    factor[fitted, m:] = spread
+    covariance = factor @ factor.T
+    remaining = target - root @ np.concatenate([x[random], x[fitted]])
+    with_prior = np.isfinite(known.prior)
+    prior_chi2 = float(np.sum((x[with_prior] / known.prior[with_prior]) ** 2))
+    used = m + len(s) - float(np.sum(np.diag(covariance)[with_prior] / known.prior[with_prior] ** 2))
+    return Solution(
+        x=x,
+        covariance=covariance,
+        directions=directions,
+        held=held,
+        chi2=chi2_floor + float(remaining @ remaining),
+        prior_chi2=prior_chi2,
+        freedom_used=used,
+    )
+
+
+def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> NDArray[np.float64]:
+    """Orthonormal rows of fitted directions, in units of the scales, that the blocks leave uncertain by more than 1."""
+    random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
+    root, _, _ = _stacked(blocks, known, noise, np.concatenate([random, fitted]))
+    directions = directions_of(root[len(random) :, len(random) :] * known.scale[fitted])
+    return directions.vectors[directions.singular < 1.0]
+
+
+def directions_of(seen: NDArray[np.float64]) -> Directions:
+    """Singular directions of a scaled information root, shape (r, f), best seen first."""
+    _, singular, vectors = np.linalg.svd(seen, full_matrices=True)
+    padded = np.zeros(seen.shape[1])
+    padded[: len(singular)] = singular
+    return Directions(padded, vectors)
+
+
+def _stacked(
+    blocks: Sequence[Block],
+    known: Columns,
+    noise: float,
+    order: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Triangle and right-hand side of all blocks and priors, columns in `order`, and the residual below it."""
+    total = len(known.prior)
+    place = np.empty(total, dtype=np.int64)
+    place[order] = np.arange(total)
+    rows = [np.zeros((0, total + 1))]
+    for block in blocks:
+        wide = np.zeros((len(block.target), total + 1))
+        wide[:, place[block.columns]] = block.triangle / noise
+        wide[:, -1] = block.target / noise
+        rows.append(wide)
+    finite = np.flatnonzero(np.isfinite(known.prior))
+    priors = np.zeros((len(finite), total + 1))
+    priors[np.arange(len(finite)), place[finite]] = 1.0 / known.prior[finite]
+    triangle = _triangle(np.vstack([*rows, priors, np.zeros((total + 1, total + 1))]))
+    floor = float(triangle[total, total] ** 2)
+    root: NDArray[np.float64] = triangle[:total, :total]
+    return root, triangle[:total, -1], floor
+
+
+def _triangle(stacked: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Upper triangle of the QR factors; NaN and infinity are refused."""
+    (triangle,) = qr(stacked, mode="r", overwrite_a=True)
+    return np.asarray(triangle, dtype=np.float64)
+
+
+def _complement(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Orthonormal rows of everything orthogonal to orthonormal rows."""
+    if len(rows) == 0:
+        return np.eye(rows.shape[1])
+    _, _, vt = np.linalg.svd(rows, full_matrices=True)
+    return vt[len(rows) :]

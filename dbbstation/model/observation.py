@@ -1,0 +1,77 @@
+"""What was commanded and what was measured, side by side: one run as calibration and diagnosis take it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Motion, Setup
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.trace.circle import RawCircle
+
+LEAD_IN_STEP_DEG = 1.0
+"""Spacing of the poses before the turn, where history is made but nothing is compared [deg]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """One accepted run.
+
+    Attributes:
+        test: name of the test in its plan.
+        repeat: counts the runs of one test and direction in a session.
+        raw: the full turn as measured.
+        setup: ball, mounting, bar and how well they are known.
+        started_s: start of the run after the start of its session [s]; None where the session does not say.
+        commanded: poses that were commanded where they were not the plan's circle, at the raw circle's samples
+            after those of the lead-in; None for the plan's circle.
+    """
+
+    test: str
+    repeat: int
+    raw: RawCircle
+    setup: Setup
+    started_s: float | None = None
+    commanded: NDArray[np.float64] | None = None
+
+    @property
+    def label(self) -> str:
+        """Name of the run in texts and tables."""
+        return f"{self.test} {self.raw.circle.direction} {self.repeat}"
+
+    @property
+    def lead_in_deg(self) -> NDArray[np.float64]:
+        """Progress of the lead-in poses, ending one step before the turn [deg]."""
+        return np.arange(-self.raw.circle.overshoot_deg, 0.0, LEAD_IN_STEP_DEG)
+
+    def motion(self) -> Motion:
+        """The run as error sources see it: the overshoot arc that leads to the turn, then the turn's samples."""
+        raw, circle = self.raw, self.raw.circle
+        lead_in = self.lead_in_deg
+        phi = np.concatenate([lead_in, raw.phi_deg])
+        before = len(lead_in)
+        poses = circle.poses(circle.theta_deg(phi)) if self.commanded is None else self.commanded
+        time = None
+        if self.started_s is not None:
+            time = self.started_s + np.concatenate(
+                [raw.t_s[0] + (lead_in - raw.phi_deg[0]) / circle.turning_deg_s, raw.t_s]
+            )
+        return Motion(
+            poses=poses,
+            is_path=True,
+            kept=slice(before, None),
+            time_s=time,
+            temperature_degc={name: _held_back(values, before) for name, values in raw.temperature_degc.items()},
+            motor_current_a=None if raw.motor_current_a is None else _held_back(raw.motor_current_a, before),
+            setup=self.setup,
+        )
+
+
+def _held_back(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Values with the first one repeated before them: nobody logged the lead-in."""
+    return np.concatenate([np.repeat(values[:1], count, axis=0), values])

@@ -1,0 +1,120 @@
+"""`dbb-machine/1`: the nominal machine, as its controller believes it."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
+from dbbstation.files.schema import Schema, read_document, validate
+from dbbstation.machine.geometry import Hexapod, Machine, Masses, Travel
+from dbbstation.machine.rotation import Rotation
+
+_Millimetre = Annotated[float, Quantity("mm", 0, 20, signed=True)]
+
+
+class TravelSchema(Schema):
+    """Limits of the machine; pairs are [least, greatest]."""
+
+    xy_radius_mm: Annotated[float, Quantity("mm", 5, 10_000)]
+    """Greatest distance of the tool tip from the Z axis [mm]."""
+    x_mm: LimitsMm
+    """X of the tool tip, machine frame [mm]."""
+    y_mm: LimitsMm
+    """Y of the tool tip, machine frame [mm]."""
+    z_mm: LimitsMm
+    """Z of the tool tip, machine frame, up positive [mm]."""
+    a_deg: LimitsDeg
+    """Tilt A about X [deg]."""
+    b_deg: LimitsDeg
+    """Tilt B about Y [deg]."""
+    c_deg: LimitsDeg
+    """Turn C about Z [deg]."""
+    strut_mm: LimitsMm
+    """Length of a strut between its joints [mm]."""
+
+
+class MassesSchema(Schema):
+    """What gravity acts on."""
+
+    platform_kg: Annotated[float, Quantity("kg", 1, 100_000)]
+    """Platform with spindle and tool [kg]."""
+    centre_of_gravity_above_tip_mm: Annotated[float, Quantity("mm", 5, 5_000, or_zero=True, signed=True)]
+    """Height of the platform's centre of gravity above the tool tip, along the platform's axis, up positive [mm]."""
+
+
+class MachineParts(Schema):
+    """The machine itself: what a machine file holds beside its `format` line, and a model holds inline."""
+
+    name: Annotated[str, Field(min_length=1)]
+    """What people call the machine."""
+    rotation: Literal["Rx(A) Ry(B) Rz(C)", "Rz(C) Ry(B) Rx(A)"]
+    """How the tilt angles turn platform axes into machine axes; the second is that of LinuxCNC's genhexkins."""
+    base_joints_mm: tuple[JointMm, JointMm, JointMm, JointMm, JointMm, JointMm]
+    """Centres of the base joints of struts 1 to 6, machine frame, Z up [mm]."""
+    platform_joints_mm: tuple[JointMm, JointMm, JointMm, JointMm, JointMm, JointMm]
+    """Centres of the platform joints of struts 1 to 6, platform frame with its origin at the tool tip [mm]."""
+    reference_length_error_mm: tuple[_Millimetre, _Millimetre, _Millimetre, _Millimetre, _Millimetre, _Millimetre] = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
+    """Strut errors that the controller already corrects: it drives strut i to F_i(T) minus this; positive where the
+    strut is longer than the controller believed [mm]."""
+    travel: TravelSchema
+    """Limits that plans and programs are checked against."""
+    screw_lead_mm: Annotated[float, Quantity("mm", 0.5, 200)] | None = None
+    """Travel of a strut per turn of its screw [mm]."""
+    joint_tolerance_mm: Annotated[float, Quantity("mm", 1e-4, 10)] | None = None
+    """Standard deviation of each base-joint coordinate after assembly [mm]; without it no weak direction of a
+    calibration is regularised."""
+    masses: MassesSchema | None = None
+    """What gravity acts on; needed by the sources that model it."""
+
+    def to_domain(self) -> Machine:
+        """Return the machine that calculations use."""
+        masses = self.masses
+        return Machine(
+            name=self.name,
+            hexapod=Hexapod(
+                np.array(self.base_joints_mm, dtype=np.float64),
+                np.array(self.platform_joints_mm, dtype=np.float64),
+                Rotation(self.rotation),
+            ),
+            travel=Travel(**{name: getattr(self.travel, name) for name in TravelSchema.model_fields}),
+            reference_length_error_mm=np.array(self.reference_length_error_mm, dtype=np.float64),
+            screw_lead_mm=self.screw_lead_mm,
+            masses=masses and Masses(**{name: getattr(masses, name) for name in MassesSchema.model_fields}),
+            joint_tolerance_mm=self.joint_tolerance_mm,
+        )
+
+
+class MachineFile(MachineParts):
+    """A hexapod machine tool as its controller believes it: joints, travel, screws, masses."""
+
+    format: Literal["dbb-machine/1"]
+    """Name and version of this format."""
+
+
+def read_machine(path: Path) -> Machine:
+    """Read a machine file.
+
+    Raises:
+        InputError: every fault of the file with its place.
+    """
+    faults: list[Problem] = []
+    parts = parse_machine(path, faults)
+    if parts is None or faults:
+        raise InputError(faults)
+    return parts.to_domain()
+
+
+def parse_machine(path: Path, faults: list[Problem]) -> MachineFile | None:
+    """Read a machine file; None with every fault added to `faults`."""
+    document = read_document(path, MachineFile, faults)
+    return document and validate(document, MachineFile, faults)

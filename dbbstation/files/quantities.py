@@ -1,0 +1,154 @@
+"""Numbers with a unit, as the schemas use them: a plausible range tells a number in the wrong unit from a right one."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+_MISTAKEN: dict[str, tuple[tuple[str, float], ...]] = {
+    "mm": (("m", 1e3), ("µm", 1e-3), ("inch", 25.4)),
+    "µm": (("mm", 1e3), ("m", 1e6), ("nm", 1e-3)),
+    "deg": (("rad", math.degrees(1.0)),),
+    "mm/min": (("m/min", 1e3), ("mm/s", 60.0), ("m/s", 6e4)),
+    "µm/(m K)": (("1/K", 1e6),),
+    "kg": (("g", 1e-3), ("t", 1e3)),
+}
+"""What people write by mistake: another unit, and what one of it is in the right one."""
+
+_KELVIN_AT_0_DEGC = 273.15
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number in a unit, plausible between two sizes.
+
+    Attributes:
+        unit: as printed.
+        least: smallest plausible value, or size where `signed`.
+        most: greatest plausible value, or size where `signed`.
+        or_zero: zero is allowed as well.
+        signed: the range holds for the absolute value.
+    """
+
+    unit: str
+    least: float
+    most: float
+    or_zero: bool = False
+    signed: bool = False
+
+    def fits(self, value: float) -> bool:
+        """Whether a value is plausible."""
+        size = abs(value) if self.signed else value
+        return self.least <= size <= self.most or (self.or_zero and value == 0)
+
+    def check(self, value: float) -> float:
+        """Return the value.
+
+        Raises:
+            PydanticCustomError: it is not plausible; says what range is, and which unit it looks like.
+        """
+        if self.fits(value):
+            return value
+        raise PydanticCustomError(
+            "implausible",
+            "{value} {unit} is not plausible, expected {range} {unit}{guess}",
+            {"value": f"{value:g}", "unit": self.unit, "range": self._range(), "guess": self.guess(value)},
+        )
+
+    def guess(self, value: float) -> str:
+        """Say which other unit a value looks like; empty where none."""
+        for unit, factor in _MISTAKEN.get(self.unit, ()):
+            if self.fits(value * factor):
+                return f" (it looks like {unit})"
+        if self.unit == "degC" and self.fits(value - _KELVIN_AT_0_DEGC):
+            return " (it looks like kelvin)"
+        return ""
+
+    def _range(self) -> str:
+        zero = "0 or " if self.or_zero and self.least > 0 else ""
+        sign = "±" if self.signed else ""
+        return f"{zero}{sign}{self.least:g} to {sign}{self.most:g}"
+
+    def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Check after the number itself was checked."""
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Print unit and range in the JSON Schema."""
+        low = -self.most if self.signed else (min(0.0, self.least) if self.or_zero else self.least)
+        return {**handler(schema), "unit": self.unit, "minimum": low, "maximum": self.most}
+
+
+Coordinate = Annotated[float, Quantity("mm", 0, 10_000, signed=True)]
+Point = tuple[Coordinate, Coordinate, Coordinate]
+"""x, y, z [mm]."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far from the origin a point plausibly lies: catches points in metres, whose coordinates alone say nothing."""
+
+    distance: Quantity
+
+    def __call__(self, point: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the point, or raise with its distance."""
+        distance = math.hypot(*point)
+        if not self.distance.fits(distance):
+            raise PydanticCustomError(
+                "implausible",
+                "lies {value} mm from the origin, expected {least} to {most} mm{guess}",
+                {
+                    "value": f"{distance:g}",
+                    "least": f"{self.distance.least:g}",
+                    "most": f"{self.distance.most:g}",
+                    "guess": self.distance.guess(distance),
+                },
+            )
+        return point
+
+
+@dataclass(frozen=True)
+class Rising:
+    """A pair of limits: the second above the first, by a plausible amount."""
+
+    span: Quantity
+
+    def __call__(self, pair: tuple[float, float]) -> tuple[float, float]:
+        """Return the pair, or raise with its span."""
+        low, high = pair
+        if high < low:
+            raise PydanticCustomError("falling", "the lower limit must come first", {})
+        if not self.span.fits(high - low):
+            raise PydanticCustomError(
+                "implausible",
+                "the limits lie {value} {unit} apart, which is not plausible{guess}",
+                {"value": f"{high - low:g}", "unit": self.span.unit, "guess": self.span.guess(high - low)},
+            )
+        return pair
+
+
+_ANGLE = Annotated[float, Quantity("deg", 0, 360, signed=True)]
+LimitsMm = Annotated[tuple[Coordinate, Coordinate], AfterValidator(Rising(Quantity("mm", 5, 20_000)))]
+"""Least and greatest [mm]."""
+LimitsDeg = Annotated[tuple[_ANGLE, _ANGLE], AfterValidator(Rising(Quantity("deg", 1, 720, or_zero=True)))]
+"""Least and greatest [deg]."""
+JointMm = Annotated[Point, AfterValidator(Reach(Quantity("mm", 20, 20_000)))]
+"""A joint's centre: x, y, z [mm]."""
+TemperatureDegc = Annotated[float, Quantity("degC", -30, 80)]
+ExpansionUmMK = Annotated[float, Quantity("µm/(m K)", 0.01, 50, or_zero=True)]
+Sha256 = str
+
+
+def twice(values: Iterable[Any]) -> list[int]:
+    """Indices of values that stood earlier already."""
+    seen: set[Any] = set()
+    again = []
+    for index, value in enumerate(values):
+        if value in seen:
+            again.append(index)
+        seen.add(value)
+    return again

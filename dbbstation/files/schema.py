@@ -1,0 +1,176 @@
+"""What all schemas share: strict, nothing unknown, frozen; and how their complaints become placed problems."""
+
+import difflib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from dbbstation.errors import Problem
+from dbbstation.files.yaml_text import Location, YamlDocument, load_yaml
+
+FORMATS = {
+    "dbb-session": "a session",
+    "dbb-machine": "a machine",
+    "dbb-plan": "a test plan",
+    "dbb-jig": "a jig",
+    "dbb-model": "a model",
+}
+"""Every format by the name before its version, with what it is called in messages."""
+
+
+class Schema(BaseModel):
+    """Base of every part of a file format; the docstring under each field tells its unit and sign."""
+
+    model_config = ConfigDict(
+        strict=True,
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+    )
+
+
+S = TypeVar("S", bound=Schema)
+
+
+def read_document(path: Path, schema: type[Schema], faults: list[Problem]) -> YamlDocument | None:
+    """Read a YAML file of the format that `schema` describes; None where it is no such file."""
+    document = load_yaml(path, faults)
+    if document is None:
+        return None
+    if not isinstance(document.data, dict):
+        what = "the file holds no `key: value` lines"
+        faults.append(document.problem((), what, "compare it with the example of its format"))
+        return None
+    return document if _has_format(document, format_of(schema), faults) else None
+
+
+def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> S | None:
+    """Return a document's data as its schema has it; None with every fault added to `faults`."""
+    try:
+        return schema.model_validate(document.data)
+    except ValidationError as error:
+        faults.extend(_problem(document, schema, detail) for detail in error.errors(include_url=False))
+        return None
+
+
+def format_of(schema: type[Schema]) -> str:
+    """Return the format's name with its version, such as `dbb-plan/1`."""
+    return str(schema.model_fields["format"].annotation.__args__[0])  # type: ignore[union-attr]  # it is a Literal
+
+
+def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) -> bool:
+    name, wanted = expected.split("/")[0], FORMATS[expected.split("/")[0]]
+    if "format" not in document.data:
+        what = f"the file does not say what format it has, {wanted} was expected"
+        faults.append(document.problem((), what, f"begin it with `format: {expected}`"))
+        return False
+    given = document.data["format"]
+    if given == expected:
+        return True
+    given_name = str(given).split("/", maxsplit=1)[0]
+    if given_name == name:
+        what, remedy = f"`{given}` is a version that this program does not know", f"it reads {expected}"
+    elif given_name in FORMATS:
+        what = f"this file is {FORMATS[given_name]} (`{given}`), {wanted} (`{expected}`) was expected"
+        remedy = "check which file is given where"
+    else:
+        what, remedy = f"`{given}` is no format that this program knows", f"write `format: {expected}`"
+    faults.append(document.problem(("format",), what, remedy))
+    return False
+
+
+def _problem(document: YamlDocument, schema: type[Schema], detail: ErrorDetails) -> Problem:
+    """Put one complaint of pydantic into plain words at its place."""
+    location = _known_part(document, detail["loc"])
+    kind, given, context = detail["type"], detail["input"], detail.get("ctx", {})
+    if kind == "missing":
+        missing = str(detail["loc"][-1])
+        return document.problem(location, f"{_within(location)}the key `{missing}` is missing", "add it")
+    if kind == "extra_forbidden":
+        allowed = list(keys_at(schema, location[:-1]))
+        near = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
+        remedy = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(sorted(allowed))}"
+        what = f"{_within(location[:-1])}the key `{location[-1]}` is not known"
+        return document.problem(location, what, remedy, at_key=True)
+    what, remedy = _in_words(kind, given, context, detail["msg"])
+    return document.problem(location, f"{dotted(location)}: {what}", remedy)
+
+
+def _in_words(kind: str, given: object, context: dict[str, Any], message: str) -> tuple[str, str]:  # noqa: PLR0911
+    """What is wrong with a value and what to do, for the kinds of fault that files have."""
+    if kind in {"float_type", "int_type", "int_from_float", "finite_number"}:
+        number = "a whole number" if kind.startswith("int") else "a number"
+        return f"{number} was expected, not {_shown(given)}", "write digits with a dot as decimal sign"
+    if kind == "string_type":
+        remedy = "put it in quotes" if isinstance(given, int | float) else "write one word or text in quotes"
+        return f"text was expected, not {_shown(given)}", remedy
+    if kind == "literal_error":
+        return f"{_shown(given)} is not one of {context['expected']}", "use one of these"
+    if kind in {"tuple_type", "list_type"}:
+        return f"a list [...] was expected, not {_shown(given)}", "put the values in brackets"
+    if kind in {"model_type", "dict_type", "model_attributes_type"}:
+        return f"`key: value` entries were expected, not {_shown(given)}", "compare it with the example of its format"
+    if kind in {"too_long", "too_short"}:
+        limit = context.get("max_length", context.get("min_length"))
+        return f"{limit} values were expected, not {context['actual_length']}", "check the list"
+    if kind == "implausible":
+        return message, "check the unit"
+    return message[:1].lower() + message[1:], ""
+
+
+def dotted(location: Location) -> str:
+    """Write a location as people do: `tests[3].ball`."""
+    text = ""
+    for step in location:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else str(step)
+    return text
+
+
+def _within(location: Location) -> str:
+    return f"{dotted(location)}: " if location else ""
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "nothing"
+    if isinstance(value, dict | tuple):
+        return "`key: value` entries" if isinstance(value, dict) else f"a list of {len(value)}"
+    if isinstance(value, str):
+        return f"the text `{value}`"
+    return f"`{str(value).lower() if isinstance(value, bool) else value}`"
+
+
+def _known_part(document: YamlDocument, location: tuple[int | str, ...]) -> Location:
+    """Drop what pydantic puts into a location beside keys and indices: names of union members, `[key]`."""
+    known: Location = ()
+    for step in location:
+        if (*known, step) in document.value_places:
+            known = (*known, step)
+    return known
+
+
+def keys_at(schema: type[Schema], location: Location) -> Iterator[str]:
+    """Keys that a schema knows for the mapping at a location."""
+    root = schema.model_json_schema()
+    definitions = root.get("$defs", {})
+
+    def alternatives(part: dict[str, Any]) -> list[dict[str, Any]]:
+        if "$ref" in part:
+            return alternatives(definitions[part["$ref"].rsplit("/", maxsplit=1)[-1]])
+        return [found for option in part["anyOf"] for found in alternatives(option)] if "anyOf" in part else [part]
+
+    parts = alternatives(root)
+    for step in location:
+        inner: list[dict[str, Any]] = []
+        for part in parts:
+            if isinstance(step, int) and "prefixItems" in part:
+                inner += part["prefixItems"][step : step + 1]
+            inner += [part[name] for name in ("items", "additionalProperties") if isinstance(part.get(name), dict)]
+            inner += [part["properties"][step]] if step in part.get("properties", {}) else []
+        parts = [found for option in inner for found in alternatives(option)]
+    for part in parts:
+        yield from part.get("properties", {})

@@ -116,12 +116,15 @@ class Parameter:
         unit: as printed.
         plausible: usual size, one standard deviation, in that unit.
         meaning: one line with the sign.
+        shape: values to search over, where the effect is not proportional to the parameter (a time constant, a
+            phase); empty for an amplitude, which the effect is proportional to.
     """
 
     name: str
     unit: str
     plausible: float
     meaning: str
+    shape: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

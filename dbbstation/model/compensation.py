@@ -1,0 +1,75 @@
+"""Inversion of a machine model: what to command so that the tool goes where it should."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import ModelError
+from dbbstation.machine.kinematics import forward, inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.model.machine_model import MachineModel, actual_hexapod
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.sources.contract import Motion
+
+MOST_ROUNDS = 30
+AGREED_MM = 1e-10
+
+
+def compensated(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
+    """Poses to command so that the actual machine goes to the wanted ones, in six degrees of freedom.
+
+    The controller drives the struts to F(T; nominal). The actual machine needs F(T wanted; actual) less what the
+    error sources add, so the command is the pose at which the nominal machine has those lengths. Sources act on
+    what is commanded, hence the rounds: where they hang on the pose, each shrinks the remainder by the ratio of
+    error to travel, about 1e-4; where they do not, the first round is exact.
+
+    Args:
+        model: calibrated model; only what belongs to the machine is inverted.
+        wanted: poses that the tool tip should take, all rows.
+
+    Returns:
+        Poses, shape (n, 6) [mm, deg], for all rows of `wanted`.
+
+    Raises:
+        KinematicsError: a pose that the machine cannot take.
+        ModelError: a source needs what the motion does not give, or the rounds do not agree.
+    """
+    own = model.of_the_machine()
+    nominal, convention = model.machine.hexapod, model.machine.hexapod.rotation
+    target = Frames.from_poses(wanted.poses, convention)
+    commanded, last = wanted.poses, np.full((len(wanted), 6), np.inf)
+    for _ in range(MOST_ROUNDS):
+        effect = own.effect(replace(wanted, poses=commanded))
+        platform = target
+        if effect.tool_tip_mm is not None:
+            tip = np.broadcast_to(effect.tool_tip_mm, (len(target), 3))
+            platform = replace(target, position_mm=target.position_mm - np.einsum("nij,nj->ni", target.rotation, tip))
+        needed = inverse(actual_hexapod(nominal, effect), platform).length_mm
+        strut = 0.0 if effect.strut_mm is None else effect.strut_mm
+        driven = needed - strut + model.machine.reference_length_error_mm
+        if np.abs(driven - last).max() < AGREED_MM:
+            return commanded
+        commanded = forward(nominal, driven, target).to_poses(convention)
+        last = driven
+    raise ModelError(
+        f"the compensation does not settle: {np.abs(driven - last).max():.2e} mm after {MOST_ROUNDS} rounds",
+        remedy="check the model's sources for an effect as large as the motion itself",
+    )
+
+
+def shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
+    """Poses shifted by minus the predicted position error, tilt left alone [GRAV 4.1], shape (n, 6) [mm, deg].
+
+    Kept for comparison with the published compensation: it is first order in the error and leaves the
+    orientation wrong.
+    """
+    error = model.of_the_machine().actual_poses(replace(wanted, kept=slice(None))) - wanted.poses
+    poses = wanted.poses.copy()
+    poses[:, :3] -= error[:, :3]
+    return poses

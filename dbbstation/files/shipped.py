@@ -19,4 +19,6 @@ def shipped_folder(name: str) -> Path:
     for folder in (package / name, package.parent / name):
         if folder.is_dir():
             return folder
-    raise InputError([Problem(str(package / name), 0, 0, "this folder of the installation is missing", "install dbbstation again")])
+    raise InputError(
+        [Problem(str(package / name), 0, 0, "this folder of the installation is missing", "install dbbstation again")]
+    )

@@ -51,13 +51,21 @@ class ByteLog:
     """
 
     def __init__(
-        self, path: Path, *, instrument: str, port: str, force: bool = False, clock: Callable[[], float] = time.monotonic
+        self,
+        path: Path,
+        *,
+        instrument: str,
+        port: str,
+        force: bool = False,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         try:
             # Line buffered: after a crash everything but the last line stands in the file.
             self._file = path.open("w" if force else "x", encoding="utf-8", buffering=1, newline="\n")
         except FileExistsError:
-            raise OutputError("the byte log exists already", where=str(path), remedy="give another name or --force") from None
+            raise OutputError(
+                "the byte log exists already", where=str(path), remedy="give another name or --force"
+            ) from None
         except OSError as error:
             raise OutputError(f"cannot write the byte log: {error.strerror}", where=str(path)) from None
         self._path = path

@@ -65,7 +65,7 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
         except NotRepresentable:
             status, value = "overrange", 0.0
     for wanted in ("overrange", "fault") if status == "overrange" else ("fault",):
-        voice = protocol.voice(wanted)  # type: ignore[arg-type]  # the tuples hold statuses, which mypy widens to str
+        voice = protocol.voice(wanted)
         if voice is not None:
             return _told(voice[0], Content(value, counter, voice[1]))
     raise InstrumentError(
@@ -192,6 +192,11 @@ class GapCounter:
     def __init__(self, modulus: int | None) -> None:
         self._modulus = modulus
         self._last: int | None = None
+
+    @property
+    def counts(self) -> bool:
+        """Whether the wire has a counter."""
+        return self._modulus is not None
 
     def lost_before(self, counter: int | None, where: str) -> int:
         """Return how many samples are missing between the last one and this.

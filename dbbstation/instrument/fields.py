@@ -20,8 +20,9 @@ import re
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
+from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
+from dbbstation.files.schema import Schema
 from dbbstation.instrument.checksums import Algorithm, checksum, checksum_bytes
 from dbbstation.instrument.reading import SEVERITY, Status
 
@@ -49,12 +50,6 @@ Bytes: TypeAlias = Annotated[
     bytes, BeforeValidator(_as_bytes), PlainSerializer(lambda raw: raw.decode("latin-1"), return_type=str)
 ]
 """Bytes, written in the file as a quoted string with escapes: `"\\x02"`, `"\\r\\n"`, `"M1"`."""
-
-
-class Strict(BaseModel):
-    """Unknown keys and converted types are errors; nothing changes after loading."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 @dataclass(slots=True)
@@ -92,7 +87,7 @@ class Content:
     voice: Code | Bit | None = None
 
 
-class Code(Strict):
+class Code(Schema):
     """One code and its meaning; `remedy` says what the operator does about a status that is not ok."""
 
     code: Bytes
@@ -102,7 +97,7 @@ class Code(Strict):
     remedy: str = ""
 
 
-class Bit(Strict):
+class Bit(Schema):
     """One status bit, counted from the lowest, 0."""
 
     bit: int = Field(ge=0, le=7)
@@ -111,7 +106,7 @@ class Bit(Strict):
     remedy: str = ""
 
 
-class Literally(Strict):
+class Literally(Schema):
     """Fixed bytes."""
 
     kind: Literal["literal"]
@@ -134,7 +129,7 @@ class Literally(Strict):
         return self.value
 
 
-class Sign(Strict):
+class Sign(Schema):
     """The sign as a part of its own; the first of `plus` and of `minus` is what the device writes."""
 
     kind: Literal["sign"]
@@ -165,7 +160,7 @@ class Sign(Strict):
         return self.minus[0] if content.value < 0 else self.plus[0]
 
 
-class Choice(Strict):
+class Choice(Schema):
     """One of several codes; without a status to report the device writes the first."""
 
     kind: Literal["choice"]
@@ -187,7 +182,11 @@ class Choice(Strict):
 
     def pattern(self) -> bytes:
         """Return the regular expression of any of the codes, the longest first."""
-        return b"(?:" + b"|".join(re.escape(raw) for raw in sorted((c.code for c in self.codes), key=len, reverse=True)) + b")"
+        return (
+            b"(?:"
+            + b"|".join(re.escape(raw) for raw in sorted((c.code for c in self.codes), key=len, reverse=True))
+            + b")"
+        )
 
     def read(self, raw: bytes, found: Found) -> None:
         """Take unit and status of the code."""
@@ -200,7 +199,7 @@ class Choice(Strict):
         return next((code.code for code in self.codes if code is content.voice), self.codes[0].code)
 
 
-class Flags(Strict):
+class Flags(Schema):
     """One byte of status bits over a fixed base."""
 
     kind: Literal["flags"]
@@ -229,7 +228,7 @@ class Flags(Strict):
         return bytes([self.base ^ sum(1 << bit.bit for bit in self.bits if bit is content.voice)])
 
 
-class Checksum(Strict):
+class Checksum(Schema):
     """A checksum over everything before it, less the first `after` bytes of the frame."""
 
     kind: Literal["checksum"]
@@ -257,7 +256,7 @@ class Checksum(Strict):
         return text.upper() if self.written == "HEX" else text
 
 
-class Skip(Strict):
+class Skip(Schema):
     """Bytes of fixed number that say nothing of the length; the virtual instrument writes `written`."""
 
     kind: Literal["skip"]

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, model_validator
 
-from dbbstation.instrument.fields import Code, Content, Found, NotRepresentable, NotUnderstood, Strict
+from dbbstation.files.schema import Schema
+from dbbstation.instrument.fields import Code, Content, Found, NotRepresentable, NotUnderstood
 
 if TYPE_CHECKING:
     from typing import Self
 
 
-class Number(Strict):
+class Number(Schema):
     """What all numbers share.
 
     Attributes:
@@ -278,5 +279,3 @@ class Ieee(Number):
             return struct.pack(self._format, value)
         except OverflowError as error:
             raise NotRepresentable(str(error)) from None
-
-

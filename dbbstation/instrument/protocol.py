@@ -1,11 +1,11 @@
 """The wire protocol of a length instrument, `dbb-instrument/1`: what one YAML file in `protocols/instruments` says.
 
-    Protocol
-    ├── line       baud rate, bits, parity, stop bits, flow control
-    ├── ask        how a reading is obtained: asked for each time, or streaming; commands to start and to stop
-    ├── length     unit, sense, range
-    ├── frames     what comes over the wire: one frame that carries the length, others that are messages
-    └── timing     latency, rate, patience
+Protocol
+├── line       baud rate, bits, parity, stop bits, flow control
+├── ask        how a reading is obtained: asked for each time, or streaming; commands to start and to stop
+├── length     unit, sense, range
+├── frames     what comes over the wire: one frame that carries the length, others that are messages
+└── timing     latency, rate, patience
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
+from dbbstation.files.schema import Schema
 from dbbstation.instrument.fields import (
     Bit,
     Bytes,
@@ -30,7 +31,6 @@ from dbbstation.instrument.fields import (
     NotUnderstood,
     Sign,
     Skip,
-    Strict,
     Unit,
 )
 from dbbstation.instrument.numbers import DecimalText, Ieee, Integer
@@ -43,7 +43,7 @@ Part: TypeAlias = Annotated[
 _MM_PER_UNIT: dict[Unit, float] = {"mm": 1.0, "um": 1e-3, "nm": 1e-6, "m": 1e3, "inch": 25.4}
 
 
-class Line(Strict):
+class Line(Schema):
     """Settings of the serial line; `baud_choices` are the rates that the device can be set to."""
 
     baud: int = Field(gt=0)
@@ -70,7 +70,7 @@ class Line(Strict):
         return f"{self.baud} baud, {self.data_bits} data bits, {self.parity} parity, {stop}{flow}"
 
 
-class Step(Strict):
+class Step(Schema):
     """One command of a start or stop sequence: bytes sent, the answer waited for, a rest afterwards."""
 
     send: Bytes = Field(min_length=1)
@@ -78,7 +78,7 @@ class Step(Strict):
     wait_s: float = Field(default=0.0, ge=0.0, le=30.0)
 
 
-class Ask(Strict):
+class Ask(Schema):
     """How a reading is obtained: `request` before each, or the device streams by itself once it is started."""
 
     mode: Literal["request", "stream"]
@@ -93,7 +93,7 @@ class Ask(Strict):
         return self
 
 
-class Length(Strict):
+class Length(Schema):
     """The number on the wire as a length.
 
     Attributes:
@@ -121,7 +121,7 @@ class Length(Strict):
         return self.sense * (self.mm_per_count or _MM_PER_UNIT[unit or self.unit])
 
 
-class Frame(Strict):
+class Frame(Schema):
     """One kind of frame: parts in wire order. A frame without a length is a message, and says what it means."""
 
     name: str = "reading"
@@ -230,7 +230,7 @@ class Frame(Strict):
         return raw
 
 
-class Timing(Strict):
+class Timing(Schema):
     """When things happen.
 
     Attributes:
@@ -250,7 +250,7 @@ class Timing(Strict):
     retries: int = Field(default=2, ge=0, le=10)
 
 
-class Reference(Strict):
+class Reference(Schema):
     """Where a statement of the file comes from; `verified` says whether it was read there, not remembered."""
 
     says: str
@@ -258,7 +258,7 @@ class Reference(Strict):
     verified: bool
 
 
-class Protocol(Strict):
+class Protocol(Schema):
     """A whole protocol file.
 
     Attributes:
@@ -284,7 +284,9 @@ class Protocol(Strict):
         if self.frames[0].number is None or any(frame.number is not None for frame in self.frames[1:]):
             raise ValueError("the first frame, and only the first, carries the length")
         if not self.by_width and not self.terminator:
-            raise ValueError("every frame ends in the same literal, or every frame has a fixed width: otherwise nobody knows where one ends")
+            raise ValueError(
+                "every frame ends in the same literal, or every frame has a fixed width: otherwise nobody knows where one ends"
+            )
         if self.line.data_bits == 7 and any(frame.binary for frame in self.frames):  # noqa: PLR2004 (bits)
             raise ValueError("binary parts need 8 data bits")
         if self.ask.mode == "stream" and self.timing.rate_hz is None:

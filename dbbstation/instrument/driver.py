@@ -1,0 +1,325 @@
+"""The driver: a protocol and a port become readings.
+
+A reader thread owns the line from `start` to `stop`: it asks or listens, decodes, stamps and queues. Nobody else touches
+the port, so that no byte is lost while the program draws or saves.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InstrumentError, StationError
+from dbbstation.instrument import symptoms
+from dbbstation.instrument.codec import Decoder, GapCounter, Garbage, Heard, Piece
+from dbbstation.instrument.link import open_link
+from dbbstation.instrument.stamps import StreamStamps
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import Self
+
+    from dbbstation.instrument.bytelog import ByteLog
+    from dbbstation.instrument.link import Link, Port
+    from dbbstation.instrument.protocol import Protocol, Step
+    from dbbstation.instrument.reading import Reading
+
+_PAUSE_TICK_S = 0.001
+
+_INCOMPLETE = "incomplete"
+
+_JOIN_S = 5.0
+"""The reader thread ends within some hundredths of a second; after this long something is broken."""
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a driver has seen since `start`: readings, samples lost, bytes not understood and an example of them."""
+
+    readings: int = 0
+    lost: int = 0
+    garbage_bytes: int = 0
+    garbage: bytes = b""
+
+
+class Instrument:
+    """A length instrument on a serial line; use it in a `with` block, which starts and closes it.
+
+    Args:
+        protocol: its wire.
+        port: name or URL of the port, or an open port (which stays open).
+        baud: baud rate where the device is not set to the usual one.
+        clock: what stamps the readings, in s, monotonic. With a virtual instrument on scaled time, its clock; patience
+            is always in real seconds.
+        log: where every byte is written down; the caller closes it.
+        timeout_s: patience before a silent line is an error, instead of the protocol's.
+    """
+
+    def __init__(
+        self,
+        protocol: Protocol,
+        port: str | Port,
+        *,
+        baud: int | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        log: ByteLog | None = None,
+        timeout_s: float | None = None,
+    ) -> None:
+        self.protocol = protocol
+        self.tally = Tally()
+        self._port = port
+        self._baud = baud or protocol.line.baud
+        self._clock = clock
+        self._log = log
+        self._timeout_s = timeout_s or protocol.timing.timeout_s
+        self._link: Link | None = None
+        self._thread: threading.Thread | None = None
+        self._stop = threading.Event()
+        self._arrived = threading.Condition()
+        self._queue: deque[Reading] = deque()
+        self._failure: StationError | None = None
+
+    @property
+    def where(self) -> str:
+        """Name of the port."""
+        return self._port if isinstance(self._port, str) else str(getattr(self._port, "name", None) or "open port")
+
+    def start(self) -> None:
+        """Open the line, send the start sequence, begin to read.
+
+        Raises:
+            InstrumentError: the port cannot be opened, or the device does not answer the start sequence.
+        """
+        if self._thread is not None:
+            raise InstrumentError("it is being read already", where=self.where, remedy="stop it first")
+        self._link = self._link or open_link(self._port, self.protocol.line, baud=self._baud, log=self._log)
+        self._stop.clear()
+        self._queue.clear()
+        self._failure = None
+        self.tally = Tally()
+        after = b""
+        try:
+            for step in self.protocol.ask.start:
+                after = _command(self._link, step, self._timeout_s)
+        except StationError:
+            self.close()
+            raise
+        self._thread = threading.Thread(
+            target=self._run, args=(self._link, after), name=f"read {self.where}", daemon=True
+        )
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End reading and send the stop sequence; the line stays open, readings not yet fetched stay to be fetched.
+
+        Raises:
+            InstrumentError: the device does not answer the stop sequence.
+        """
+        if self._thread is None:
+            return
+        self._stop.set()
+        self._thread.join(_JOIN_S)
+        if self._thread.is_alive():
+            raise InstrumentError(
+                "the reader does not end: the port hangs", where=self.where, remedy="unplug the adapter"
+            )
+        self._thread = None
+        if self._link is not None and self._failure is None:
+            for step in self.protocol.ask.stop:
+                _command(self._link, step, self._timeout_s)
+
+    def close(self) -> None:
+        """Stop and close the line; a port that was given open stays open. Readings not yet fetched stay."""
+        try:
+            self.stop()
+        finally:
+            if self._link is not None:
+                self._link.close()
+            self._link = None
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def read(self) -> Reading:
+        """Return the next reading, waiting for it.
+
+        Raises:
+            InstrumentError: the line is silent, closed, garbled, or was stopped; OutputError: the byte log is full. Every
+                reading that came before is returned first.
+        """
+        with self._arrived:
+            while not self._queue:
+                if self._failure is not None:
+                    raise self._failure
+                if self._thread is None or not self._thread.is_alive():
+                    raise InstrumentError("it is not being read", where=self.where, remedy="start it first")
+                # Woken by each reading; the limit is for a thread that ended in between.
+                self._arrived.wait(0.1)
+            return self._queue.popleft()
+
+    def drain(self) -> list[Reading]:
+        """Return every reading that has come and was not fetched yet, without waiting.
+
+        Raises:
+            InstrumentError: as `read`, once everything before it was fetched.
+        """
+        with self._arrived:
+            readings = list(self._queue)
+            self._queue.clear()
+            if not readings and self._failure is not None:
+                raise self._failure
+            return readings
+
+    def readings(self, count: int | None = None) -> Iterator[Reading]:
+        """Yield readings as they come, `count` of them or without end.
+
+        Raises:
+            InstrumentError: as `read`.
+        """
+        done = 0
+        while count is None or done < count:
+            yield self.read()
+            done += 1
+
+    def _run(self, link: Link, after: bytes) -> None:
+        try:
+            if self.protocol.ask.mode == "request":
+                self._note_garbage(after)
+                self._poll(link)
+            else:
+                self._listen(link, after)
+        except StationError as error:
+            self._end(error)
+        except Exception as error:  # noqa: BLE001 (a thread that dies silently would look like a silent instrument)
+            self._end(InstrumentError(f"reading failed: {type(error).__name__}: {error}", where=self.where))
+
+    def _poll(self, link: Link) -> None:
+        """Ask, wait for the reply, ask again; a reply that does not come or cannot be read is asked for again."""
+        timing, line, request = self.protocol.timing, self.protocol.line, self.protocol.ask.request
+        gaps = GapCounter(self.protocol.counter_modulus)
+        to_latch_s = len(request) * line.character_s(self._baud) + timing.latch_delay_s
+        pause_s = 1.0 / timing.rate_hz if timing.rate_hz else 0.0
+        last_s = float("-inf")
+        failed: list[Garbage] = []
+        self._note_garbage(link.read())
+        while not self._stop.is_set():
+            decoder = Decoder(self.protocol, joining=False)
+            asked_s = self._clock()
+            link.write(request)
+            heard = self._reply(link, decoder)
+            if self._stop.is_set():
+                return
+            if isinstance(heard, Piece):
+                last_s = max(asked_s + to_latch_s, last_s + 1e-6)
+                missing = gaps.lost_before(heard.reading.counter, self.where)
+                self._put(replace(heard.reading, t_s=last_s, lost=missing if gaps.counts else len(failed)))
+                failed.clear()
+                while self._clock() < asked_s + pause_s and not self._stop.wait(_PAUSE_TICK_S):
+                    pass
+                continue
+            failed.append(heard)
+            # A late reply must not be taken for the reply to the next request.
+            self._note_garbage(heard.raw + link.read())
+            if len(failed) > timing.retries:
+                # The attempt that brought something says more than the silence after it.
+                telling = next((one for one in reversed(failed) if one.raw), heard)
+                raise self._symptom(telling.raw, telling.why)
+
+    def _reply(self, link: Link, decoder: Decoder) -> Heard:
+        """Return the reply, or as garbage whatever came instead before patience ended."""
+        deadline_s = time.monotonic() + self._timeout_s
+        while time.monotonic() < deadline_s and not self._stop.is_set():
+            heard = decoder.feed(link.read())
+            pieces = [one for one in heard if isinstance(one, Piece)]
+            if pieces:
+                self._note_garbage(
+                    b"".join(one.raw for one in heard if isinstance(one, Garbage)) + decoder.take_pending()
+                )
+                return pieces[-1]
+            if heard and not decoder.pending:
+                # A whole line that is no reading: asking again is quicker than waiting.
+                return heard[-1]
+        return Garbage(decoder.take_pending(), _INCOMPLETE)
+
+    def _listen(self, link: Link, chunk: bytes) -> None:
+        """Take what comes; only a long time without a reading is an error."""
+        timing, line = self.protocol.timing, self.protocol.line
+        gaps = GapCounter(self.protocol.counter_modulus)
+        # Behind the answer to a start command the stream begins with a whole frame.
+        decoder = Decoder(self.protocol, joining=not (self.protocol.ask.start and self.protocol.ask.start[-1].reply))
+        stamps = StreamStamps(1.0 / self.protocol.fastest_hz(self._baud))
+        character_s = line.character_s(self._baud)
+        good_s = time.monotonic()
+        garbled, unread, why = 0, b"", ""
+        while not self._stop.is_set():
+            chunk += link.read()
+            seen_s = self._clock()
+            for heard in decoder.feed(chunk) if chunk else ():
+                if isinstance(heard, Garbage):
+                    if not heard.joining:
+                        self._note_garbage(heard.raw)
+                        garbled += max(1, round(len(heard.raw) / self.protocol.frame_characters))
+                        unread, why = (unread + heard.raw)[:256], heard.why
+                    continue
+                missing = gaps.lost_before(heard.reading.counter, self.where)
+                lost = missing if gaps.counts else garbled
+                on_line_s = (heard.after + len(heard.raw)) * character_s + timing.latch_delay_s
+                self._put(replace(heard.reading, t_s=stamps.stamp(seen_s - on_line_s, lost), lost=lost))
+                good_s = time.monotonic()
+                garbled, unread, why = 0, b"", ""
+            chunk = b""
+            if time.monotonic() - good_s > self._timeout_s:
+                raise self._symptom(unread or decoder.pending, why if unread else _INCOMPLETE)
+
+    def _symptom(self, raw: bytes, why: str) -> InstrumentError:
+        if not raw:
+            heard_before = self.tally.readings > 0
+            return symptoms.silence(self.protocol, self.where, self._timeout_s, self._baud, heard_before=heard_before)
+        if why == _INCOMPLETE and symptoms.begins_well(self.protocol, raw):
+            return symptoms.half_line(raw, self.where, self._timeout_s)
+        return symptoms.garbage(self.protocol, self.where, raw, why, self._baud)
+
+    def _note_garbage(self, raw: bytes) -> None:
+        self.tally.garbage_bytes += len(raw)
+        self.tally.garbage = self.tally.garbage or raw
+
+    def _put(self, reading: Reading) -> None:
+        with self._arrived:
+            self.tally.readings += 1
+            self.tally.lost += reading.lost
+            self._queue.append(reading)
+            self._arrived.notify_all()
+
+    def _end(self, failure: StationError) -> None:
+        with self._arrived:
+            self._failure = failure
+            self._arrived.notify_all()
+
+
+def _command(link: Link, step: Step, patience_s: float) -> bytes:
+    """Send one command, wait for its answer, return what came behind it.
+
+    Raises:
+        InstrumentError: another answer, or none.
+    """
+    link.write(step.send)
+    came = b""
+    deadline_s = time.monotonic() + patience_s
+    while step.reply and step.reply not in came:
+        if time.monotonic() > deadline_s:
+            answer = symptoms.shown(came) if came else "nothing"
+            raise InstrumentError(
+                f"to the command {symptoms.shown(step.send)} came {answer} instead of {symptoms.shown(step.reply)}",
+                where=link.name,
+                remedy="is it the right instrument, switched on and set to the right baud rate?",
+            )
+        came += link.read()
+    time.sleep(step.wait_s)
+    return came.partition(step.reply)[2] if step.reply else b""

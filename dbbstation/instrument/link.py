@@ -1,0 +1,205 @@
+"""The serial link: opening a port, reading and writing bytes, and saying in words what went wrong."""
+
+from __future__ import annotations
+
+import errno
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import serial
+from serial.tools import list_ports
+from serial.urlhandler.protocol_socket import Serial as SocketPort
+
+from dbbstation.errors import InstrumentError
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.bytelog import ByteLog
+    from dbbstation.instrument.protocol import Line
+
+_ERRORS: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
+"""What a port can raise; pyserial lets some errors of the system through, and TypeError from a port just closed."""
+
+try:
+    from termios import error as _termios_error
+except ImportError:  # Windows has no termios
+    pass
+else:
+    _ERRORS += (_termios_error,)
+
+_OPENING_ERRORS: tuple[type[Exception], ...] = (*_ERRORS, ValueError)
+
+_TICK_S = 0.02
+"""How long a read waits at most, so that a reader thread sees soon that it shall stop."""
+
+_MOST = 1 << 16
+"""Bytes taken from a socket at once."""
+
+_PARITY = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN, "odd": serial.PARITY_ODD}
+
+_BUSY = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
+
+
+class Port(Protocol):
+    """What an already open port must be able to do: the part of pyserial that is used, or a stand-in for tests."""
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that can be read at once."""
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Return up to `size` bytes; fewer, or none, when its own timeout ends first."""
+
+    def write(self, data: bytes, /) -> int | None:
+        """Send the bytes."""
+
+
+class Link:
+    """An open line to an instrument.
+
+    Args:
+        port: the open port.
+        name: what messages call it.
+        owned: close the port with the link; a port that somebody else opened stays open.
+        log: where every byte is written down.
+    """
+
+    def __init__(self, port: Port, *, name: str, owned: bool, log: ByteLog | None = None) -> None:
+        self._port = port
+        self._owned = owned
+        self._log = log
+        self.name = name
+
+    def read(self) -> bytes:
+        """Return the bytes that have arrived, after waiting a moment for the first; empty where none came.
+
+        Raises:
+            InstrumentError: the line is closed.
+        """
+        try:
+            raw = self._port.read(1)
+            if raw:
+                raw += self._rest()
+        except _ERRORS as error:
+            raise self._gone(error) from None
+        if raw and self._log is not None:
+            self._log.note("<", raw)
+        return raw
+
+    def _rest(self) -> bytes:
+        """Return what has come behind the first byte, without waiting."""
+        with suppress(*_ERRORS):
+            # What is wrong with the line comes up again with the next read; what was read is not thrown away for it.
+            if isinstance(self._port, SocketPort):
+                # A socket does not tell how much has come; without patience it gives all of it.
+                self._port.timeout = 0
+                rest = self._port.read(_MOST)
+                self._port.timeout = _TICK_S
+                return rest
+            waiting = self._port.in_waiting
+            return self._port.read(waiting) if waiting else b""
+        return b""
+
+    def write(self, raw: bytes) -> None:
+        """Send bytes.
+
+        Raises:
+            InstrumentError: the line is closed.
+        """
+        if self._log is not None:
+            self._log.note(">", raw)
+        try:
+            self._port.write(raw)
+        except _ERRORS as error:
+            raise self._gone(error) from None
+
+    def close(self) -> None:
+        """Close the port if this link opened it."""
+        close = getattr(self._port, "close", None)
+        if self._owned and close is not None:
+            with suppress(*_ERRORS):
+                close()
+
+    def _gone(self, error: Exception) -> InstrumentError:
+        return InstrumentError(
+            "the line was closed while it was in use",
+            where=self.name,
+            remedy=f"plug the instrument in again and check its cable and power; the system says: {_first_words(error)}",
+        )
+
+
+def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: ByteLog | None = None) -> Link:
+    """Open a line to an instrument.
+
+    Args:
+        port: name of a port (`/dev/ttyUSB0`, `COM3`), a URL of pyserial (`socket://127.0.0.1:4001`), or an open port.
+        line: its settings.
+        baud: baud rate to use instead of the usual one.
+        log: where every byte is written down.
+
+    Raises:
+        InstrumentError: no such port, no permission, in use, settings that the port does not take.
+    """
+    if not isinstance(port, str):
+        return Link(port, name=str(getattr(port, "name", None) or "open port"), owned=False, log=log)
+    speed = baud or line.baud
+    try:
+        opened = serial.serial_for_url(
+            port,
+            do_not_open=True,
+            baudrate=speed,
+            bytesize=line.data_bits,
+            parity=_PARITY[line.parity],
+            stopbits=line.stop_bits,
+            rtscts=line.flow == "rts-cts",
+            xonxoff=line.flow == "xon-xoff",
+            timeout=_TICK_S,
+        )
+        if "://" not in port:
+            opened.exclusive = True
+        opened.open()
+    except _OPENING_ERRORS as error:
+        raise _not_opened(port, speed, error) from None
+    return Link(opened, name=port, owned=True, log=log)
+
+
+def connected_ports() -> list[tuple[str, str, str]]:
+    """Return name, description and hardware id of every serial port of this computer, sorted by name."""
+    return sorted((port.device, port.description or "", port.hwid or "") for port in list_ports.comports())
+
+
+def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:
+    """Return the error in words; `errno` where the system gave one, else the words of pyserial."""
+    number = getattr(error, "errno", None)
+    words = str(error).lower()
+    if "://" in port:
+        what = f"cannot connect: {_first_words(error)}"
+        remedy = "is the instrument's server running, and are host and port number right?"
+        return InstrumentError(what, where=port, remedy=remedy)
+    if number == errno.ENOENT or "filenotfound" in words:
+        names = ", ".join(name for name, _, _ in connected_ports())
+        remedy = f"connected are {names}" if names else "no serial port is connected: plug the adapter in"
+        return InstrumentError("there is no such port", where=port, remedy=f"{remedy}; see `dbbstation ports`")
+    if number in _BUSY or "access is denied" in words:
+        remedy = "close the other program, for example a second monitor or a terminal program"
+        return InstrumentError("another program has the port open", where=port, remedy=remedy)
+    if number in {errno.EACCES, errno.EPERM}:
+        remedy = f"add yourself to the group that owns it ({_group(port)}) and log in again"
+        return InstrumentError("no permission to open the port", where=port, remedy=remedy)
+    if "baud" in words or (isinstance(error, ValueError) and baud not in serial.Serial.BAUDRATES):
+        remedy = "set the instrument to a usual rate such as 9600, 19200 or 115200 and give it with --baud"
+        return InstrumentError(f"the port does not take the baud rate {baud}", where=port, remedy=remedy)
+    return InstrumentError(
+        f"this is no serial port that can be used: {_first_words(error)}", where=port, remedy="see `dbbstation ports`"
+    )
+
+
+def _group(port: str) -> str:
+    try:
+        return Path(port).group()
+    except (OSError, KeyError, NotImplementedError):
+        return "dialout"
+
+
+def _first_words(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -1,0 +1,90 @@
+"""From what was seen on the line to what is probably wrong."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InstrumentError
+from dbbstation.instrument.codec import decode
+from dbbstation.instrument.fields import Content, NotUnderstood
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.protocol import Protocol
+
+_SHOWN = 24
+"""Bytes that a message shows; a whole line of any instrument at hand fits."""
+
+
+def silence(protocol: Protocol, where: str, waited_s: float, baud: int, *, heard_before: bool) -> InstrumentError:
+    """Return the error for a line on which nothing came."""
+    if heard_before:
+        what = f"the instrument fell silent: nothing for {waited_s:g} s"
+        remedy = "is it still switched on, is the cable still plugged in at both ends?"
+    else:
+        asked = f" to the request {protocol.ask.request.hex(' ')}" if protocol.ask.request else ""
+        what = f"the instrument is silent: no answer{asked} in {waited_s:g} s"
+        others = ", ".join(str(rate) for rate in protocol.line.baud_choices if rate != baud)
+        remedy = (
+            f"is it switched on, is the cable a null-modem one and plugged into this port, is it set to {baud} baud"
+            + (f" (it can also be set to {others})?" if others else "?")
+        )
+    return InstrumentError(what, where=where, remedy=remedy)
+
+
+def half_line(raw: bytes, where: str, waited_s: float) -> InstrumentError:
+    """Return the error for a frame that began and never ended."""
+    return InstrumentError(
+        f"only part of a reply came, then nothing for {waited_s:g} s: {shown(raw)}",
+        where=where,
+        remedy="check the cable; if it happens often, lower the baud rate on both sides",
+    )
+
+
+def garbage(protocol: Protocol, where: str, raw: bytes, why: str, baud: int) -> InstrumentError:
+    """Return the error for bytes that are no reading, with the likeliest cause."""
+    return InstrumentError(
+        f"what comes is not {protocol.name}: {shown(raw)}" + (f" ({why})" if why else ""),
+        where=where,
+        remedy=_cause(protocol, raw, baud),
+    )
+
+
+def begins_well(protocol: Protocol, raw: bytes) -> bool:
+    """Whether some frame of the protocol could begin with these bytes: tried with the ends of an example."""
+    for frame in protocol.frames:
+        example = frame.write(Content(0.0))
+        if any(frame.pattern.fullmatch(raw + example[cut:]) for cut in range(1, len(example))):
+            return True
+    return False
+
+
+def shown(raw: bytes) -> str:
+    """Return the bytes in hexadecimal, and as text where most of it is text."""
+    head = raw[:_SHOWN]
+    text = head.hex(" ") + (f" … ({len(raw)} bytes)" if len(raw) > _SHOWN else "")
+    printable = sum(32 <= byte < 127 for byte in head)  # noqa: PLR2004 (printable ASCII)
+    return f"{text} = {head.decode('latin-1')!r}" if 2 * printable > len(head) else text
+
+
+def _cause(protocol: Protocol, raw: bytes, baud: int) -> str:
+    seven_bits = bytes(byte & 0x7F for byte in raw)
+    if seven_bits != raw and _is_reading(protocol, seven_bits):
+        return f"without the highest bit it is a reading: set data bits and parity of the port to {protocol.line.text}"
+    strange = sum(byte >= 0x80 or (byte < 0x20 and byte not in b"\r\n\x02") for byte in raw)  # noqa: PLR2004 (ASCII)
+    binary = any(frame.binary for frame in protocol.frames)
+    if strange and not binary:
+        rates = ", ".join(str(rate) for rate in protocol.line.baud_choices) or str(protocol.line.baud)
+        return (
+            f"most likely the baud rate: the port uses {baud}, the instrument can be set to {rates}; or a noisy cable"
+        )
+    return (
+        f"is it this instrument, set as `dbbstation instruments {protocol.name}` says, with nothing else on the line?"
+    )
+
+
+def _is_reading(protocol: Protocol, raw: bytes) -> bool:
+    try:
+        decode(protocol, raw)
+    except NotUnderstood:
+        return False
+    return True

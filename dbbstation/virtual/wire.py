@@ -1,0 +1,292 @@
+"""The virtual instrument: answers on a pseudo-terminal as a protocol file says, byte for byte, at the speed of its line.
+
+It is driven by the same grammar as the driver. What it measures is a function of virtual time; one thread does the rest.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InstrumentError
+from dbbstation.instrument.codec import encode
+from dbbstation.virtual.wire_clock import ScaledClock
+from dbbstation.virtual.wire_ends import HAS_PTY, open_end
+from dbbstation.virtual.wire_uart import heard_at
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Self
+
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.virtual.wire_ends import End
+
+_TICK_S = 0.001
+"""Real seconds between looks at the line while bytes are under way; bytes due in between go together."""
+
+_IDLE_S = 0.005
+"""Real seconds between looks while nothing is under way; a request wakes it at once."""
+
+_BACKLOG = 4096
+"""Frames that wait for a program that does not read; later samples are dropped, which the counter shows."""
+
+
+@dataclass(slots=True)
+class _Outgoing:
+    """Bytes on their way: the first is complete one character time after `start_s`."""
+
+    raw: bytes
+    start_s: float
+    sent: int = 0
+
+
+class VirtualInstrument:
+    """A length instrument that is not there; use it in a `with` block, which switches it on and off.
+
+    Args:
+        protocol: its wire.
+        length_mm_at: length in mm at a virtual time in s; None: the bar is not between the balls, which the instrument
+            tells in its own way as a fault. Called from the instrument's thread.
+        clock: virtual time; real time by default.
+        rate_hz: samples per second of a stream, instead of the protocol's.
+        baud: rate that the device is set to. On a pseudo-terminal the rate of the program at the other end is known,
+            and where the two differ, both hear what a wrong baud rate makes of the bytes.
+        pty: use a pseudo-terminal; otherwise a loopback socket.
+
+    Attributes:
+        port: what a program opens to talk to it.
+        unknown_bytes: bytes that came and were no command.
+    """
+
+    def __init__(
+        self,
+        protocol: Protocol,
+        length_mm_at: Callable[[float], float | None],
+        *,
+        clock: ScaledClock | None = None,
+        rate_hz: float | None = None,
+        baud: int | None = None,
+        pty: bool = HAS_PTY,
+    ) -> None:
+        self.protocol = protocol
+        self.clock = clock or ScaledClock()
+        self.port = ""
+        self.unknown_bytes = 0
+        self._length_mm_at = length_mm_at
+        self._baud = baud or protocol.line.baud
+        self._rate_hz = rate_hz or protocol.fastest_hz(self._baud)
+        self._character_s = protocol.line.character_s(self._baud)
+        self._pty = pty
+        self._end: End | None = None
+        self._thread: threading.Thread | None = None
+        self._stop = threading.Event()
+        self._failure: Exception | None = None
+        self._lock = threading.Lock()
+        self._outgoing: deque[_Outgoing] = deque()
+        self._incoming = b""
+        self._running = not protocol.ask.start
+        self._counter = 0
+        self._next_sample_s = 0.0
+        self._silent = False
+        self._parity_shows = False
+        self._to_cut: int | None = None
+        self._silent_after_cut = False
+        self._to_drop = 0
+
+    def start(self) -> None:
+        """Open the line and switch the instrument on; `port` is known from then on."""
+        self._end = open_end(pty=self._pty)
+        self.port = self._end.port
+        self._stop.clear()
+        self._next_sample_s = self.clock()
+        self._thread = threading.Thread(target=self._run, args=(self._end,), name=f"virtual {self.port}", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Switch the instrument off and close the line.
+
+        Raises:
+            Exception: what `length_mm_at` raised.
+        """
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._thread = None
+        if self._end is not None:
+            self._end.close()
+        self._end = None
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    # Faults, for tests and for showing what they look like.
+
+    def go_silent(self) -> None:
+        """Send nothing any more, as with a cable pulled out at the instrument."""
+        with self._lock:
+            self._silent = True
+            self._outgoing.clear()
+
+    def speak_again(self) -> None:
+        """End the silence."""
+        with self._lock:
+            self._silent = False
+
+    def hang_up(self) -> None:
+        """Close the line while a program uses it, as with an adapter pulled out."""
+        self.stop()
+
+    def send_garbage(self, raw: bytes) -> None:
+        """Send bytes that are no reading, as noise on the cable."""
+        with self._lock:
+            self._send(raw, self.clock())
+
+    def cut_next_frame(self, keep: int, *, then_silent: bool = False) -> None:
+        """Send only the first `keep` bytes of the next frame, and nothing more after it with `then_silent`."""
+        with self._lock:
+            self._to_cut, self._silent_after_cut = keep, then_silent
+
+    def drop_samples(self, count: int) -> None:
+        """Do not send the next samples; the counter goes on."""
+        with self._lock:
+            self._to_drop += count
+
+    def show_parity(self) -> None:
+        """Put even parity into the eighth bit, as a port with 8 data bits sees a line with 7 and parity."""
+        with self._lock:
+            self._parity_shows = True
+
+    def _run(self, end: End) -> None:
+        try:
+            while not self._stop.is_set():
+                if end.wait(self._pause_s()):
+                    self._hear(self._through_wrong_baud(end.read(), end, to_host=False))
+                with self._lock:
+                    now_s = self.clock()
+                    if self.protocol.ask.mode == "stream":
+                        self._sample(now_s, connected=end.connected)
+                    self._transmit(end, now_s)
+        except Exception as error:  # noqa: BLE001 (raised again by `stop`, in the thread that can be told)
+            self._failure = error
+
+    def _pause_s(self) -> float:
+        """Return how long nothing is due, in real seconds."""
+        with self._lock:
+            if self._outgoing:
+                first = self._outgoing[0]
+                due_s = first.start_s + len(first.raw) * self._character_s
+                tick_s = _TICK_S
+            elif self.protocol.ask.mode == "stream" and self._running:
+                due_s, tick_s = self._next_sample_s, _IDLE_S
+            else:
+                return _IDLE_S
+            return min(max(self.clock.real_s(due_s - self.clock()), 0.0), tick_s)
+
+    def _hear(self, raw: bytes) -> None:
+        """Act on every complete command; forget bytes that begin none."""
+        ask = self.protocol.ask
+        commands = sorted({ask.request, *(step.send for step in ask.start + ask.stop)} - {b""}, key=len, reverse=True)
+        with self._lock:
+            seen_s = self.clock()
+            self._incoming += raw
+            while self._incoming:
+                command = next((one for one in commands if self._incoming.startswith(one)), None)
+                if command is not None:
+                    self._incoming = self._incoming[len(command) :]
+                    # On a real line the command takes this long to arrive.
+                    self._obey(command, seen_s + len(command) * self._character_s)
+                elif any(one.startswith(self._incoming) for one in commands):
+                    return
+                else:
+                    self._incoming = self._incoming[1:]
+                    self.unknown_bytes += 1
+
+    def _obey(self, command: bytes, now_s: float) -> None:
+        ask, timing = self.protocol.ask, self.protocol.timing
+        for step in ask.stop:
+            if step.send == command:
+                self._running = self._running and bool(ask.start) and ask.start[-1].send == command
+                self._send(step.reply, now_s + timing.reply_latency_s)
+                return
+        for step in ask.start:
+            if step.send == command:
+                self._send(step.reply, now_s + timing.reply_latency_s)
+                if step is ask.start[-1]:
+                    self._running = True
+                    self._next_sample_s = now_s
+                return
+        if self._running:
+            self._send_sample(now_s + timing.latch_delay_s, now_s + timing.reply_latency_s)
+
+    def _sample(self, now_s: float, *, connected: bool) -> None:
+        """Take the samples of a stream that are due; where nobody listens they are gone, as on a real line."""
+        while self._running and self._next_sample_s <= now_s:
+            at_s = self._next_sample_s
+            self._next_sample_s += 1.0 / self._rate_hz
+            if connected and len(self._outgoing) < _BACKLOG:
+                self._send_sample(at_s, at_s + self.protocol.timing.latch_delay_s)
+            else:
+                self._counter += 1
+
+    def _send_sample(self, at_s: float, start_s: float) -> None:
+        counter, self._counter = self._counter, self._counter + 1
+        if self._to_drop:
+            self._to_drop -= 1
+            return
+        raw = b""
+        # A device without a way to say that it has no value says nothing.
+        with suppress(InstrumentError):
+            raw = encode(self.protocol, self._length_mm_at(at_s), counter=counter)
+        if self._to_cut is None:
+            self._send(raw, start_s)
+            return
+        self._send(raw[: self._to_cut], start_s)
+        self._to_cut = None
+        self._silent = self._silent_after_cut
+
+    def _send(self, raw: bytes, start_s: float) -> None:
+        """Put bytes on the line, behind those that are still on their way."""
+        if self._silent or not raw:
+            return
+        if self._outgoing:
+            last = self._outgoing[-1]
+            start_s = max(start_s, last.start_s + len(last.raw) * self._character_s)
+        if self._parity_shows:
+            raw = bytes(byte | (byte.bit_count() % 2) << 7 for byte in raw)
+        self._outgoing.append(_Outgoing(raw, start_s))
+
+    def _transmit(self, end: End, now_s: float) -> None:
+        """Write every byte whose time has come; bytes for nobody are gone."""
+        while self._outgoing:
+            first = self._outgoing[0]
+            due = min(len(first.raw), int((now_s - first.start_s) / self._character_s + 1e-6))
+            if due > first.sent:
+                raw = first.raw[first.sent : due]
+                if end.connected:
+                    garbled = self._through_wrong_baud(raw, end, to_host=True)
+                    taken = end.write(garbled) if garbled is raw else len(raw) if end.write(garbled) >= 0 else 0
+                else:
+                    taken = len(raw)
+                first.sent += taken
+                if taken < len(raw):
+                    return
+            if first.sent < len(first.raw):
+                return
+            self._outgoing.popleft()
+
+    def _through_wrong_baud(self, raw: bytes, end: End, *, to_host: bool) -> bytes:
+        host_baud = end.host_baud()
+        if host_baud is None or not raw:
+            return raw
+        sent, heard = (self._baud, host_baud) if to_host else (host_baud, self._baud)
+        return heard_at(raw, self.protocol.line, sent_baud=sent, heard_baud=heard)

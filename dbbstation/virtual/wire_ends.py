@@ -1,0 +1,168 @@
+"""The instrument's end of a line on this computer: a pseudo-terminal, or a loopback socket where there are none."""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import socket
+from typing import Protocol
+
+try:
+    import termios
+    import tty
+
+    _RATES = {getattr(termios, name): int(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].isdigit()}
+    HAS_PTY = hasattr(os, "openpty")
+except ImportError:  # Windows
+    HAS_PTY = False
+
+
+class End(Protocol):
+    """What the virtual instrument needs of a line."""
+
+    port: str
+    """Name under which a program opens the other end."""
+
+    @property
+    def connected(self) -> bool:
+        """Whether a program has the other end open, as of the last `wait` or `read`."""
+
+    def wait(self, real_s: float) -> bool:
+        """Wait at most so long for bytes; return whether there is something to read."""
+
+    def read(self) -> bytes:
+        """Return the bytes that have come."""
+
+    def write(self, raw: bytes) -> int:
+        """Send what the line takes at once; return how many bytes that was."""
+
+    def host_baud(self) -> int | None:
+        """Return the rate that the other side is set to, None where the line does not tell."""
+
+    def close(self) -> None:
+        """Close the line: the other side sees the device unplugged."""
+
+
+def open_end(*, pty: bool = HAS_PTY) -> End:
+    """Return the instrument's end of a new line."""
+    return PtyEnd() if pty else SocketEnd()
+
+
+class PtyEnd:
+    """A pseudo-terminal; this side is the master, the program opens the slave by name."""
+
+    def __init__(self) -> None:
+        self._master, slave = os.openpty()
+        tty.setraw(slave)
+        self.port = os.ttyname(slave)
+        # Not held open here: so a program that opens and closes it can be told from nobody at all.
+        os.close(slave)
+        os.set_blocking(self._master, False)
+        self.connected = False
+
+    def wait(self, real_s: float) -> bool:
+        """Wait at most so long for bytes; return whether there is something to read."""
+        poller = select.poll()
+        poller.register(self._master, select.POLLIN)
+        # Without a program at the other end poll returns at once, so it is asked first and slept apart.
+        now = dict(poller.poll(0)).get(self._master, 0)
+        self.connected = not now & select.POLLHUP
+        if now & select.POLLIN:
+            return True
+        if not self.connected:
+            select.select([], [], [], real_s)
+            return False
+        return bool(select.select([self._master], [], [], real_s)[0])
+
+    def read(self) -> bytes:
+        """Return the bytes that have come."""
+        try:
+            return os.read(self._master, 4096)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            if error.errno != errno.EIO:
+                raise
+            self.connected = False
+            return b""
+
+    def write(self, raw: bytes) -> int:
+        """Send what the line takes at once; return how many bytes that was."""
+        try:
+            return os.write(self._master, raw)
+        except BlockingIOError:
+            return 0
+
+    def host_baud(self) -> int | None:
+        """Return the rate that the other side is set to."""
+        return _RATES.get(termios.tcgetattr(self._master)[5])
+
+    def close(self) -> None:
+        """Close the line."""
+        if self._master >= 0:
+            os.close(self._master)
+        self._master = -1
+
+
+class SocketEnd:
+    """A socket on the loopback address; one program at a time."""
+
+    def __init__(self) -> None:
+        self._server = socket.create_server(("127.0.0.1", 0), backlog=1)
+        self._server.settimeout(0.0)
+        self._client: socket.socket | None = None
+        self.port = f"socket://127.0.0.1:{self._server.getsockname()[1]}"
+
+    @property
+    def connected(self) -> bool:
+        """Whether a program is connected."""
+        return self._client is not None
+
+    def wait(self, real_s: float) -> bool:
+        """Wait at most so long for bytes; return whether there is something to read."""
+        ready = select.select([self._client or self._server], [], [], real_s)[0]
+        if ready and self._client is None:
+            self._client, _ = self._server.accept()
+            self._client.settimeout(0.0)
+            # Each byte at its time, not collected.
+            self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            return False
+        return bool(ready)
+
+    def read(self) -> bytes:
+        """Return the bytes that have come."""
+        if self._client is None:
+            return b""
+        try:
+            raw = self._client.recv(4096)
+        except BlockingIOError:
+            return b""
+        except ConnectionError:
+            raw = b""
+        if not raw:
+            self._client.close()
+            self._client = None
+        return raw
+
+    def write(self, raw: bytes) -> int:
+        """Send what the line takes at once; return how many bytes that was."""
+        if self._client is None:
+            return len(raw)
+        try:
+            return self._client.send(raw)
+        except BlockingIOError:
+            return 0
+        except ConnectionError:
+            return len(raw)
+
+    def host_baud(self) -> int | None:
+        """Return nothing: a socket has no rate."""
+        return None
+
+    def close(self) -> None:
+        """Close the line."""
+        if self._client is not None:
+            self._client.close()
+        self._client = None
+        self._server.close()

@@ -1,0 +1,88 @@
+"""The command line: parse, call, print. Commands are loaded when they are called, not before."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+from dbbstation import __version__
+from dbbstation.errors import StationError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+DONE, FAILED, USAGE = 0, 1, 2
+"""Exit codes."""
+
+COMMANDS = {
+    "calibrate": "Fit the machine's errors to recorded sessions.",
+    "check": "Validate files of any format, and whole sessions.",
+    "compensate": "Compensate any NC program with a calibrated model.",
+    "demo": "The whole job on a simulated machine, start to end.",
+    "evaluate": "Circle by circle: what a model leaves of recordings.",
+    "instruments": "Instruments that the program knows.",
+    "monitor": "Live reading of an instrument.",
+    "ports": "What is connected to this computer.",
+    "predict": "Actual poses for commanded ones, under a model.",
+    "program": "NC programs of a plan's circles, nominal or compensated.",
+    "replay": "Send a byte log through an instrument's driver.",
+    "simulate": "Noise-free recordings of a plan, as a model predicts them.",
+}
+"""Name and one line of help of every command; each is a module of this folder with a command of its name."""
+
+
+class LazyGroup(click.Group):
+    """Loads a command's module only when that command is asked for, so that `--help` stays quick."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Return the names of all commands."""
+        return sorted(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import the command's module."""
+        if cmd_name not in COMMANDS:
+            return None
+        module = importlib.import_module(f"dbbstation.cli.{cmd_name}")
+        command: click.Command = getattr(module, cmd_name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands from the table above, without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(sorted(COMMANDS.items()))
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(__version__, prog_name="dbbstation")
+@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+def cli(*, debug: bool) -> None:
+    """Measure a hexapod machine tool with a double ball bar, calibrate it, find what its model lacks.
+
+    \b
+    Start here:
+      dbbstation demo                                  the whole job on a simulated machine
+      dbbstation calibrate SESSION --out model.yaml    fit the errors of a recorded machine
+      dbbstation COMMAND --help                        what a command does, with examples
+    """  # noqa: D301 - \b is click's mark for "do not wrap"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit code."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        code = cli.main(arguments, prog_name="dbbstation", standalone_mode=False)
+    except click.ClickException as problem:
+        problem.show()
+        sys.exit(problem.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted; what was written before stays", err=True)
+        sys.exit(FAILED)
+    except (StationError, OSError) as problem:
+        if "--debug" in arguments:
+            raise
+        click.echo(str(problem), err=True)
+        sys.exit(FAILED)
+    sys.exit(code if isinstance(code, int) else DONE)

@@ -1,0 +1,73 @@
+"""`dbbstation instruments`: what is known, and the line settings of each."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.protocol import Protocol
+
+
+@click.command()
+@click.argument("name", required=False)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def instruments(name: str | None, *, as_json: bool) -> None:
+    r"""List the instruments that are known, or show one: NAME, or a protocol file.
+
+    \b
+    Examples:
+      dbbstation instruments
+      dbbstation instruments heidenhain-nd281b
+      dbbstation instruments ./my-gauge.yaml
+    """
+    from dbbstation.instrument.library import known_instruments, load_instrument
+
+    if name is not None:
+        protocol = load_instrument(name)
+        if as_json:
+            click.echo(json.dumps({**_summary(protocol), "protocol": protocol.model_dump(mode="json")}, indent=2))
+        else:
+            click.echo("\n".join(_details(protocol)))
+        return
+    known = [load_instrument(one) for one in known_instruments()]
+    if as_json:
+        click.echo(json.dumps({"instruments": [_summary(one) for one in known]}, indent=2))
+        return
+    for one in known:
+        click.echo(
+            f"{one.name}\n    {one.title}\n    {one.line.text}, about {one.fastest_hz():.0f} readings per second"
+        )
+
+
+def _summary(protocol: Protocol) -> dict[str, object]:
+    return {
+        "name": protocol.name,
+        "title": protocol.title,
+        "line": protocol.line.model_dump(),
+        "mode": protocol.ask.mode,
+        "readings_per_second": protocol.fastest_hz(),
+        "counts_samples": protocol.counter_modulus is not None,
+        "range_mm": protocol.length.range_mm,
+    }
+
+
+def _details(protocol: Protocol) -> list[str]:
+    low_mm, high_mm = protocol.length.range_mm
+    asked = f"asked with {protocol.ask.request.hex(' ')}" if protocol.ask.request else "streams"
+    counter = protocol.counter_modulus
+    lines = [
+        protocol.title,
+        f"  line      {protocol.line.text}",
+        f"  can be    {', '.join(str(rate) for rate in protocol.line.baud_choices) or protocol.line.baud} baud",
+        f"  reading   {asked}, about {protocol.fastest_hz():.1f} per second",
+        f"  range     {low_mm:g} to {high_mm:g} mm",
+        f"  counter   {f'modulo {counter}: lost samples are seen' if counter else 'none'}",
+    ]
+    lines += ["", "Set on the instrument:", *(f"  - {step}" for step in protocol.setup)] if protocol.setup else []
+    said = [f"  - {one.status}: {one.means}. {one.remedy[:1].upper()}{one.remedy[1:]}." for one in protocol.statuses]
+    lines += ["", "What it can report:", *said] if said else []
+    sources = [f"  - {'' if one.verified else 'NOT VERIFIED: '}{one.says}: {one.where}" for one in protocol.references]
+    return lines + (["", "From:", *sources] if sources else [])

@@ -1,0 +1,75 @@
+"""`dbbstation monitor`: live reading of an instrument."""
+
+from __future__ import annotations
+
+import json
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.driver import Tally
+    from dbbstation.instrument.reading import Reading
+
+
+@click.command()
+@click.option("--instrument", required=True, metavar="NAME", help="An instrument that is known, or a protocol file.")
+@click.option("--port", required=True, help="Port name, or a URL such as socket://127.0.0.1:4001.")
+@click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
+@click.option("--count", type=click.IntRange(min=1), help="Stop after so many readings.")
+@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="Write down every byte, for `replay`.")
+@click.option("--force", is_flag=True, help="Overwrite the log file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per reading, and one with the totals.")
+def monitor(
+    *, instrument: str, port: str, baud: int | None, count: int | None, log: Path | None, force: bool, as_json: bool
+) -> None:
+    r"""Show what an instrument measures, until Ctrl-C.
+
+    \b
+    Examples:
+      dbbstation monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0
+      dbbstation monitor --instrument streaming-encoder --port COM3 --count 100 --json
+      dbbstation monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0 --log bytes.txt
+    """
+    from dbbstation.instrument.bytelog import ByteLog
+    from dbbstation.instrument.driver import Instrument
+    from dbbstation.instrument.library import load_instrument
+
+    protocol = load_instrument(instrument)
+    with ExitStack() as stack:
+        book = None
+        if log is not None:
+            book = stack.enter_context(ByteLog(log, instrument=instrument, port=port, force=force))
+        driver = stack.enter_context(Instrument(protocol, port, baud=baud, log=book))
+        first_s: float | None = None
+        try:
+            for reading in driver.readings(count):
+                first_s = reading.t_s if first_s is None else first_s
+                _show(reading, reading.t_s - first_s, as_json=as_json)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            _conclude(driver.tally, as_json=as_json)
+
+
+def _show(reading: Reading, t_s: float, *, as_json: bool) -> None:
+    if as_json:
+        row: dict[str, object] = {"t_s": round(t_s, 6), "length_mm": reading.length_mm, "status": reading.status}
+        row |= {"lost": reading.lost, "counter": reading.counter, "said": reading.said}
+        click.echo(json.dumps(row))
+        return
+    length = f"{reading.length_mm:14.5f} mm" if reading.length_mm is not None else f"{'--':>14}   "
+    lost = f"  ({reading.lost} lost before)" if reading.lost else ""
+    said = f"  {reading.status}: {reading.said}" if reading.status != "ok" else ""
+    click.echo(f"{t_s:10.3f} s {length}{lost}{said}")
+
+
+def _conclude(tally: Tally, *, as_json: bool) -> None:
+    if as_json:
+        totals = {"readings": tally.readings, "lost": tally.lost, "garbage_bytes": tally.garbage_bytes}
+        click.echo(json.dumps({"totals": totals}))
+        return
+    text = f"{tally.readings} readings, {tally.lost} lost, {tally.garbage_bytes} bytes not understood"
+    click.echo(text + (f", for example {tally.garbage[:24].hex(' ')}" if tally.garbage else ""), err=True)

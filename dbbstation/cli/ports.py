@@ -1,0 +1,29 @@
+"""`dbbstation ports`: what is connected."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+
+@click.command()
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def ports(*, as_json: bool) -> None:
+    r"""List the serial ports of this computer.
+
+    \b
+    Example:
+      dbbstation ports
+    """
+    from dbbstation.instrument.link import connected_ports
+
+    found = connected_ports()
+    if as_json:
+        keys = ("port", "description", "hardware")
+        click.echo(json.dumps({"ports": [dict(zip(keys, port, strict=True)) for port in found]}, indent=2))
+        return
+    if not found:
+        click.echo("No serial port is connected: plug in the adapter of the instrument.", err=True)
+    for port, description, hardware in found:
+        click.echo(f"{port:16} {description}" + (f"  ({hardware})" if hardware not in {"", "n/a"} else ""))

@@ -1,0 +1,53 @@
+"""`dbbstation replay`: a byte log through the decoder."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--instrument", metavar="NAME", help="An instrument that is known, or a protocol file [that of the log].")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def replay(file: Path, *, instrument: str | None, as_json: bool) -> None:
+    r"""Decode a byte log that `monitor --log` wrote: every reading, and everything that is not understood.
+
+    \b
+    Examples:
+      dbbstation replay bytes.txt
+      dbbstation replay bytes.txt --instrument streaming-encoder --json
+    """
+    from dbbstation.instrument.bytelog import logged_instrument, read_byte_log
+    from dbbstation.instrument.library import load_instrument
+    from dbbstation.instrument.replay import replayed
+
+    name = instrument or logged_instrument(file)
+    if not name:
+        raise click.UsageError("the log does not name its instrument: give --instrument")
+    rows = list(replayed(load_instrument(name), read_byte_log(file), where=str(file)))
+    readings = [row for row in rows if row.reading is not None]
+    garbage = [row for row in rows if row.reading is None]
+    lost = sum(row.reading.lost for row in rows if row.reading is not None)
+    if as_json:
+        said = [
+            {"t_s": row.t_s, "length_mm": row.reading.length_mm, "status": row.reading.status, "lost": row.reading.lost}
+            for row in rows
+            if row.reading is not None
+        ]
+        unread = [{"t_s": row.t_s, "bytes": row.raw.hex(" "), "why": row.why} for row in garbage]
+        click.echo(json.dumps({"readings": said, "lost": lost, "not_understood": unread}, indent=2))
+        return
+    for row in rows:
+        if row.reading is None:
+            click.echo(f"{row.t_s:12.6f} s  not understood: {row.raw.hex(' ')}" + (f"  ({row.why})" if row.why else ""))
+            continue
+        length = f"{row.reading.length_mm:14.5f} mm" if row.reading.length_mm is not None else f"{'--':>14}   "
+        gap = f"  ({row.reading.lost} lost before)" if row.reading.lost else ""
+        status = f"  {row.reading.status}: {row.reading.said}" if row.reading.status != "ok" else ""
+        click.echo(f"{row.t_s:12.6f} s {length}{gap}{status}")
+    click.echo(
+        f"{len(readings)} readings, {lost} lost, {sum(len(row.raw) for row in garbage)} bytes not understood", err=True
+    )

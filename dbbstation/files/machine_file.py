@@ -86,10 +86,10 @@ class MachineParts(Schema):
                 np.array(self.platform_joints_mm, dtype=np.float64),
                 Rotation(self.rotation),
             ),
-            travel=Travel(**{name: getattr(self.travel, name) for name in TravelSchema.model_fields}),
+            travel=Travel(**self.travel.model_dump()),
             reference_length_error_mm=np.array(self.reference_length_error_mm, dtype=np.float64),
             screw_lead_mm=self.screw_lead_mm,
-            masses=masses and Masses(**{name: getattr(masses, name) for name in MassesSchema.model_fields}),
+            masses=None if masses is None else Masses(**masses.model_dump()),
             joint_tolerance_mm=self.joint_tolerance_mm,
         )
 
@@ -117,4 +117,4 @@ def read_machine(path: Path) -> Machine:
 def parse_machine(path: Path, faults: list[Problem]) -> MachineFile | None:
     """Read a machine file; None with every fault added to `faults`."""
     document = read_document(path, MachineFile, faults)
-    return document and validate(document, MachineFile, faults)
+    return None if document is None else validate(document, MachineFile, faults)

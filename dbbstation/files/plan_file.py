@@ -103,9 +103,9 @@ class PlanFile(Schema):
     """How the circles are travelled."""
     jig: JigSchema | str
     """The plate; or the path of a `dbb-jig/1` file, from this file's folder, that holds plate, holders and balls."""
-    holders: dict[str, HolderSchema] = {}
+    holders: dict[str, HolderSchema] = Field(default_factory=dict)
     """Holders by name."""
-    balls: dict[str, BallSchema] = {}
+    balls: dict[str, BallSchema] = Field(default_factory=dict)
     """Balls by name, one per bore and holder used."""
     tests: Annotated[tuple[TestSchema, ...], Field(min_length=1)]
     """Tests in the order they are run."""

@@ -63,7 +63,8 @@ def format_of(schema: type[Schema]) -> str:
 
 
 def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) -> bool:
-    name, wanted = expected.split("/")[0], FORMATS[expected.split("/")[0]]
+    name = expected.partition("/")[0]
+    wanted = FORMATS[name]
     if "format" not in document.data:
         what = f"the file does not say what format it has, {wanted} was expected"
         faults.append(document.problem((), what, f"begin it with `format: {expected}`"))
@@ -71,7 +72,7 @@ def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) ->
     given = document.data["format"]
     if given == expected:
         return True
-    given_name = str(given).split("/", maxsplit=1)[0]
+    given_name = str(given).partition("/")[0]
     if given_name == name:
         what, remedy = f"`{given}` is a version that this program does not know", f"it reads {expected}"
     elif given_name in FORMATS:

@@ -150,27 +150,29 @@ class _Walk:
         return data
 
     def _scalar(self, node: ScalarNode) -> Any:  # noqa: ANN401 - the type stands in the file
-        kind, text = node.tag.removeprefix(_TAG), node.value
+        kind, text = (node.tag or "").removeprefix(_TAG), node.value
         if kind in _PLAIN_TEXT:
             return text
         if kind == "null":
             return None
         if kind == "bool":
             return text.lower() == "true"
-        try:
-            if kind == "int":
-                digits = text.replace("_", "")
-                return int(digits, 0) if digits.lstrip("+-")[:2].lower() in {"0o", "0x", "0b"} else int(digits)
-            if kind == "float":
-                return float(text.replace("_", "").replace(".inf", "inf").replace(".nan", "nan").lower())
-        except ValueError:
-            self._fault(node, f"`{text}` is not a number", "write digits with a dot as decimal sign")
-            return None
+        if kind in {"int", "float"}:
+            return self._number(node, kind, text.replace("_", "").lower())
         if kind == "merge":
             self._fault(node, "merge keys `<<` are not allowed", "write the entries out")
         else:
             self._fault(node, f"the tag `{node.tag}` is not allowed", "remove it, values need no tags here")
         return None
+
+    def _number(self, node: ScalarNode, kind: str, digits: str) -> float | int | None:
+        try:
+            if kind == "float":
+                return float(digits.replace(".inf", "inf").replace(".nan", "nan"))
+            return int(digits, 0) if digits.lstrip("+-")[:2] in {"0o", "0x", "0b"} else int(digits)
+        except ValueError:
+            self._fault(node, f"`{node.value}` is not a number", "write digits with a dot as decimal sign")
+            return None
 
     def _untagged(self, node: Node, kind: str) -> None:
         if node.tag != _TAG + kind:

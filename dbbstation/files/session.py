@@ -1,0 +1,405 @@
+"""Reading a session folder: what was done, with which machine and plan, and each run when it is asked for."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from datetime import datetime
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.machine_file import parse_machine
+from dbbstation.files.plan_file import parse_plan
+from dbbstation.files.quantities import Quantity, twice
+from dbbstation.files.run_csv import PART, RunFile, changed, read_run
+from dbbstation.files.run_lines import split_file
+from dbbstation.files.schema import read_document, validate
+from dbbstation.files.session_file import BarSchema, ProgramSchema, RunSchema, SessionFile
+from dbbstation.files.source_text import read_bytes
+from dbbstation.plan.circle import Direction
+from dbbstation.sources.contract import Setup
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.files.yaml_text import YamlDocument
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Plan
+    from dbbstation.trace.recording import Recording
+
+SESSION_FILE = "session.yaml"
+"""What a session folder is known by."""
+
+_UNLIKE_RADIUS = 0.2
+"""Share of the bar's length that readings may be off; no ball bar reaches that far."""
+
+_SLOWEST, _FASTEST = 50.0, 0.05
+"""Times as long as the circle should take, between which a recording's duration is plausible."""
+
+
+class RunState(StrEnum):
+    """How far a run has come."""
+
+    RECORDING = "recording"
+    COMPLETE = "complete"
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class Program:
+    """An NC program that was commanded.
+
+    Attributes:
+        path: of its file.
+        sha256: of its file.
+        model_sha256: of the model that it was compensated with; empty where none.
+    """
+
+    path: Path
+    sha256: str
+    model_sha256: str
+
+
+@dataclass(frozen=True)
+class RunEntry:
+    """What the session says of one run.
+
+    Attributes:
+        test: name of the test.
+        direction: sense of travel.
+        repeat: counts the runs of this test and direction, from 1.
+        mounting: counts how often a ball was put up; None: one mounting per test.
+        state: how far it has come.
+        reason: why it was rejected; empty otherwise.
+        started: when the first sample was taken; None where not noted.
+        path: of its file.
+        sha256: of its file; empty while recording.
+        program: what was commanded where it was not the plan's circle.
+        centre_mm: centre of the circle as programmed, machine frame (x, y, z) [mm]; None: as planned.
+    """
+
+    test: str
+    direction: Direction
+    repeat: int
+    mounting: int | None
+    state: RunState
+    reason: str
+    started: datetime | None
+    path: Path
+    sha256: str
+    program: Program | None
+    centre_mm: tuple[float, float, float] | None
+
+    @property
+    def label(self) -> str:
+        """Name of the run in messages."""
+        return f"{self.test} {self.direction} {self.repeat}"
+
+
+@dataclass(frozen=True)
+class Bar:
+    """The bar: provenance and uncertainty, nothing of it is added to readings.
+
+    Attributes:
+        serial_number: of the bar.
+        calibrated_length_mm: distance between the ball centres that its calibration found [mm].
+        calibrator_uncertainty_mm: of that length, one standard deviation [mm].
+        calibrated: when; None where not noted.
+        temp_c: of the bar then [degC]; None where not noted.
+        expansion_um_m_k: thermal expansion [µm/(m K)]; None where not noted.
+    """
+
+    serial_number: str
+    calibrated_length_mm: float
+    calibrator_uncertainty_mm: float
+    calibrated: datetime | None
+    temp_c: float | None
+    expansion_um_m_k: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class SessionFolder:
+    """A session with its machine and plan; runs are read when asked for.
+
+    Attributes:
+        name: of the folder.
+        folder: where it is.
+        machine: the nominal model that the controller had.
+        plan: the plan as run.
+        runs: in the order they were started, of every state.
+        sha256: of the session file.
+        serial_number: of the machine; empty where not noted.
+        operator: empty where not noted.
+        ambient_temp_c: temperature of the shop [degC]; None where not noted.
+        bar: None where not noted.
+    """
+
+    name: str
+    folder: Path
+    machine: Machine
+    plan: Plan
+    runs: tuple[RunEntry, ...]
+    sha256: str
+    serial_number: str = ""
+    operator: str = ""
+    ambient_temp_c: float | None = None
+    bar: Bar | None = None
+
+    def in_state(self, *states: RunState) -> tuple[RunEntry, ...]:
+        """Return the runs in one of these states."""
+        return tuple(run for run in self.runs if run.state in states)
+
+    def circle(self, run: RunEntry) -> Circle:
+        """Return the circle that a run was commanded, its centre as programmed."""
+        circle = self.plan.tests[run.test].run(run.direction)
+        return circle if run.centre_mm is None else replace(circle, centre_mm=run.centre_mm)
+
+    def setup(self, run: RunEntry) -> Setup:
+        """Return ball, mounting and bar of a run, named so that no other session has the same names."""
+        ball = self.plan.tests[run.test].ball
+        mounted = f"test {run.test}" if run.mounting is None else f"mounting {run.mounting}"
+        return Setup(
+            session=self.name,
+            mounting=f"{self.name}: {ball.name}, {mounted}",
+            ball=f"{self.name}: {ball.name}",
+            instrument=f"{self.name}: bar" if self.bar is None else self.bar.serial_number or f"{self.name}: bar",
+            fixed_ball_mm=np.array(ball.centre_mm, dtype=np.float64),
+            mounting_repeatability_mm=ball.repeatability_mm,
+            ball_uncertainty_mm=ball.uncertainty_mm,
+            bar_uncertainty_mm=0.0 if self.bar is None else self.bar.calibrator_uncertainty_mm,
+        )
+
+    def started_s(self, run: RunEntry) -> float | None:
+        """Start of a run after that of the session's first [s]; None where not noted."""
+        moments = [other.started for other in self.runs if other.started is not None]
+        return None if run.started is None else (run.started - min(moments)).total_seconds()
+
+    def load(self, run: RunEntry) -> RunFile:
+        """Read a run and hold it against what session and plan say of it.
+
+        Raises:
+            InputError: the file was changed, is damaged, or holds another run; every fault with its line.
+        """
+        read = read_run(run.path, sha256=run.sha256)
+        faults = [*_header_faults(run, read.header), *self._implausible(run, read.recording)]
+        if faults:
+            raise InputError(faults)
+        return read
+
+    def load_all(self, runs: Sequence[RunEntry]) -> list[RunFile]:
+        """Read several runs.
+
+        Raises:
+            InputError: every fault of all their files.
+        """
+        read: list[RunFile] = []
+        faults: list[Problem] = []
+        for run in runs:
+            try:
+                read.append(self.load(run))
+            except InputError as error:
+                faults += error.problems
+        if faults:
+            raise InputError(faults)
+        return read
+
+    def _implausible(self, run: RunEntry, recording: Recording) -> list[Problem]:
+        """Units that the file itself cannot tell: only the planned circle says how long and how far."""
+        circle, file = self.circle(run), str(run.path)
+        faults = []
+        bar = circle.bar_mm
+        length = float(np.median(recording.length_mm))
+        likely = Quantity("mm", (1.0 - _UNLIKE_RADIUS) * bar, (1.0 + _UNLIKE_RADIUS) * bar)
+        if not likely.fits(length):
+            what = f"length_mm is about {length:g}, the plan's test {run.test} has a bar of {bar:g} mm"
+            guess = likely.guess(length)
+            if not guess and abs(length) < _UNLIKE_RADIUS * bar:
+                guess = " (it looks like a deviation from the radius)"
+            remedy = "give the whole distance between the balls in mm, nothing taken off"
+            faults.append(Problem(file, 0, 0, what + guess, remedy))
+        if run.state is RunState.RECORDING:
+            return faults
+        expected = 360.0 / circle.turning_deg_s
+        duration = float(recording.t_s[-1] - recording.t_s[0])
+        if not _FASTEST * expected < duration < _SLOWEST * expected:
+            what = f"t_s spans {duration:g}, a turn takes {expected:.1f} s at the plan's feed"
+            faults.append(Problem(file, 0, 0, what, "give t_s in seconds, and the feed that was programmed"))
+        if recording.theta_deg is not None and np.ptp(recording.theta_deg) < np.pi * 2.0 + 0.1:
+            what = f"theta_deg spans {np.ptp(recording.theta_deg):.3f} only (it looks like rad)"
+            faults.append(Problem(file, 0, 0, what, "give a full turn in degrees"))
+        return faults
+
+
+def read_session(path: Path) -> SessionFolder:
+    """Read a session: its folder, or the session file in it.
+
+    Hashes of all files are checked here; the runs' content when they are loaded.
+
+    Raises:
+        InputError: every fault of session, machine and plan, every missing or changed file.
+    """
+    faults: list[Problem] = []
+    session = parse_session(path, faults)
+    if session is None or faults:
+        raise InputError(faults)
+    return session
+
+
+def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
+    """Read a session; None with every fault added to `faults`."""
+    file = path / SESSION_FILE if path.is_dir() else path
+    folder = file.parent
+    document = read_document(file, SessionFile, faults)
+    if document is None:
+        return None
+    session = validate(document, SessionFile, faults)
+    data = document.data
+    named = {key: data.get(key) for key in ("machine", "plan")}
+    machine = parse_machine(folder / named["machine"], faults) if isinstance(named["machine"], str) else None
+    plan = parse_plan(folder / named["plan"], faults) if isinstance(named["plan"], str) else None
+    planned = None if plan is None else plan.to_domain()
+    _check_runs(document, planned, folder, faults)
+    if session is None or machine is None or planned is None:
+        return None
+    entries = [run_entry(run, folder) for run in session.runs]
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    return SessionFolder(
+        name=folder.resolve().name,
+        folder=folder,
+        machine=machine.to_domain(),
+        plan=planned,
+        runs=(*entries, *_unlisted(folder, entries, planned, faults)),
+        sha256=digest,
+        serial_number=session.serial_number,
+        operator=session.operator,
+        ambient_temp_c=session.ambient_temp_c,
+        bar=None if session.bar is None else _bar(session.bar),
+    )
+
+
+def run_entry(run: RunSchema, folder: Path) -> RunEntry:
+    """Return the entry of a run as the rest of the program takes it."""
+    return RunEntry(
+        test=run.test,
+        direction=Direction(run.direction),
+        repeat=run.repeat,
+        mounting=run.mounting,
+        state=RunState(run.state),
+        reason=run.reason or "",
+        started=None if run.started is None else datetime.fromisoformat(run.started),
+        path=folder / run.file,
+        sha256=run.sha256 or "",
+        program=None if run.program is None else _program(run.program, folder),
+        centre_mm=run.centre_mm,
+    )
+
+
+def _program(program: ProgramSchema, folder: Path) -> Program:
+    return Program(folder / program.file, program.sha256, program.model_sha256 or "")
+
+
+def _bar(bar: BarSchema) -> Bar:
+    moment = None if bar.calibrated is None else datetime.fromisoformat(bar.calibrated)
+    return Bar(**{**bar.model_dump(), "calibrated": moment})
+
+
+def _check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: list[Problem]) -> None:
+    """Check runs against each other, the plan and the disk, on the raw data: other faults must not hide these."""
+    runs = document.entries("runs")
+    for key, what in ((("test", "direction", "repeat"), "this run"), (("file",), "this file")):
+        values = [tuple(map(str, map(run.get, key))) for _, run in runs]
+        for index in twice(values):
+            shown = " ".join(values[index])
+            text = f"{what} ({shown}) stands here a second time"
+            faults.append(document.problem(runs[index][0], text, "give each run its own repeat and file"))
+    for location, run in runs:
+        test, direction = run.get("test"), run.get("direction")
+        if plan is not None and isinstance(test, str):
+            if test not in plan.tests:
+                what = f"the plan has no test `{test}`: this is a run of another plan"
+                faults.append(document.problem((*location, "test"), what, f"its tests: {', '.join(plan.tests)}"))
+            elif direction in {"ccw", "cw"} and direction not in plan.tests[test].directions:
+                what = f"the plan does not run test {test} {direction}: this is a run of another plan"
+                faults.append(document.problem((*location, "direction"), what, "check plan and run"))
+        _check_file(document, location, run, folder, faults)
+        if isinstance(run.get("program"), dict):
+            _check_file(document, (*location, "program"), run["program"], folder, faults)
+
+
+def _check_file(
+    document: YamlDocument,
+    location: tuple[str | int, ...],
+    entry: dict[str, Any],
+    folder: Path,
+    faults: list[Problem],
+) -> None:
+    """Check that a file is there and is the one whose hash was noted."""
+    file, expected = entry.get("file"), entry.get("sha256")
+    if not isinstance(file, str):
+        return
+    path = folder / file
+    if not path.is_file():
+        what = f"there is no file `{file}` in the session folder"
+        faults.append(document.problem((*location, "file"), what, "restore it, or take the entry out"))
+    elif isinstance(expected, str):
+        data = read_bytes(path, faults)
+        if data is not None and hashlib.sha256(data).hexdigest() != expected:
+            faults.append(changed(str(path)))
+
+
+def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Problem]) -> list[RunEntry]:
+    """Runs that were being recorded when the station died before it could note them."""
+    listed = {run.path.name for run in entries}
+    found = []
+    for path in sorted(folder.glob(f"runs/*.csv{PART}")):
+        entry = None if path.name in listed else part_entry(path)
+        if entry is None or path.name in listed:
+            continue
+        if entry.test not in plan.tests:
+            faults.append(
+                Problem(str(path), 1, 0, f"the plan has no test `{entry.test}`: this is a run of another plan")
+            )
+        else:
+            found.append(entry)
+    return found
+
+
+def part_entry(path: Path) -> RunEntry | None:
+    """Return what a half-recorded run says of itself; None where it died before it could."""
+    lines = split_file(path.read_bytes(), str(path), [])
+    header = {} if lines is None else lines.header
+    if (
+        not header.get("test")
+        or header.get("direction") not in set(Direction)
+        or not header.get("repeat", "").isdigit()
+    ):
+        return None
+    return RunEntry(
+        test=header["test"],
+        direction=Direction(header["direction"]),
+        repeat=int(header["repeat"]),
+        mounting=None,
+        state=RunState.RECORDING,
+        reason="",
+        started=None,
+        path=path,
+        sha256="",
+        program=None,
+        centre_mm=None,
+    )
+
+
+def _header_faults(run: RunEntry, header: Mapping[str, str]) -> list[Problem]:
+    """Compare what the run file says of itself with its entry."""
+    faults = []
+    for key, expected in (("test", run.test), ("direction", str(run.direction)), ("repeat", str(run.repeat))):
+        if header.get(key, expected) != expected:
+            what = f"the file is {key} `{header[key]}`, the session calls it {key} `{expected}`"
+            faults.append(Problem(str(run.path), 0, 0, what, "check which file belongs to which run"))
+    return faults

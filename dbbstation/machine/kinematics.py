@@ -16,8 +16,8 @@ from dbbstation.machine.rotation import Frames
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-TOLERANCE_MM = 1e-10
-"""Strut length residual at which the forward kinematics is content."""
+TOLERANCE_MM = 1e-11
+"""Strut length residual at which the forward kinematics is content: it puts the pose itself within 1e-9 mm."""
 
 MOST_STEPS = 25
 """Newton steps: three do from a commanded pose; more than ten mean that there is no pose nearby."""
@@ -70,7 +70,7 @@ def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> F
         near: where Newton-Raphson starts, usually the commanded poses.
 
     Returns:
-        Frames that reproduce `length_mm` within 1e-10 mm.
+        Frames that reproduce `length_mm` within 1e-11 mm.
 
     Raises:
         KinematicsError: no pose found; names the first such pose.

@@ -7,15 +7,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import TravelError
-from dbbstation.machine.geometry import STRUTS, Machine
-from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import inverse, strut_jacobian
 from dbbstation.machine.rotation import Frames
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.machine.kinematics import Struts
+
 ROUNDING = 1e-9
 """A pose on the limit itself is inside; rounding must not decide [mm or deg]."""
+
+
+LEAST_STIFFNESS = 0.02
+"""Share of the middle's Jacobian determinant below which a pose counts as loose: the struts then hardly hold the
+platform in some direction. Travel limits alone allow such poses: on a PM-600-like machine at high tilt near the
+upper rim, where the determinant passes through zero."""
 
 
 def check_travel(machine: Machine, poses: NDArray[np.float64], *, where: str) -> None:
@@ -48,9 +57,10 @@ def _limited_quantities(
     """Name, unit, value per pose and limits of everything that has limits."""
     travel = machine.travel
     radius = np.hypot(poses[:, 0], poses[:, 1])
-    lengths = inverse(machine.hexapod, Frames.from_poses(poses, machine.hexapod.rotation)).length_mm
-    driven = lengths - machine.reference_length_error_mm
+    struts = inverse(machine.hexapod, Frames.from_poses(poses, machine.hexapod.rotation))
+    driven = struts.length_mm - machine.reference_length_error_mm
     return [
+        ("the hold of the struts on the platform", "of the middle's", _hold(machine, struts), LEAST_STIFFNESS, np.inf),
         ("the distance from the Z axis", "mm", radius, 0.0, travel.xy_radius_mm),
         ("X", "mm", poses[:, 0], *travel.x_mm),
         ("Y", "mm", poses[:, 1], *travel.y_mm),
@@ -60,3 +70,12 @@ def _limited_quantities(
         ("C", "deg", poses[:, 5], *travel.c_deg),
         *((f"strut {i + 1}", "mm", driven[:, i], *travel.strut_mm) for i in range(STRUTS)),
     ]
+
+
+def _hold(machine: Machine, struts: Struts) -> NDArray[np.float64]:
+    """Jacobian determinant over that in the middle of the travel, shape (n,); zero where the platform is loose."""
+    middle = np.zeros((1, 6))
+    middle[0, 2] = sum(machine.travel.z_mm) / 2.0
+    there = inverse(machine.hexapod, Frames.from_poses(middle, machine.hexapod.rotation))
+    with np.errstate(invalid="ignore"):  # a pose that is no number has no hold, and is refused for it
+        return np.asarray(np.linalg.det(strut_jacobian(struts)) / np.linalg.det(strut_jacobian(there)))

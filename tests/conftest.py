@@ -1,0 +1,32 @@
+"""What every test may use: the reference machine, recordings made elsewhere."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dbbstation.files.machine_file import read_machine
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.machine.geometry import Machine
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    """The folder of recordings that this project did not make."""
+    folder = os.environ.get("DBBSTATION_RECORDINGS")
+    if not folder:
+        pytest.skip("DBBSTATION_RECORDINGS is not set: no recordings made elsewhere to test on")
+    return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def reference() -> Machine:
+    return read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20261121)

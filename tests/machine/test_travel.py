@@ -1,0 +1,47 @@
+"""Travel limits name the pose and the limit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbbstation.errors import TravelError
+from dbbstation.machine.travel import check_travel
+
+HOME = np.array([[0.0, 0.0, -1008.0, 0.0, 0.0, 0.0]])
+
+
+def pose(**change):
+    values = dict(zip("xyzabc", HOME[0], strict=True)) | change
+    return np.array([[values[axis] for axis in "xyzabc"]])
+
+
+def test_the_middle_is_inside(reference):
+    check_travel(reference, HOME, where="home")
+
+
+@pytest.mark.parametrize(
+    ("outside", "named"),
+    [
+        (pose(x=290, y=290), "distance from the Z axis is 410"),
+        (pose(x=301), "distance from the Z axis is 301"),
+        (pose(z=-1209), "Z is -1209"),
+        (pose(a=26.5), "A is 26.5"),
+        (pose(b=-30), "B is -30"),
+        (pose(c=6), "C is 6"),
+        (pose(x=float("nan")), "is nan"),
+    ],
+)
+def test_each_limit_is_named_with_its_pose(reference, outside, named):
+    with pytest.raises(TravelError, match=named) as refused:
+        check_travel(reference, np.vstack([HOME, outside]), where="test q ccw")
+    assert "test q ccw, pose 2 of 2" in str(refused.value)
+
+
+def test_a_pose_where_the_platform_comes_loose_is_refused(reference):
+    """Inside all travel limits the Jacobian's determinant passes through zero at high tilt near the upper rim."""
+    low, high = np.array([150, -180, -809, 5, 15, 0]), np.array([200, -140, -830, 20, 20, 3])
+    poses = np.random.default_rng(3).uniform(np.minimum(low, high), np.maximum(low, high), (20000, 6))
+    poses = poses[np.hypot(poses[:, 0], poses[:, 1]) < 290]
+    with pytest.raises(TravelError, match="hold of the struts"):
+        check_travel(reference, poses, where="corner")

@@ -143,14 +143,16 @@ def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: Byt
     if not isinstance(port, str):
         return Link(port, name=str(getattr(port, "name", None) or "open port"), owned=False, log=log)
     speed = baud or line.baud
+    # A pseudo-terminal has no bits: asked a second time for parity, the system finds nothing to change and refuses.
+    bits = (8, "none", 1) if _is_pseudo_terminal(port) else (line.data_bits, line.parity, line.stop_bits)
     try:
         opened = serial.serial_for_url(
             port,
             do_not_open=True,
             baudrate=speed,
-            bytesize=line.data_bits,
-            parity=_PARITY[line.parity],
-            stopbits=line.stop_bits,
+            bytesize=bits[0],
+            parity=_PARITY[bits[1]],
+            stopbits=bits[2],
             rtscts=line.flow == "rts-cts",
             xonxoff=line.flow == "xon-xoff",
             timeout=_TICK_S,
@@ -166,6 +168,10 @@ def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: Byt
 def connected_ports() -> list[tuple[str, str, str]]:
     """Return name, description and hardware id of every serial port of this computer, sorted by name."""
     return sorted((port.device, port.description or "", port.hwid or "") for port in list_ports.comports())
+
+
+def _is_pseudo_terminal(port: str) -> bool:
+    return "://" not in port and str(Path(port).resolve()).startswith(("/dev/pts/", "/dev/ttys"))
 
 
 def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:

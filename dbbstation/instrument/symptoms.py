@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError
-from dbbstation.instrument.codec import decode
-from dbbstation.instrument.fields import Content, NotUnderstood
+from dbbstation.instrument.codec import Decoder, Piece
+from dbbstation.instrument.fields import Content
 
 if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
@@ -68,7 +68,7 @@ def shown(raw: bytes) -> str:
 
 def _cause(protocol: Protocol, raw: bytes, baud: int) -> str:
     seven_bits = bytes(byte & 0x7F for byte in raw)
-    if seven_bits != raw and _is_reading(protocol, seven_bits):
+    if seven_bits != raw and _holds_reading(protocol, seven_bits):
         return f"without the highest bit it is a reading: set data bits and parity of the port to {protocol.line.text}"
     strange = sum(byte >= 0x80 or (byte < 0x20 and byte not in b"\r\n\x02") for byte in raw)  # noqa: PLR2004 (ASCII)
     binary = any(frame.binary for frame in protocol.frames)
@@ -82,9 +82,5 @@ def _cause(protocol: Protocol, raw: bytes, baud: int) -> str:
     )
 
 
-def _is_reading(protocol: Protocol, raw: bytes) -> bool:
-    try:
-        decode(protocol, raw)
-    except NotUnderstood:
-        return False
-    return True
+def _holds_reading(protocol: Protocol, raw: bytes) -> bool:
+    return any(isinstance(one, Piece) for one in Decoder(protocol, joining=False).feed(raw))

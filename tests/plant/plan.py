@@ -1,7 +1,7 @@
 """Test plans: where circles are measured, with which balls, in which order.
 
 Balls stand in the bores of the jig plate of [CAL Fig 5] on holders of three heights, or free. The bore numbers follow
-from the tilts of [CAL Table II], where the platform always leans towards the centre of the machine.
+from the tilts of [CAL Table II], taken so that the tool always points towards the middle of the machine.
 """
 
 from __future__ import annotations

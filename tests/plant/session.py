@@ -89,6 +89,23 @@ def record(
     return Truth(seed, folder, scene, decided, noise, tuple(runs))
 
 
+def true_runs(
+    plan: Plan,
+    mechanisms: Sequence[Mechanism],
+    machine: Machine | None = None,
+    rate_hz: float = 5.0,
+    timing: Timing | None = None,
+) -> list[TrueRun]:
+    """The runs of a session without noise and without writing anything, for quick looks at what a mechanism does.
+
+    Mechanisms with anything random in them must have been decided before.
+    """
+    scene = Scene(
+        rounded(machine or reference_machine()), plan, _slots(plan, timing or Timing(), mounting_numbers=True)
+    )
+    return [simulate_run(scene, slot, mechanisms, rate_hz)[0] for slot in scene.slots]
+
+
 def simulate_run(
     scene: Scene,
     slot: Slot,

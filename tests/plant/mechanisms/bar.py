@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from tests.plant.hexapod import Platform
     from tests.plant.run import Motion, Scene
 
+BAR_WARMING = Warming(rise_k=2.0, time_constant_s=1200.0)
+
 
 @dataclass(frozen=True)
 class BarOffset(Mechanism):
@@ -50,7 +52,7 @@ class BarDrift(Mechanism):
 
     name: ClassVar[str] = "bar-drift"
 
-    warming: Warming = Warming(rise_k=2.0, time_constant_s=1200.0)
+    warming: Warming = BAR_WARMING
     expansion_um_m_k: float = 10.6
     logged: bool = False
 

@@ -89,7 +89,7 @@ class HoseDrag(Mechanism):
     listed: ClassVar[bool] = False
 
     stiffness_n_mm: float = 0.8
-    natural_mm: float = 900.0
+    natural_mm: float = 500.0
     anchor_mm: tuple[float, float, float] = (900.0, 300.0, -200.0)
     on_platform_mm: tuple[float, float, float] = (250.0, 0.0, 550.0)
     compliance_mm_n: float = 9.68e-6

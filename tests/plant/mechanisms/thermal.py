@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from tests.plant.run import Motion
 
 EVEN = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+STRUTS_WARMING = Warming(rise_k=3.0, time_constant_s=2400.0)
+SPINDLE_WARMING = Warming(rise_k=4.0, time_constant_s=900.0)
+FRAME_WARMING = Warming(rise_k=1.5, time_constant_s=5400.0)
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class ThermalStruts(Mechanism):
 
     name: ClassVar[str] = "thermal-struts"
 
-    warming: Warming = Warming(rise_k=3.0, time_constant_s=2400.0)
+    warming: Warming = STRUTS_WARMING
     expansion_um_m_k: float = 11.5
     shares: tuple[float, float, float, float, float, float] = EVEN
     logged: bool = False
@@ -51,7 +54,7 @@ class ThermalFrame(Mechanism):
 
     name: ClassVar[str] = "thermal-frame"
 
-    warming: Warming = Warming(rise_k=1.5, time_constant_s=5400.0)
+    warming: Warming = FRAME_WARMING
     expansion_um_m_k: float = 11.5
     logged: bool = False
 
@@ -73,7 +76,7 @@ class SpindleGrowth(Mechanism):
 
     name: ClassVar[str] = "spindle-growth"
 
-    warming: Warming = Warming(rise_k=4.0, time_constant_s=900.0)
+    warming: Warming = SPINDLE_WARMING
     growth_um_k: float = 3.0
 
     def tool_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:

@@ -1,0 +1,92 @@
+"""Base joints that rub, or whose centre is not a point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from tests.plant.hexapod import Platform, commanded_platform
+from tests.plant.mechanisms.base import Mechanism
+from tests.plant.mechanisms.play_operator import follower
+
+if TYPE_CHECKING:
+    from tests.plant.arrays import FloatArray
+    from tests.plant.machine import Machine
+    from tests.plant.run import Motion
+
+HOME = np.array([[0.0, 0.0, -1008.0, 0.0, 0.0, 0.0]])
+
+
+def joint_axes(machine: Machine) -> tuple[FloatArray, FloatArray]:
+    """Axes of the 2-DOF base joints `(6, 3)` each: the first fixed in the base and level, the second square to it.
+
+    An assumption, as no paper gives them; both are square to the strut when the platform is at home.
+    """
+    home = commanded_platform(machine, HOME).direction[0]
+    first = np.cross(home, [0.0, 0.0, 1.0])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return first, np.cross(home, first)
+
+
+def joint_angles_rad(machine: Machine, direction: FloatArray) -> FloatArray:
+    """Turn about the first and the second axis `(n, 6, 2)` since home, of struts along `(n, 6, 3)`."""
+    first, second = joint_axes(machine)
+    home = commanded_platform(machine, HOME).direction[0]
+    along, side, level = (np.einsum("nij,ij->ni", direction, axis) for axis in (home, second, first))
+    return np.stack([np.arctan2(-side, along), np.arcsin(level)], axis=2)
+
+
+@dataclass(frozen=True)
+class JointFriction(Mechanism):
+    """Base joints rub: a moment [N mm] against the turn of each axis, built up over a small wind-up angle [µrad].
+
+    A strut held back by a moment M at its base pushes the platform sideways with M/L, and the struts' own compliance
+    turns that into an error: hysteresis that changes sign where a joint turns round, not where a strut does.
+    """
+
+    name: ClassVar[str] = "joint-friction"
+
+    moment_n_mm: float = 2.0e4
+    wind_up_urad: float = 100.0
+    compliance_mm_n: float = 9.68e-6
+
+    def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
+        """Stretch `(n, 6)` under the sideways forces."""
+        commanded = commanded_platform(motion.machine, motion.commanded)
+        angle_rad = joint_angles_rad(motion.machine, commanded.direction)
+        share = np.stack([self._wound(angle_rad[:, strut]) for strut in range(6)], axis=1)
+        # A turn about an axis moves the strut's end along axis × direction; friction pushes the other way.
+        ways = [np.cross(axis, platform.direction) for axis in joint_axes(motion.machine)]
+        force_n = (
+            -sum(share[:, :, [k]] * ways[k] for k in range(2)) * (self.moment_n_mm / platform.length_mm)[:, :, None]
+        )
+        wrench = np.concatenate([force_n.sum(axis=1), np.cross(platform.arm_mm, force_n).sum(axis=1)], axis=1)
+        return self.compliance_mm_n * np.linalg.solve(platform.jacobian.transpose(0, 2, 1), wrench[:, :, None])[:, :, 0]
+
+    def _wound(self, angle_rad: FloatArray) -> FloatArray:
+        """How far `(n, 2)` the friction of both axes is built up, -1 to 1."""
+        half_rad = self.wind_up_urad * 1e-6
+        return np.stack([(angle_rad[:, k] - follower(angle_rad[:, k], half_rad)) / half_rad for k in range(2)], axis=1)
+
+
+def _zeros_63() -> FloatArray:
+    return np.zeros((6, 3))
+
+
+@dataclass(frozen=True)
+class JointRunout(Mechanism):
+    """The strut's axis misses the base joint's first axis by `(6, 3)` [µm], and goes round with it."""
+
+    name: ClassVar[str] = "joint-runout"
+
+    eccentricity_um: FloatArray = field(default_factory=_zeros_63)
+
+    def base_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray:
+        """The eccentricity turned about the first axis `(n, 6, 3)`, less what it is at home (Rodrigues)."""
+        first, _ = joint_axes(motion.machine)
+        turn_rad = joint_angles_rad(motion.machine, platform.direction)[:, :, :1]
+        e_mm = np.asarray(self.eccentricity_um) / 1000.0
+        inside = first * np.einsum("ij,ij->i", first, e_mm)[:, None]
+        return (np.cos(turn_rad) - 1.0) * (e_mm - inside) + np.sin(turn_rad) * np.cross(first, e_mm)

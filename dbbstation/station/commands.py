@@ -1,0 +1,57 @@
+"""What a person, or a program in their place, tells the sequencer. Put into its queue from any thread."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+
+@dataclass(frozen=True)
+class Start:
+    """The ball stands, the bar is in: wait for the machine to feed in.
+
+    Attributes:
+        remounted: the holder was touched although the announcement did not ask for it, so this run gets a new mounting.
+    """
+
+    remounted: bool = False
+
+
+@dataclass(frozen=True)
+class Accept:
+    """The complete run counts; go on to the next."""
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """The run does not count, neither when complete nor while it goes on: measure it again.
+
+    Attributes:
+        reason: kept with the recording.
+    """
+
+    reason: str = "repeated by the operator"
+
+
+@dataclass(frozen=True)
+class Reject:
+    """The run does not count; go on to the next. What lacks an accepted run is named at the end.
+
+    Attributes:
+        reason: kept with the recording.
+    """
+
+    reason: str = "rejected by the operator"
+
+
+@dataclass(frozen=True)
+class Skip:
+    """Leave the announced run out for now."""
+
+
+@dataclass(frozen=True)
+class Quit:
+    """Stop here; a run that goes on is kept as far as it came. The session can be continued later."""
+
+
+Command: TypeAlias = Start | Accept | Repeat | Reject | Skip | Quit

@@ -1,0 +1,294 @@
+"""What the sequencer tells whoever listens: storage, screens, the command line. Data only, in the order it happened."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbbstation.errors import StationError
+    from dbbstation.instrument.reading import Status
+    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.plan.plan import Ball
+    from dbbstation.station.commands import Command
+    from dbbstation.station.states import State
+    from dbbstation.trace.analysis import CircleFigures
+
+
+@dataclass(frozen=True)
+class RunId:
+    """Which run of the session.
+
+    Attributes:
+        test: name of the test.
+        direction: sense of travel.
+        repeat: counts the runs of this test and direction in the session, from 1.
+        mounting: counts how often a ball was put up in the session, from 1.
+    """
+
+    test: str
+    direction: Direction
+    repeat: int
+    mounting: int
+
+    @property
+    def label(self) -> str:
+        """Name of the run in messages and of its file, such as `a-ccw-1`."""
+        return f"{self.test}-{self.direction}-{self.repeat}"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One reading, as seen by the sequencer.
+
+    Attributes:
+        t_s: machine time; since the run's first sample while a run is recorded, of the driver's clock before [s].
+        length_mm: distance between the ball centres [mm]; None where the instrument gave no number.
+        status: `ok`, `overrange` or `fault`.
+        said: what the instrument said where the status is not `ok`.
+        lost: samples lost immediately before this one.
+        phi_deg: progress along the turn as far as it can be told live, 0 to 360 on the full turn, negative on the
+            overshoot before it, above 360 behind it [deg]; None off the circle.
+    """
+
+    t_s: float
+    length_mm: float | None
+    status: Status = "ok"
+    said: str = ""
+    lost: int = 0
+    phi_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class StateChanged:
+    """The sequencer is in another state.
+
+    Attributes:
+        state: the new one.
+        commands: what it takes now.
+    """
+
+    state: State
+    commands: frozenset[type[Command]]
+
+
+@dataclass(frozen=True)
+class RunAnnounced:
+    """What is measured next, and what a person has to do for it.
+
+    Attributes:
+        run: which run.
+        ball: the ball on the table with its bore (None: it stands in none) and holder.
+        circle: the circle: bar length, tilt, elevation, feed, centre.
+        put_up: the ball has to be put up; otherwise it stands there already and is not touched.
+        program: NC program that commands the run; empty: the plain nominal circle.
+        number: of the run in the sequence, from 1.
+        count: runs in the sequence.
+        instructions: the same in words, one step per entry.
+    """
+
+    run: RunId
+    ball: Ball
+    circle: Circle
+    put_up: bool
+    program: str
+    number: int
+    count: int
+    instructions: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ReadingsSeen:
+    """Readings in time order, while no run is recorded: for a live display only.
+
+    Attributes:
+        samples: at least one.
+    """
+
+    samples: tuple[Sample, ...]
+
+
+@dataclass(frozen=True)
+class RunStarted:
+    """The bar stands outside the circle: from now on every sample belongs to the run.
+
+    Attributes:
+        run: which run.
+        program: NC program that commands it; empty: the plain nominal circle.
+    """
+
+    run: RunId
+    program: str
+
+
+@dataclass(frozen=True)
+class SamplesRecorded:
+    """Samples of the run that goes on, in time order.
+
+    Attributes:
+        run: which run.
+        samples: at least one.
+    """
+
+    run: RunId
+    samples: tuple[Sample, ...]
+
+
+@dataclass(frozen=True)
+class FeedInSeen:
+    """The bar came onto the circle.
+
+    Attributes:
+        run: which run.
+        t_s: since the run's first sample [s].
+    """
+
+    run: RunId
+    t_s: float
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the run is; sent once per degree at most.
+
+    Attributes:
+        run: which run.
+        swept_deg: travelled since the feed-in [deg].
+        of_deg: from feed-in to feed-out, both overshoots included [deg].
+    """
+
+    run: RunId
+    swept_deg: float
+    of_deg: float
+
+
+@dataclass(frozen=True)
+class RunCompleted:
+    """The recording has ended, nothing is added to it any more.
+
+    Attributes:
+        run: which run.
+        samples: how many it has.
+        lost: samples that the line lost during it.
+        figures: of its circle; None where there is none.
+        problem: why it cannot be used; empty where it can.
+    """
+
+    run: RunId
+    samples: int
+    lost: int
+    figures: CircleFigures | None
+    problem: str
+
+
+@dataclass(frozen=True)
+class RunAccepted:
+    """The run counts."""
+
+    run: RunId
+
+
+@dataclass(frozen=True)
+class RunRejected:
+    """The run does not count; its recording is kept.
+
+    Attributes:
+        run: which run.
+        reason: why.
+    """
+
+    run: RunId
+    reason: str
+
+
+@dataclass(frozen=True)
+class RunLate:
+    """The machine did not come: no recording was begun, the run is announced again.
+
+    Attributes:
+        run: which run.
+        problem: what was waited for and how long.
+    """
+
+    run: RunId
+    problem: str
+
+
+@dataclass(frozen=True)
+class CommandRefused:
+    """A command that the state does not take; nothing happened.
+
+    Attributes:
+        command: which.
+        state: in which.
+        why: in words, with what can be done instead.
+    """
+
+    command: Command
+    state: State
+    why: str
+
+
+@dataclass(frozen=True)
+class SessionFinished:
+    """The sequence is through.
+
+    Attributes:
+        accepted: runs that count, of the whole session.
+        missing: test and direction of every planned run that has no accepted recording.
+    """
+
+    accepted: int
+    missing: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SessionStopped:
+    """Somebody quit.
+
+    Attributes:
+        accepted: runs that count, of the whole session.
+        left_to_do: planned runs that have no accepted recording.
+        interrupted: the run that went on, kept as far as it came; None where none did.
+    """
+
+    accepted: int
+    left_to_do: int
+    interrupted: RunId | None
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Instrument or storage failed; the sequence ends here. What was recorded is kept.
+
+    Attributes:
+        error: what is wrong, where, what to do.
+        interrupted: the run that went on, kept as far as it came; None where none did.
+    """
+
+    error: StationError
+    interrupted: RunId | None
+
+
+Event: TypeAlias = (
+    StateChanged
+    | RunAnnounced
+    | ReadingsSeen
+    | RunStarted
+    | SamplesRecorded
+    | FeedInSeen
+    | Progress
+    | RunCompleted
+    | RunAccepted
+    | RunRejected
+    | RunLate
+    | CommandRefused
+    | SessionFinished
+    | SessionStopped
+    | Fault
+)
+
+Observer: TypeAlias = "Callable[[Event], None]"
+"""Called with each event in the thread that runs the sequence; what it raises ends the sequence."""

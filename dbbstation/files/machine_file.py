@@ -1,9 +1,10 @@
 """`dbb-machine/1`: the nominal machine, as its controller believes it."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from dbbstation.errors import InputError, Problem
@@ -92,6 +93,33 @@ class MachineParts(Schema):
             masses=None if masses is None else Masses(**masses.model_dump()),
             joint_tolerance_mm=self.joint_tolerance_mm,
         )
+
+
+def machine_parts(machine: Machine) -> MachineParts:
+    """Return a machine as files hold it; the inverse of `MachineParts.to_domain`, exact to the last digit."""
+
+    def points(joints: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+        return tuple(tuple(joint) for joint in joints.tolist())
+
+    masses = machine.masses
+    return MachineParts.model_validate(
+        {
+            "name": machine.name,
+            "rotation": machine.hexapod.rotation.value,
+            "base_joints_mm": points(machine.hexapod.base_joints_mm),
+            "platform_joints_mm": points(machine.hexapod.platform_joints_mm),
+            "reference_length_error_mm": tuple(machine.reference_length_error_mm.tolist()),
+            "travel": {name: getattr(machine.travel, name) for name in TravelSchema.model_fields},
+            "screw_lead_mm": machine.screw_lead_mm,
+            "joint_tolerance_mm": machine.joint_tolerance_mm,
+            "masses": masses and {name: getattr(masses, name) for name in MassesSchema.model_fields},
+        }
+    )
+
+
+def machine_data(parts: MachineParts) -> dict[str, Any]:
+    """Return the keys of a machine in the order of the format, those without a value left out."""
+    return parts.model_dump(exclude_none=True, exclude={"format"})
 
 
 class MachineFile(MachineParts):

@@ -6,19 +6,19 @@ import hashlib
 from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.machine_file import parse_machine
 from dbbstation.files.plan_file import parse_plan
-from dbbstation.files.quantities import Quantity, twice
-from dbbstation.files.run_csv import PART, RunFile, changed, read_run
+from dbbstation.files.quantities import Quantity
+from dbbstation.files.run_csv import PART, RunFile, read_run
 from dbbstation.files.run_lines import split_file
 from dbbstation.files.schema import read_document, validate
+from dbbstation.files.session_checks import check_runs
 from dbbstation.files.session_file import BarSchema, ProgramSchema, RunSchema, SessionFile
-from dbbstation.files.source_text import read_bytes
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.files.yaml_text import YamlDocument
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Plan
@@ -264,7 +263,7 @@ def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
     machine = parse_machine(folder / named["machine"], faults) if isinstance(named["machine"], str) else None
     plan = parse_plan(folder / named["plan"], faults) if isinstance(named["plan"], str) else None
     planned = None if plan is None else plan.to_domain()
-    _check_runs(document, planned, folder, faults)
+    check_runs(document, planned, folder, faults)
     if session is None or machine is None or planned is None:
         return None
     entries = [run_entry(run, folder) for run in session.runs]
@@ -307,50 +306,6 @@ def _program(program: ProgramSchema, folder: Path) -> Program:
 def _bar(bar: BarSchema) -> Bar:
     moment = None if bar.calibrated is None else datetime.fromisoformat(bar.calibrated)
     return Bar(**{**bar.model_dump(), "calibrated": moment})
-
-
-def _check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: list[Problem]) -> None:
-    """Check runs against each other, the plan and the disk, on the raw data: other faults must not hide these."""
-    runs = document.entries("runs")
-    for key, what in ((("test", "direction", "repeat"), "this run"), (("file",), "this file")):
-        values = [tuple(map(str, map(run.get, key))) for _, run in runs]
-        for index in twice(values):
-            shown = " ".join(values[index])
-            text = f"{what} ({shown}) stands here a second time"
-            faults.append(document.problem(runs[index][0], text, "give each run its own repeat and file"))
-    for location, run in runs:
-        test, direction = run.get("test"), run.get("direction")
-        if plan is not None and isinstance(test, str):
-            if test not in plan.tests:
-                what = f"the plan has no test `{test}`: this is a run of another plan"
-                faults.append(document.problem((*location, "test"), what, f"its tests: {', '.join(plan.tests)}"))
-            elif direction in {"ccw", "cw"} and direction not in plan.tests[test].directions:
-                what = f"the plan does not run test {test} {direction}: this is a run of another plan"
-                faults.append(document.problem((*location, "direction"), what, "check plan and run"))
-        _check_file(document, location, run, folder, faults)
-        if isinstance(run.get("program"), dict):
-            _check_file(document, (*location, "program"), run["program"], folder, faults)
-
-
-def _check_file(
-    document: YamlDocument,
-    location: tuple[str | int, ...],
-    entry: dict[str, Any],
-    folder: Path,
-    faults: list[Problem],
-) -> None:
-    """Check that a file is there and is the one whose hash was noted."""
-    file, expected = entry.get("file"), entry.get("sha256")
-    if not isinstance(file, str):
-        return
-    path = folder / file
-    if not path.is_file():
-        what = f"there is no file `{file}` in the session folder"
-        faults.append(document.problem((*location, "file"), what, "restore it, or take the entry out"))
-    elif isinstance(expected, str):
-        data = read_bytes(path, faults)
-        if data is not None and hashlib.sha256(data).hexdigest() != expected:
-            faults.append(changed(str(path)))
 
 
 def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Problem]) -> list[RunEntry]:

@@ -1,0 +1,170 @@
+"""Writing whole or not at all: temporary file beside the target, synced to disk, renamed, folder synced.
+
+A power cut leaves the old file, the new one or a temporary one with `.new` in its name, never half a file under the
+name that was asked for.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import OutputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+_MARK = ".new"
+
+
+def write_text(path: Path, text: str, *, force: bool = False) -> None:
+    """Write a text file, UTF-8 with LF.
+
+    Raises:
+        OutputError: it exists and `force` is not given, or it cannot be written; the old file is then untouched.
+    """
+    write_bytes(path, text.encode(), force=force)
+
+
+def write_bytes(path: Path, data: bytes, *, force: bool = False) -> None:
+    """Write a file.
+
+    Raises:
+        OutputError: it exists and `force` is not given, or it cannot be written; the old file is then untouched.
+    """
+    refuse_existing(path, force=force)
+    with _told(path):
+        temporary = _temporary(path)
+        try:
+            _write_synced(temporary, data)
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        sync_folder(path.parent)
+
+
+def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool = False) -> None:
+    """Write several files into one folder, all or none; the folder is made where it does not exist.
+
+    Args:
+        folder: where they go.
+        files: content by path within the folder; a path that ends with a slash is an empty folder.
+        force: replace files that exist; others in the folder stay.
+
+    Raises:
+        OutputError: one exists and `force` is not given, or one cannot be written; nothing has changed then.
+    """
+    if not folder.exists():
+        with _told(folder):
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            made = Path(tempfile.mkdtemp(prefix=f".{folder.name}", suffix=_MARK, dir=folder.parent))
+            try:
+                made.chmod(_usual_mode(0o777))
+                _fill(made, files)
+                made.rename(folder)
+            except BaseException:
+                shutil.rmtree(made, ignore_errors=True)
+                raise
+            sync_folder(folder.parent)
+        return
+    for name in files:
+        if not name.endswith("/"):
+            refuse_existing(folder / name, force=force)
+    with _told(folder):
+        _replace_all(folder, files)
+
+
+def refuse_existing(path: Path, *, force: bool) -> None:
+    """Refuse to overwrite.
+
+    Raises:
+        OutputError: the path exists and `force` is not given, or is a folder.
+    """
+    if path.is_dir():
+        raise OutputError("this is a folder, a file cannot be written there", where=str(path), remedy="name a file")
+    if path.exists() and not force:
+        raise OutputError("the file exists already", where=str(path), remedy="give --force to replace it")
+
+
+def sync_folder(folder: Path) -> None:
+    """Make renames in a folder last over a power cut, where the system can do that."""
+    with contextlib.suppress(PermissionError, NotADirectoryError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _fill(folder: Path, files: Mapping[str, str | bytes]) -> None:
+    for name, content in files.items():
+        path = folder / name
+        if name.endswith("/"):
+            path.mkdir(parents=True, exist_ok=True)
+            continue
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _write_synced(path, content.encode() if isinstance(content, str) else content)
+    for inner in {folder, *(path for path in folder.rglob("*") if path.is_dir())}:
+        sync_folder(inner)
+
+
+def _replace_all(folder: Path, files: Mapping[str, str | bytes]) -> None:
+    """Write all beside their targets first: what can fail has failed before the first target is touched."""
+    written: list[tuple[Path, Path]] = []
+    try:
+        for name, content in files.items():
+            path = folder / name
+            (path if name.endswith("/") else path.parent).mkdir(parents=True, exist_ok=True)
+            if not name.endswith("/"):
+                temporary = _temporary(path)
+                written.append((temporary, path))
+                _write_synced(temporary, content.encode() if isinstance(content, str) else content)
+        for temporary, path in written:
+            temporary.replace(path)
+    except BaseException:
+        for temporary, _ in written:
+            temporary.unlink(missing_ok=True)
+        raise
+    for parent in {path.parent for _, path in written}:
+        sync_folder(parent)
+
+
+def _temporary(path: Path) -> Path:
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=_MARK, dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    # mkstemp makes files that only their owner can read.
+    temporary.chmod(path.stat().st_mode & 0o777 if path.exists() else _usual_mode(0o666))
+    return temporary
+
+
+def _usual_mode(wanted: int) -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return wanted & ~mask
+
+
+def _write_synced(path: Path, data: bytes) -> None:
+    with path.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Turn what the system refuses into an error that says what could not be written."""
+    try:
+        yield
+    except OSError as error:
+        why = (error.strerror or str(error)).lower()
+        raise OutputError(
+            f"cannot be written: {why}",
+            where=str(path),
+            remedy="check that the folder exists, its permissions and the disk",
+        ) from error

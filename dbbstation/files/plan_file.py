@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
@@ -142,6 +142,11 @@ class InlinePlan:
         )
         repeatability = self.plan.holders[ball.holder].repeatability_um / 1e3
         return Ball(name, ball.bore, ball.holder, centre, ball.uncertainty_um / 1e3, repeatability)
+
+
+def plan_data(plan: InlinePlan) -> dict[str, Any]:
+    """Return a plan as its file holds it, the jig inline."""
+    return plan.plan.model_dump(exclude_none=True)
 
 
 def _planned(test: TestSchema, ball: Ball, general: PathSchema) -> PlannedTest:

@@ -71,6 +71,12 @@ def read_run(path: Path, *, sha256: str = "") -> RunFile:
     return parse_run(data, str(path), digest, partial=path.suffix == PART)
 
 
+def sealed_or_part(path: Path) -> Path:
+    """Return where a run's file is: it may have been sealed and renamed just before the station died."""
+    sealed = path.with_suffix("") if path.suffix == PART else path
+    return sealed if not path.exists() and sealed.exists() else path
+
+
 def changed(file: str) -> Problem:
     """Return the problem of a file whose hash is not the one that the session noted."""
     what = "the file was changed after it was recorded: its SHA-256 is not the one in the session"

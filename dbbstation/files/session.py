@@ -14,7 +14,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.machine_file import parse_machine
 from dbbstation.files.plan_file import parse_plan
 from dbbstation.files.quantities import Quantity
-from dbbstation.files.run_csv import PART, RunFile, read_run
+from dbbstation.files.run_csv import PART, RunFile, read_run, sealed_or_part
 from dbbstation.files.run_lines import split_file
 from dbbstation.files.schema import read_document, validate
 from dbbstation.files.session_checks import check_runs
@@ -131,6 +131,8 @@ class SessionFolder:
         folder: where it is.
         machine: the nominal model that the controller had.
         plan: the plan as run.
+        machine_path: of the machine's file.
+        plan_path: of the plan's file.
         runs: in the order they were started, of every state.
         sha256: of the session file.
         serial_number: of the machine; empty where not noted.
@@ -143,6 +145,8 @@ class SessionFolder:
     folder: Path
     machine: Machine
     plan: Plan
+    machine_path: Path
+    plan_path: Path
     runs: tuple[RunEntry, ...]
     sha256: str
     serial_number: str = ""
@@ -273,6 +277,8 @@ def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
         folder=folder,
         machine=machine.to_domain(),
         plan=planned,
+        machine_path=folder / session.machine,
+        plan_path=folder / session.plan,
         runs=(*entries, *_unlisted(folder, entries, planned, faults)),
         sha256=digest,
         serial_number=session.serial_number,
@@ -292,7 +298,7 @@ def run_entry(run: RunSchema, folder: Path) -> RunEntry:
         state=RunState(run.state),
         reason=run.reason or "",
         started=None if run.started is None else datetime.fromisoformat(run.started),
-        path=folder / run.file,
+        path=sealed_or_part(folder / run.file),
         sha256=run.sha256 or "",
         program=None if run.program is None else _program(run.program, folder),
         centre_mm=run.centre_mm,

@@ -6,7 +6,7 @@ import hashlib
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.files.quantities import twice
-from dbbstation.files.run_csv import changed
+from dbbstation.files.run_csv import changed, sealed_or_part
 from dbbstation.files.source_text import read_bytes
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def _check_file(
     file, expected = entry.get("file"), entry.get("sha256")
     if not isinstance(file, str):
         return
-    path = folder / file
+    path = sealed_or_part(folder / file)
     if not path.is_file():
         what = f"there is no file `{file}` in the session folder"
         faults.append(document.problem((*location, "file"), what, "restore it, or take the entry out"))

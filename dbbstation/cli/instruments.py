@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 @click.argument("name", required=False)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def instruments(name: str | None, *, as_json: bool) -> None:
-    r"""List the instruments that are known, or show one: NAME, or a protocol file.
+    """List the instruments that are known, or show one: NAME, or a protocol file.
 
     \b
     Examples:
       dbbstation instruments
       dbbstation instruments heidenhain-nd281b
       dbbstation instruments ./my-gauge.yaml
-    """
+    """  # noqa: D301 (click reads the escape)
     from dbbstation.instrument.library import known_instruments, load_instrument
 
     if name is not None:

@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 def monitor(
     *, instrument: str, port: str, baud: int | None, count: int | None, log: Path | None, force: bool, as_json: bool
 ) -> None:
-    r"""Show what an instrument measures, until Ctrl-C.
+    """Show what an instrument measures, until Ctrl-C.
 
     \b
     Examples:
       dbbstation monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0
       dbbstation monitor --instrument streaming-encoder --port COM3 --count 100 --json
       dbbstation monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0 --log bytes.txt
-    """
+    """  # noqa: D301 (click reads the escape)
     from dbbstation.instrument.bytelog import ByteLog
     from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.library import load_instrument

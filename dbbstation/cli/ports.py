@@ -10,12 +10,12 @@ import click
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def ports(*, as_json: bool) -> None:
-    r"""List the serial ports of this computer.
+    """List the serial ports of this computer.
 
     \b
     Example:
       dbbstation ports
-    """
+    """  # noqa: D301 (click reads the escape)
     from dbbstation.instrument.link import connected_ports
 
     found = connected_ports()

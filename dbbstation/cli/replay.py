@@ -13,13 +13,13 @@ import click
 @click.option("--instrument", metavar="NAME", help="An instrument that is known, or a protocol file [that of the log].")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def replay(file: Path, *, instrument: str | None, as_json: bool) -> None:
-    r"""Decode a byte log that `monitor --log` wrote: every reading, and everything that is not understood.
+    """Decode a byte log that `monitor --log` wrote: every reading, and everything that is not understood.
 
     \b
     Examples:
       dbbstation replay bytes.txt
       dbbstation replay bytes.txt --instrument streaming-encoder --json
-    """
+    """  # noqa: D301 (click reads the escape)
     from dbbstation.instrument.bytelog import logged_instrument, read_byte_log
     from dbbstation.instrument.library import load_instrument
     from dbbstation.instrument.replay import replayed

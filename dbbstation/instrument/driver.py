@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 _PAUSE_TICK_S = 0.001
 
+_MARGIN_S = 0.02
+
 _INCOMPLETE = "incomplete"
 
 _JOIN_S = 5.0
@@ -208,7 +210,7 @@ class Instrument:
         pause_s = 1.0 / timing.rate_hz if timing.rate_hz else 0.0
         last_s = float("-inf")
         failed: list[Garbage] = []
-        self._note_garbage(link.read())
+        self._until_quiet(link)
         while not self._stop.is_set():
             decoder = Decoder(self.protocol, joining=False)
             asked_s = self._clock()
@@ -225,12 +227,27 @@ class Instrument:
                     pass
                 continue
             failed.append(heard)
-            # A late reply must not be taken for the reply to the next request.
-            self._note_garbage(heard.raw + link.read())
+            self._note_garbage(heard.raw)
+            self._until_quiet(link)
             if len(failed) > timing.retries:
                 # The attempt that brought something says more than the silence after it.
                 telling = next((one for one in reversed(failed) if one.raw), heard)
                 raise self._symptom(telling.raw, telling.why)
+
+    def _until_quiet(self, link: Link) -> None:
+        """Let a reply to an earlier request pass, perhaps one of a program before, lest it be taken for the next one.
+
+        The line is quiet when nothing came for longer than a reply takes from the request to its last byte.
+        """
+        timing, line = self.protocol.timing, self.protocol.line
+        quiet_s = timing.reply_latency_s + self.protocol.frame_characters * line.character_s(self._baud) + _MARGIN_S
+        now_s = heard_s = time.monotonic()
+        end_s = now_s + self._timeout_s + quiet_s
+        while now_s < min(heard_s + quiet_s, end_s) and not self._stop.is_set():
+            raw = link.read()
+            now_s = time.monotonic()
+            heard_s = now_s if raw else heard_s
+            self._note_garbage(raw)
 
     def _reply(self, link: Link, decoder: Decoder) -> Heard:
         """Return the reply, or as garbage whatever came instead before patience ended."""

@@ -1,0 +1,112 @@
+"""The commands `ports`, `instruments`, `monitor` and `replay`."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from click.testing import CliRunner
+
+from dbbstation.cli.instruments import instruments
+from dbbstation.cli.monitor import monitor
+from dbbstation.cli.ports import ports
+from dbbstation.cli.replay import replay
+from dbbstation.errors import InstrumentError, OutputError
+from dbbstation.instrument import link
+from dbbstation.instrument.library import load_instrument
+from dbbstation.virtual.wire import VirtualInstrument
+from dbbstation.virtual.wire_clock import ScaledClock
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import click
+
+ND = load_instrument("heidenhain-nd281b")
+ENCODER = load_instrument("streaming-encoder")
+
+
+def run(command: click.Command, *arguments: str) -> tuple[str, str]:
+    result = CliRunner().invoke(command, arguments, catch_exceptions=False, standalone_mode=False)
+    if result.exception is not None:
+        raise result.exception
+    return result.stdout, result.stderr
+
+
+@pytest.mark.parametrize("command", [ports, instruments, monitor, replay], ids=lambda command: command.name)
+def test_help_has_an_example(command: click.Command) -> None:
+    text, _ = run(command, "--help")
+    assert "Example" in text
+    assert f"\n    dbbstation {command.name}" in text
+
+
+def test_help_loads_no_serial_library() -> None:
+    code = (
+        "import sys; from dbbstation.cli import instruments, monitor, ports, replay; "
+        "sys.exit(', '.join({'serial', 'pydantic', 'ruamel'} & set(sys.modules)) or None)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+
+
+def test_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link, "connected_ports", lambda: [("/dev/ttyUSB0", "FT232R", "USB VID")])
+    assert run(ports)[0] == "/dev/ttyUSB0     FT232R  (USB VID)\n"
+    assert json.loads(run(ports, "--json")[0]) == {
+        "ports": [{"port": "/dev/ttyUSB0", "description": "FT232R", "hardware": "USB VID"}]
+    }
+    monkeypatch.setattr(link, "connected_ports", list)
+    assert run(ports) == ("", "No serial port is connected: plug in the adapter of the instrument.\n")
+
+
+def test_instruments() -> None:
+    text, _ = run(instruments)
+    assert "heidenhain-nd281b\n" in text
+    assert "9600 baud, 7 data bits, even parity, 2 stop bits, about 14 readings per second" in text
+    listed = json.loads(run(instruments, "--json")[0])["instruments"]
+    assert {one["name"] for one in listed} >= {"heidenhain-nd281b", "streaming-encoder"}
+
+
+def test_one_instrument() -> None:
+    text, _ = run(instruments, "heidenhain-nd281b")
+    assert "asked with 02" in text
+    assert "NOT VERIFIED" in text
+    assert "fault: the display shows a fault" in text
+    shown = json.loads(run(instruments, "heidenhain-nd281b", "--json")[0])
+    assert shown["protocol"]["ask"]["request"] == "\x02"
+
+
+def test_monitor_counts_and_logs_and_replay_reads_the_log(tmp_path: Path) -> None:
+    log = tmp_path / "bytes.txt"
+    with VirtualInstrument(ND, lambda _: 150.0003, clock=ScaledClock(5)) as virtual:
+        arguments = ["--instrument", ND.name, "--port", virtual.port, "--count", "3", "--log", str(log)]
+        text, talk = run(monitor, *arguments)
+        with pytest.raises(OutputError, match="exists already"):
+            run(monitor, *arguments)
+        run(monitor, *arguments, "--force")
+    assert text.count("150.00030 mm\n") == 3
+    assert "3 readings, 0 lost" in talk or "4 readings, 0 lost" in talk
+    text, talk = run(replay, str(log))
+    assert text.count("150.00030 mm\n") >= 3
+    assert "0 lost, 0 bytes not understood" in talk
+    shown = json.loads(run(replay, str(log), "--instrument", ND.name, "--json")[0])
+    assert shown["readings"][0]["length_mm"] == 150.0003
+    assert shown["not_understood"] == []
+
+
+def test_monitor_prints_json_lines_only() -> None:
+    with VirtualInstrument(ENCODER, lambda _: None) as virtual:
+        text, _ = run(monitor, "--instrument", ENCODER.name, "--port", virtual.port, "--count", "2", "--json")
+    rows = [json.loads(line) for line in text.splitlines()]
+    assert [row["status"] for row in rows[:2]] == ["fault", "fault"]
+    assert rows[0]["t_s"] == 0.0
+    assert rows[0]["length_mm"] is None
+    assert rows[2]["totals"]["lost"] == 0
+
+
+def test_monitor_of_a_port_that_is_not_there() -> None:
+    with pytest.raises(InstrumentError, match="there is no such port"):
+        run(monitor, "--instrument", ND.name, "--port", "/dev/ttyNONE9")

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dbbstation.errors import InputError, InstrumentError
+from dbbstation.instrument.library import instruments_folder, known_instruments, load_instrument, read_protocol
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+GOOD = r"""format: dbb-instrument/1
+name: gauge
+title: A gauge
+line: {baud: 9600}
+ask: {mode: request, request: "?"}
+length: {unit: mm, range_mm: [0, 100]}
+frames:
+  - parts:
+      - {kind: decimal, width: 8, decimals: 3}
+      - {kind: literal, value: "\r"}
+timing: {timeout_s: 1}
+"""
+
+
+def faults_of(tmp_path: Path, text: str) -> str:
+    file = tmp_path / "gauge.yaml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_protocol(file)
+    return str(caught.value).replace(f"{tmp_path}/", "")
+
+
+def test_both_shipped_instruments_load() -> None:
+    assert {"heidenhain-nd281b", "streaming-encoder"} <= set(known_instruments())
+    for name in known_instruments():
+        assert load_instrument(name).name == name
+    assert instruments_folder().is_dir()
+
+
+def test_the_line_of_the_nd281b() -> None:
+    protocol = load_instrument("heidenhain-nd281b")
+    assert protocol.line.text == "9600 baud, 7 data bits, even parity, 2 stop bits"
+    assert protocol.ask.request == b"\x02"
+    # The manual counts 187 bits for a reply.
+    assert protocol.frame_characters * protocol.line.bits_per_character == 187
+    assert protocol.fastest_hz() == pytest.approx(14.0, abs=0.1)
+
+
+def test_a_name_that_is_not_known_brings_the_nearest() -> None:
+    with pytest.raises(
+        InstrumentError, match="no instrument is called 'heidenhain-nd281'; did you mean heidenhain-nd281b"
+    ):
+        load_instrument("heidenhain-nd281")
+    with pytest.raises(
+        InstrumentError, match=r"known are heidenhain-nd281b, streaming-encoder.*; or give a \.yaml file"
+    ):
+        load_instrument("zzz")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("baud: 9600", "baudd: 9600", "gauge.yaml:4:8: line: the key `baudd` is not known; did you mean `baud`?"),
+        ("timeout_s: 1", "timeout_s: soon", "gauge.yaml:11:21: timing.timeout_s: a number was expected"),
+        ("name: gauge", "name: other", "gauge.yaml:2:7: the name 'other' is not the file's; rename the file"),
+        ("mode: request", "mode: stream", "gauge.yaml:5:6: ask: value error, mode request has request bytes"),
+        ("[0, 100]", "[100, 0]", "length: value error, range_mm is [lowest, highest]"),
+        ("unit: mm", "unit: count", "length: value error, unit count, and only it, needs mm_per_count"),
+        ('value: "\\r"', 'value: "\u20ac"', "characters on a wire are bytes"),
+        ("width: 8, ", "", "every frame ends in the same literal"),
+        ("kind: decimal, width: 8, decimals: 3", "kind: skip, written: x", "a frame without a length is a message"),
+        ("format: dbb-instrument/1", "format: dbb-plan/1", "gauge.yaml:1:9: format: "),
+    ],
+)
+def test_a_wrong_file_is_refused_with_the_place(tmp_path: Path, old: str, new: str, fault: str) -> None:
+    assert old in GOOD
+    text = GOOD.replace(old, new)
+    if old.startswith("width"):
+        text = text.replace('      - {kind: literal, value: "\\r"}\n', "")
+    assert fault in faults_of(tmp_path, text)
+
+
+def test_every_fault_is_told_at_once(tmp_path: Path) -> None:
+    text = GOOD.replace("baud: 9600", "baud: fast").replace("timeout_s: 1", "timeout_s: -1")
+    assert faults_of(tmp_path, text).count("gauge.yaml:") == 2
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none\.yaml"):
+        load_instrument(tmp_path / "none.yaml")

@@ -1,0 +1,142 @@
+"""The virtual instrument alone: bytes and times as a real one would send them."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import pytest
+import serial
+
+from dbbstation.instrument.codec import decode
+from dbbstation.instrument.driver import Instrument
+from dbbstation.instrument.library import load_instrument
+from dbbstation.virtual.wire import VirtualInstrument
+from dbbstation.virtual.wire_clock import ScaledClock
+from tests.instrument.leaks import nothing_left_open
+
+__all__ = ["nothing_left_open"]
+
+ND = load_instrument("heidenhain-nd281b")
+ENCODER = load_instrument("streaming-encoder")
+LINES = pytest.mark.parametrize("pty", [True, False], ids=["pty", "socket"])
+
+
+@LINES
+def test_the_display_answers_byte_for_byte(pty: bool) -> None:  # noqa: FBT001 (a parameter of the test)
+    with (
+        VirtualInstrument(ND, lambda _: -5.23, pty=pty) as virtual,
+        serial.serial_for_url(virtual.port, 9600, timeout=1) as port,
+    ):
+        for _ in range(2):
+            port.write(b"\x02")
+            assert port.read(17) == b"-    5.2300    \r\n"
+        port.timeout = 0.05
+        assert port.read(1) == b""
+        port.write(b"hello")
+        assert port.read(1) == b""
+    assert virtual.unknown_bytes == 5
+
+
+def test_the_display_takes_its_time() -> None:
+    with VirtualInstrument(ND, lambda _: 150.0) as virtual, serial.Serial(virtual.port, 9600, timeout=1) as port:
+        asked_s = time.monotonic()
+        port.write(b"\x02")
+        port.read(1)
+        first_s = time.monotonic() - asked_s
+        port.read(16)
+        last_s = time.monotonic() - asked_s
+    # Request 1.15 ms, latency 51 ms, then 17 characters of 1.15 ms; a loaded computer may only be later.
+    assert first_s > 0.0525
+    assert last_s > 0.0714
+    assert last_s - first_s > 0.010
+
+
+@pytest.mark.parametrize(("scale", "slack"), [(1.0, 0.06), (10.0, 0.25)])
+def test_fourteen_readings_per_second_at_9600_baud(scale: float, slack: float) -> None:
+    clock = ScaledClock(scale)
+    with (
+        VirtualInstrument(ND, lambda _: 150.0, clock=clock) as virtual,
+        Instrument(ND, virtual.port, clock=clock) as driver,
+    ):
+        times_s = [reading.t_s for reading in driver.readings(1 + round(10 * min(scale, 4)))]
+    rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0])
+    assert 13.97 * (1 - slack) < rate_hz < 14.0
+
+
+@LINES
+def test_the_stream_loses_nothing(pty: bool) -> None:  # noqa: FBT001 (a parameter of the test)
+    clock = ScaledClock(10)
+    with (
+        VirtualInstrument(ENCODER, math.sin, clock=clock, pty=pty) as virtual,
+        Instrument(ENCODER, virtual.port, clock=clock) as driver,
+    ):
+        readings = list(driver.readings(2500))
+    assert driver.tally.lost == driver.tally.garbage_bytes == 0
+    rate_hz = (len(readings) - 1) / (readings[-1].t_s - readings[0].t_s)
+    assert rate_hz == pytest.approx(250.0, rel=0.05)
+    assert [(one.counter - readings[0].counter) % 100_000 for one in readings] == list(range(2500))
+
+
+def test_samples_are_stamped_when_they_were_taken() -> None:
+    clock = ScaledClock(2)
+    for protocol in (ND, ENCODER):
+        with (
+            VirtualInstrument(protocol, lambda t_s: 100.0 + t_s, clock=clock) as virtual,
+            Instrument(protocol, virtual.port, clock=clock) as driver,
+        ):
+            late_s = sorted(one.t_s - (one.length_mm - 100.0) for one in driver.readings(20))
+        assert abs(late_s[10]) < 0.005
+
+
+def test_nobody_listening_is_no_backlog() -> None:
+    clock = ScaledClock(10)
+    with VirtualInstrument(ENCODER, lambda t_s: t_s, clock=clock) as virtual:
+        for _ in range(2):
+            time.sleep(0.1)
+            with Instrument(ENCODER, virtual.port, clock=clock) as driver:
+                reading = driver.read()
+                assert abs(reading.length_mm - clock()) < 0.5
+                assert driver.tally.lost == 0
+
+
+def test_other_baud_rates_are_other_speeds() -> None:
+    assert ND.fastest_hz(1200) < ND.fastest_hz() < ND.fastest_hz(38400) < 20
+    with (
+        VirtualInstrument(ENCODER, lambda _: 1.0, baud=9600) as virtual,
+        Instrument(ENCODER, virtual.port, baud=9600) as driver,
+    ):
+        times_s = [reading.t_s for reading in driver.readings(20)]
+    # 21 characters of 10 bits: the line carries 45.7 lines per second, not 250.
+    assert 19 / (times_s[-1] - times_s[0]) == pytest.approx(45.7, rel=0.1)
+
+
+def test_an_error_in_the_length_comes_out() -> None:
+    def broken(_t_s: float) -> float:
+        raise ZeroDivisionError("no length")
+
+    virtual = VirtualInstrument(ND, broken)
+    virtual.start()
+    with serial.Serial(virtual.port, 9600, timeout=0.1) as port:
+        port.write(b"\x02")
+        port.read(1)
+    with pytest.raises(ZeroDivisionError, match="no length"):
+        virtual.stop()
+
+
+def test_it_can_be_switched_on_again() -> None:
+    virtual = VirtualInstrument(ND, lambda _: 150.0)
+    for _ in range(2):
+        with virtual, serial.Serial(virtual.port, 9600, timeout=1) as port:
+            port.write(b"\x02")
+            assert decode(ND, port.read(17)).length_mm == 150.0
+
+
+def test_nothing_listens_beyond_this_computer() -> None:
+    with VirtualInstrument(ND, lambda _: 150.0, pty=False) as virtual:
+        assert virtual.port.startswith("socket://127.0.0.1:")
+
+
+def test_a_time_scale_is_positive() -> None:
+    with pytest.raises(ValueError, match="above 0"):
+        ScaledClock(0.0)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -33,6 +34,15 @@ Reprogram: TypeAlias = Callable[[Slot, FloatArray], FloatArray]
 """From a run and its nominal commanded poses `(n, 6)` to what a compensated program commands instead."""
 
 
+@dataclass(frozen=True)
+class Program:
+    """The text of an NC program that was run instead of the plain circle, and the model that it came from."""
+
+    text: str
+    model_sha256: str | None = None
+    ending: str = "ngc"
+
+
 def usual_setup() -> tuple[Mechanism, ...]:
     """The errors of set-up that every real session has: mountings, CMM entries, length of the bar."""
     return (MountingScatter(), CmmScatter(), RandomBarOffset())
@@ -54,12 +64,14 @@ def record(
     crc: bool = False,
     begun: datetime = BEGUN,
     reprogram: Reprogram | None = None,
+    programs: Mapping[str, Program] | None = None,
 ) -> Truth:
     """Simulates a session and writes its folder, `dbb-session/1`.
 
     `mechanisms` is what is wrong with the machine, `setup` what is wrong with balls and bar (the usual errors if left
     out). With `angles` the recordings carry `theta_deg` and are cut to the circle; without `mounting_numbers` the runs
-    of a test share one mounting, as the format says of sessions that count none.
+    of a test share one mounting, as the format says of sessions that count none. A compensated session needs both: what
+    is commanded instead (`reprogram`), and the `programs` that say so, by test and direction as in "a-cw".
     """
     plan = plan or table_ii_plan(seed)
     machine = rounded(machine or reference_machine())
@@ -76,7 +88,11 @@ def record(
         read_mm = run.length_mm + noise.drawn_mm(rng, len(run.time_s))
         text = recording_text(slot, _columns(run, outcome, read_mm, decided, angles=angles), crc=crc)
         (folder / "runs" / f"{slot.stem}.csv").write_text(text, encoding="utf-8", newline="\n")
-        entries.append(_run_entry(slot, begun, text, mounting_numbers=mounting_numbers))
+        entry = _run_entry(slot, begun, text, mounting_numbers=mounting_numbers)
+        name = f"{slot.test.name}-{slot.direction}"
+        if programs and name in programs:
+            entry["program"] = _program_entry(folder, name, programs[name])
+        entries.append(entry)
     (folder / "machine.yaml").write_text(machine_text(machine), encoding="utf-8")
     (folder / "plan.yaml").write_text(plan_text(plan), encoding="utf-8")
     bar = {
@@ -115,7 +131,7 @@ def simulate_run(
     reprogram: Reprogram | None = None,
 ) -> tuple[TrueRun, Outcome]:
     """One run without noise; `phase_s` is how far into the first dwell the first sample falls."""
-    count = int(np.floor((slot.path.duration_s - phase_s) * rate_hz))
+    count = int(np.floor((slot.path.duration_s - phase_s) * rate_hz)) + 1
     time_s = np.arange(count) / rate_hz
     poses = slot.path.poses(time_s + phase_s)
     motion = Motion(scene, slot.start_s + phase_s + time_s, poses, slot)
@@ -194,3 +210,11 @@ def _run_entry(slot: Slot, begun: datetime, text: str, *, mounting_numbers: bool
         "state": "accepted",
         "sha256": hashlib.sha256(text.encode()).hexdigest(),
     }
+
+
+def _program_entry(folder: FilePath, name: str, program: Program) -> dict[str, object]:
+    file = f"programs/{name}.{program.ending}"
+    (folder / "programs").mkdir(exist_ok=True)
+    (folder / file).write_text(program.text, encoding="utf-8", newline="\n")
+    entry: dict[str, object] = {"file": file, "sha256": hashlib.sha256(program.text.encode()).hexdigest()}
+    return entry if program.model_sha256 is None else entry | {"model_sha256": program.model_sha256}

@@ -26,7 +26,7 @@ from tests.plant.mechanisms.bar import BarDrift, BarOffset
 from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.currents import DriveCurrents
 from tests.plant.mechanisms.gravity import CentreOfGravityShift, Gravity
-from tests.plant.mechanisms.joints import JointFriction, JointRunout
+from tests.plant.mechanisms.joints import JointFriction, JointRunout, UjointScrew
 from tests.plant.mechanisms.kinematics import Kinematics, RandomKinematics
 from tests.plant.mechanisms.outsiders import (
     BuildingSway,
@@ -56,7 +56,7 @@ from tests.plant.plan import (
 )
 from tests.plant.rotation import CONVENTIONS
 from tests.plant.sensitivity import readings
-from tests.plant.session import record
+from tests.plant.session import Program, record
 
 SHORT = subset(table_ii_plan(3), ["a", "h"])
 SILENT = Noise(white_um=0.0)
@@ -76,6 +76,7 @@ EVERYTHING: tuple[Mechanism, ...] = (
     TimeSkew(),
     JointFriction(),
     JointRunout(np.full((6, 3), 5.0)),
+    UjointScrew(),
     ThermalStruts(),
     ThermalFrame(),
     SpindleGrowth(),
@@ -123,7 +124,7 @@ def test_a_recording_looks_like_those_of_a_station(tmp_path: FilePath) -> None:
     assert lines[5].startswith("0.0200,151.")
     columns = read_run(tmp_path / "s/runs/h-cw-1.csv")
     # 2.6 s of dwell, 450 degrees and two feeds of 1.5 mm at 1000 mm/min, three ramps, at 50 Hz.
-    assert len(columns["t_s"]) in {3676, 3677, 3678}
+    assert len(columns["t_s"]) in {3677, 3678, 3679}
 
 
 def test_the_list_of_runs(tmp_path: FilePath) -> None:
@@ -332,7 +333,16 @@ def test_a_compensated_program_changes_what_is_commanded(tmp_path: FilePath) -> 
     def back(_slot: object, poses: FloatArray) -> FloatArray:
         return poses - np.array([0.05, 0, 0, 0, 0, 0])
 
-    truth = record(tmp_path / "s", seed=5, plan=SHORT, mechanisms=[errors], setup=[], reprogram=back)
+    programs = {"a-cw": Program("G1 X1\n", model_sha256="c0" * 32)}
+    truth = record(tmp_path / "s", seed=5, plan=SHORT, mechanisms=[errors], setup=[], reprogram=back, programs=programs)
+    runs = read_yaml(tmp_path / "s/session.yaml")["runs"]
+    assert [run["file"] for run in runs if "program" in run] == ["runs/a-cw-1.csv"]
+    assert runs[1]["program"] == {
+        "file": "programs/a-cw.ngc",
+        "sha256": hashlib.sha256(b"G1 X1\n").hexdigest(),
+        "model_sha256": "c0" * 32,
+    }
+    assert (tmp_path / "s/programs/a-cw.ngc").read_text() == "G1 X1\n"
     for test in ("a", "h"):
         np.testing.assert_allclose(truth.noise_free_lengths(test, "ccw")[1], 150.0, atol=1e-6)
 

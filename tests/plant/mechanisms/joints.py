@@ -71,6 +71,35 @@ class JointFriction(Mechanism):
         return np.stack([(angle_rad[:, k] - follower(angle_rad[:, k], half_rad)) / half_rad for k in range(2)], axis=1)
 
 
+@dataclass(frozen=True)
+class UjointScrew(Mechanism):
+    """A screw held by universal joints at both ends is turned by them as the strut swings: lead/2π of length per turn.
+
+    The joints' first axes are level when the platform is at home. Controls correct for most of it; `share` is what
+    they leave. A twist of the platform end against the base end in the sense of a right-hand screw lengthens.
+    """
+
+    name: ClassVar[str] = "ujoint-screw"
+
+    share: float = 0.02
+
+    def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
+        """Twist since home times the lead per turn `(n, 6)`."""
+        home = commanded_platform(motion.machine, HOME)
+        since_home_rad = _twist_rad(motion.machine, platform) - _twist_rad(motion.machine, home)
+        return self.share * motion.machine.screw_lead_mm / (2 * np.pi) * since_home_rad
+
+
+def _twist_rad(machine: Machine, platform: Platform) -> FloatArray:
+    """Turn about the strut `(n, 6)` from the base joint's cross to the platform joint's."""
+    first, _ = joint_axes(machine)
+    u = platform.direction
+    base_cross = np.cross(first, u)
+    platform_cross = np.cross(first @ platform.rotation.transpose(0, 2, 1), u)
+    across = np.einsum("nij,nij->ni", u, np.cross(base_cross, platform_cross))
+    return np.arctan2(across, np.einsum("nij,nij->ni", base_cross, platform_cross))
+
+
 def _zeros_63() -> FloatArray:
     return np.zeros((6, 3))
 

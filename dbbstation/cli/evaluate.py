@@ -1,0 +1,52 @@
+"""`dbbstation evaluate`: circle by circle, what a model leaves of recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
+@click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
+@click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def evaluate(sessions: tuple[Path, ...], *, model: Path, exclude: tuple[str, ...], as_json: bool) -> None:
+    r"""Compare recordings with the nominal machine (before) and with a model (after).
+
+    After is what the model leaves of the recordings, not a new measurement. Flatness over X, Y = ±190 mm and
+    parallelism of a move along X are what the model predicts of programs that are not compensated.
+
+    \b
+    Examples:
+      dbbstation evaluate check-session --model model.yaml
+      dbbstation evaluate check-session --model model.yaml --json
+    """
+    from dbbstation.calibration.evaluation import evaluate as compare
+    from dbbstation.calibration.evaluation import plane_figures
+    from dbbstation.calibration.summary import evaluation_summary
+    from dbbstation.cli.figures import print_runs
+    from dbbstation.cli.output import print_json, say
+    from dbbstation.files.models import read_model
+    from dbbstation.recorded import load_sessions
+    from dbbstation.sources.registry import known_sources
+
+    identified = read_model(model, known_sources())
+    recorded = load_sessions(sessions, exclude)
+    for warning in recorded.warnings:
+        say(f"note: {warning}")
+    summary = evaluation_summary(compare(identified.model, recorded.observations))
+    height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
+    plane = plane_figures(identified.model, height_mm)
+    summary |= {"flatness_um": plane.flatness_um, "parallelism_um": plane.parallelism_um, "plane_z_mm": height_mm}
+    if as_json:
+        print_json(summary)
+        return
+    print_runs(summary)
+    click.echo()
+    click.echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
+    click.echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
+    click.echo(f"uncompensated at Z {height_mm:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
+    click.echo(f"flatness               {summary['flatness_um']:8.1f} µm")
+    click.echo(f"parallelism along X    {summary['parallelism_um']:8.1f} µm")

@@ -1,0 +1,43 @@
+"""What commands print: tables for people, JSON for programs. Standard output is data, standard error is talk."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+
+def print_json(data: dict[str, Any]) -> None:
+    """Print one JSON object; numbers that are not finite are refused rather than printed as invalid JSON."""
+    click.echo(json.dumps(data, indent=1, allow_nan=False))
+
+
+def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Print rows under titles, numbers to the right, texts to the left."""
+    texts = [[_text(cell) for cell in row] for row in rows]
+    numeric = [all(_is_number(row[k]) for row in texts if row[k]) for k in range(len(titles))]
+    widths = [max(len(title), *(len(row[k]) for row in texts), 0) for k, title in enumerate(titles)]
+    for row in [list(titles), *texts]:
+        cells = [c.rjust(w) if n else c.ljust(w) for c, w, n in zip(row, widths, numeric, strict=True)]
+        click.echo("  ".join(cells).rstrip())
+
+
+def say(text: str) -> None:
+    """Tell the person at the terminal something that is not the result."""
+    click.echo(text, err=True)
+
+
+def _text(cell: object) -> str:
+    return f"{cell:.1f}" if isinstance(cell, float) else str(cell)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,69 @@
+"""Circle figures against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dbbstation.errors import TraceError
+from dbbstation.plan.circle import Circle, Direction
+from dbbstation.trace.analysis import best_circle, centred, figures
+from dbbstation.trace.circle import RawCircle
+
+CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
+THETA = np.arange(0, 360, 0.25)
+
+
+def raw(length_mm, circle=CIRCLE):
+    return RawCircle("a run", circle, np.arange(len(THETA)) * 0.01, THETA, length_mm)
+
+
+def shifted_circle(radius, x, y):
+    """Distance from the origin to a circle about (x, y), in every direction."""
+    theta = np.radians(THETA)
+    along = x * np.cos(theta) + y * np.sin(theta)
+    return along + np.sqrt(radius**2 - (x * np.sin(theta) - y * np.cos(theta)) ** 2)
+
+
+def test_a_shifted_circle_is_found_exactly():
+    centre, radius, deviation = best_circle(THETA, shifted_circle(150.1, 0.3, -0.4))
+    assert centre == pytest.approx([0.3, -0.4], abs=1e-10)
+    assert radius == pytest.approx(150.1, abs=1e-10)
+    assert np.abs(deviation).max() < 1e-10
+
+
+def test_figures_of_a_shifted_circle():
+    found = figures(raw(shifted_circle(150.1, 0.3, -0.4)))
+    assert found.centre_deviation_um == pytest.approx(500)
+    # The mean of the distance is R minus d²/4R to second order.
+    assert found.mean_radial_error_um == pytest.approx(100 - 1e3 * 0.25 / 4 / 150, abs=1e-3)
+    assert found.circularity_um == pytest.approx(0, abs=1e-6)
+
+
+def test_circularity_of_an_ellipse():
+    """A cos 2θ of amplitude A has the circularity 2A and no centre."""
+    found = figures(raw(150 + 0.01 * np.cos(2 * np.radians(THETA))))
+    assert found.circularity_um == pytest.approx(20, rel=1e-3)
+    assert found.centre_deviation_um == pytest.approx(0, abs=1e-9)
+
+
+def test_a_raised_bar_sees_the_horizontal_shift():
+    circle = replace(CIRCLE, elevation_deg=30)
+    height = 150 * np.sin(np.radians(30))
+    horizontal = shifted_circle(circle.radius_mm, 0.05, 0.02)
+    found = figures(raw(np.hypot(horizontal, height), circle))
+    assert found.centre_mm == pytest.approx((0.05, 0.02), abs=1e-9)
+
+
+def test_centring_removes_the_centre_and_keeps_the_shape():
+    shape = 0.01 * np.cos(3 * np.radians(THETA))
+    result = centred(raw(150 + shape + 0.2 * np.cos(np.radians(THETA))))
+    assert result.deviation_mm == pytest.approx(shape, abs=2e-4)
+    assert not hasattr(result, "length_mm")
+
+
+def test_a_point_is_no_circle():
+    with pytest.raises(TraceError, match="do not determine a circle"):
+        best_circle(np.array([10.0, 10.0, 10.0]), np.array([150.0, 150.0, 150.0]))

@@ -1,0 +1,110 @@
+"""Cutting the turn out of a trace: angles, edges, feed, holes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dbbstation.errors import TraceError
+from dbbstation.plan.circle import Circle, Direction
+from dbbstation.trace.cut import cut
+from dbbstation.trace.recording import Recording
+
+CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
+RATE_HZ = 100.0
+
+
+def shape(theta_deg):
+    """What the machine does wrong in this test, by angle [mm]."""
+    theta = np.radians(theta_deg)
+    return 0.05 * np.cos(theta) - 0.03 * np.sin(2 * theta) + 0.004 * np.cos(5 * theta)
+
+
+def trace(circle=CIRCLE, dwell_s=0.3, feed=None, noise_mm=0.0, seed=0):
+    """A trace as a control makes it: it dwells at the corners, which the angles must not feel."""
+    feed = feed or circle.feed_mm_min
+    turning = np.degrees(feed / 60 / circle.radius_mm)
+    feeding_s, arc_s = circle.feed_in_mm / (feed / 60), circle.swept_deg / turning
+    t = np.arange(0, 2 + 2 * feeding_s + 2 * dwell_s + arc_s, 1 / RATE_HZ)
+    start = 1 + feeding_s + dwell_s
+    phi = np.clip((t - start) * turning, 0, circle.swept_deg) - circle.overshoot_deg
+    outside = np.interp(t, [1, 1 + feeding_s], [1, 0]) + np.interp(
+        t, [start + arc_s + dwell_s, start + arc_s + dwell_s + feeding_s], [0, 1]
+    )
+    length = circle.bar_mm + circle.feed_in_mm * outside + shape(circle.theta_deg(phi))
+    noise = np.random.default_rng(seed).normal(0, noise_mm, len(t))
+    return Recording("a run", t, length + noise)
+
+
+@pytest.mark.parametrize("direction", list(Direction))
+@pytest.mark.parametrize("dwell_s", [0.0, 0.3, 2.0])
+def test_angles_are_right_whatever_the_corners_take(direction, dwell_s):
+    circle = replace(CIRCLE, direction=direction, start_deg=20)
+    raw = cut(trace(circle, dwell_s, noise_mm=0.0005), circle)
+    assert len(raw) == pytest.approx(360 / circle.turning_deg_s * RATE_HZ, abs=1.5)
+    assert np.std(raw.length_mm - 150 - shape(raw.theta_deg)) < 0.0006
+
+
+def test_rows_with_angles_are_used_as_they_are():
+    theta = np.arange(0, 360, 1.0)
+    recording = Recording("a run", np.arange(360.0), 150 + shape(theta + 720), theta + 720)
+    raw = cut(recording, CIRCLE)
+    assert np.allclose(raw.theta_deg, theta)
+
+
+def test_another_feed_is_found_and_named():
+    with pytest.raises(TraceError, match=r"overlap shows a feed of (97\d|98\d)\.\d ± .* plan says 1000"):
+        cut(trace(feed=980, noise_mm=0.0003), CIRCLE)
+
+
+def test_a_perfect_circle_cannot_tell_its_feed_and_is_not_refused():
+    recording = trace()
+    inside = recording.length_mm < 150.7
+    flat = replace(recording, length_mm=np.where(inside, 150 + 0.0004 * np.sin(7 * recording.t_s), recording.length_mm))
+    assert len(cut(flat, CIRCLE)) > 5000
+
+
+def test_feed_in_missing():
+    recording = trace()
+    late = recording.t_s > 3
+    with pytest.raises(TraceError, match="no feed-in found"):
+        cut(Recording("a run", recording.t_s[late], recording.length_mm[late]), CIRCLE)
+
+
+def test_feed_out_missing():
+    recording = trace()
+    early = recording.t_s < 40
+    with pytest.raises(TraceError, match="no feed-out found"):
+        cut(Recording("a run", recording.t_s[early], recording.length_mm[early]), CIRCLE)
+
+
+def test_half_a_circle_is_refused():
+    short = replace(CIRCLE, overshoot_deg=-90)
+    with pytest.raises(TraceError, match="only 18[0-9] of 450 degrees"):
+        cut(trace(short), CIRCLE)
+
+
+def test_a_hole_is_named_where_it_is():
+    recording = trace()
+    keep = np.abs(recording.t_s - 30) > 2
+    with pytest.raises(TraceError, match="no sample over 25.* degrees"):
+        cut(Recording("a run", recording.t_s[keep], recording.length_mm[keep]), CIRCLE)
+
+
+def test_samples_that_the_instrument_called_bad_are_left_out():
+    recording = trace()
+    spoilt = recording.length_mm.copy()
+    spoilt[3000] += 0.5
+    usable = np.ones(len(spoilt), dtype=bool)
+    usable[3000] = False
+    raw = cut(replace(recording, length_mm=spoilt, usable=usable), CIRCLE)
+    assert np.abs(raw.length_mm - 150).max() < 0.1
+
+
+def test_a_ball_that_left_its_seat_is_refused():
+    recording = trace()
+    spoilt = recording.length_mm + np.where((recording.t_s > 30) & (recording.t_s < 30.5), -0.9, 0.0)
+    with pytest.raises(TraceError, match=r"0\.\d* mm off the bar's 150 mm"):
+        cut(replace(recording, length_mm=spoilt), CIRCLE)

@@ -1,0 +1,147 @@
+"""Checking any file of any format, and whole sessions, for `dbbstation check`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, Problem, TravelError
+from dbbstation.files.jig_file import parse_jig
+from dbbstation.files.machine_file import parse_machine
+from dbbstation.files.models import parse_model
+from dbbstation.files.plan_file import parse_plan
+from dbbstation.files.run_csv import PART, read_run
+from dbbstation.files.schema import FORMATS
+from dbbstation.files.session import SESSION_FILE, RunState, SessionFolder, parse_session
+from dbbstation.files.yaml_text import load_yaml
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from dbbstation.sources.contract import ErrorSource
+
+
+@dataclass
+class Checked:
+    """What was found in one file or session.
+
+    Attributes:
+        path: as given.
+        kind: its format, or `run` for a run file; empty where it could not be told.
+        summary: what it holds, one line; empty where it has problems.
+        problems: what makes it unusable.
+        warnings: what does not.
+    """
+
+    path: Path
+    kind: str = ""
+    summary: str = ""
+    problems: list[Problem] = field(default_factory=list)
+    warnings: list[Problem] = field(default_factory=list)
+
+
+def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
+    """Check one file of any format, or a session folder."""
+    checked = Checked(path)
+    if path.is_dir():
+        if (path / SESSION_FILE).exists():
+            checked.kind = "dbb-session/1"
+            _session(checked)
+        else:
+            what = f"this folder is no session: there is no {SESSION_FILE} in it"
+            checked.problems.append(Problem(str(path), 0, 0, what, "name a session folder or a file"))
+    elif path.suffixes[-1:] == [".csv"] or path.suffixes[-2:] == [".csv", PART]:
+        checked.kind = "run"
+        _run(checked)
+    else:
+        _yaml(checked, known_sources)
+    if checked.problems:
+        checked.summary = ""
+    return checked
+
+
+def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
+    document = load_yaml(checked.path, checked.problems)
+    if document is None:
+        return
+    given = document.data.get("format") if isinstance(document.data, dict) else None
+    by_name: dict[str, Callable[[], None]] = {
+        "dbb-session": lambda: _session(checked),
+        "dbb-machine": lambda: _machine(checked),
+        "dbb-plan": lambda: _plan(checked),
+        "dbb-jig": lambda: _jig(checked),
+        "dbb-model": lambda: _model(checked, known_sources),
+    }
+    name = str(given).partition("/")[0]
+    if name in by_name:
+        checked.kind = str(given)
+        by_name[name]()
+        return
+    what = "the file does not say what format it has" if given is None else f"`{given}` is no format"
+    formats = ", ".join(f"{name}/1" for name in FORMATS)
+    checked.problems.append(document.problem(("format",), what, f"begin it with `format: `, one of {formats}"))
+
+
+def _machine(checked: Checked) -> None:
+    machine = parse_machine(checked.path, checked.problems)
+    if machine is not None:
+        checked.summary = f"machine {machine.name}"
+
+
+def _jig(checked: Checked) -> None:
+    jig = parse_jig(checked.path, checked.problems)
+    if jig is not None:
+        checked.summary = f"jig with {_count(len(jig.jig.bores), 'bore')}, {_count(len(jig.balls), 'ball')}"
+
+
+def _plan(checked: Checked) -> None:
+    plan = parse_plan(checked.path, checked.problems)
+    if plan is not None:
+        checked.summary = f"plan {plan.plan.name}: {_count(len(plan.plan.tests), 'test')}"
+
+
+def _model(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
+    model = parse_model(checked.path, known_sources, checked.problems)
+    if model is not None:
+        names = sorted({one.source.name for one in model.model.of_the_machine().sources})
+        checked.summary = f"model of {model.model.machine.name}: {', '.join(names) or 'no sources'}"
+
+
+def _run(checked: Checked) -> None:
+    try:
+        run = read_run(checked.path)
+    except InputError as error:
+        checked.problems += error.problems
+        return
+    checked.warnings += run.warnings
+    seconds = run.recording.t_s[-1] - run.recording.t_s[0]
+    checked.summary = f"run: {_count(len(run.recording), 'sample')} in {seconds:.1f} s"
+
+
+def _session(checked: Checked) -> None:
+    session = parse_session(checked.path, checked.problems)
+    if session is None or checked.problems:
+        return
+    for run in session.runs:
+        try:
+            checked.warnings += session.load(run).warnings
+        except InputError as error:
+            # A run that died before its first sample is no fault of the session.
+            found = checked.warnings if run.state is RunState.RECORDING else checked.problems
+            found += error.problems
+    try:
+        session.plan.check(session.machine)
+    except TravelError as error:
+        checked.problems.append(Problem(str(session.plan_path), 0, 0, f"{error.where}: {error.what}", error.remedy))
+    checked.summary = f"session: {_states(session)}"
+
+
+def _states(session: SessionFolder) -> str:
+    counts = {state: len(session.in_state(state)) for state in RunState}
+    told = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
+    return f"{_count(len(session.runs), 'run')} ({told})" if told else "no runs yet"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

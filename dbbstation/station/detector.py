@@ -1,0 +1,76 @@
+"""Begin and end of a circle, seen in the readings themselves: no control tells a ball bar when it moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dbbstation.plan.circle import Circle
+
+AGREEING = 3
+"""Readings in a row on one side before a side counts: one misread line is no movement."""
+
+HYSTERESIS = 0.1
+"""Share of the feed-in about its middle where neither side is meant."""
+
+CORNER_DWELL_S = 0.3
+"""Controls stop about so long between feed-in and arc; only the live display assumes it [s]."""
+
+DWELL_BEHIND_S = 0.5
+"""Recorded behind the feed-out, so that its edge has both sides [s]."""
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long is waited, in machine time.
+
+    Attributes:
+        for_machine_s: for the bar at the feed-in point, and there for the feed-in [s].
+        turn_factor: as many times the time that the circle takes at its feed.
+        turn_extra_s: and so much more [s].
+    """
+
+    for_machine_s: float = 600.0
+    turn_factor: float = 1.5
+    turn_extra_s: float = 20.0
+
+    def for_turn_s(self, circle: Circle) -> float:
+        """Longest time between feed-in and feed-out [s]."""
+        return self.turn_factor * circle.swept_deg / circle.turning_deg_s + self.turn_extra_s
+
+
+class EdgeDetector:
+    """Tells on which side of the feed-in's middle the bar is, from readings in time order.
+
+    Args:
+        circle: as commanded; its feed-in must not be 0.
+    """
+
+    def __init__(self, circle: Circle) -> None:
+        middle = circle.bar_mm + circle.feed_in_mm / 2.0
+        self._outside_mm = middle + HYSTERESIS * circle.feed_in_mm
+        self._inside_mm = middle - HYSTERESIS * circle.feed_in_mm
+        self._side: bool | None = None
+        self._agreeing = 0
+
+    def outside(self, length_mm: float) -> bool | None:
+        """Return True once the last readings say outside, False once they say inside, None while they disagree."""
+        side = None
+        if length_mm > self._outside_mm:
+            side = True
+        elif length_mm < self._inside_mm:
+            side = False
+        self._agreeing = self._agreeing + 1 if side is self._side and side is not None else int(side is not None)
+        self._side = side
+        return side if self._agreeing >= AGREEING else None
+
+
+def live_phi_deg(circle: Circle, since_feed_in_s: float) -> float:
+    """Progress along the turn at a time after the feed-in edge was seen, good to a degree or two [deg].
+
+    The recording is cut better: its angles are anchored midway between both edges, which live is not known yet.
+    """
+    feed_in_rest_s = circle.feed_in_mm / 2.0 / (circle.feed_mm_min / 60.0)
+    on_arc_s = max(since_feed_in_s - feed_in_rest_s - CORNER_DWELL_S, 0.0)
+    return min(on_arc_s * circle.turning_deg_s, circle.swept_deg) - circle.overshoot_deg

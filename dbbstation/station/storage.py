@@ -1,0 +1,113 @@
+"""Storage: subscribes to the sequence and keeps every sample and verdict in the session folder."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import OutputError
+from dbbstation.station import events
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from dbbstation.files.journal import RunWriter
+    from dbbstation.files.session import Program, RunEntry
+    from dbbstation.files.session_writer import SessionWriter
+    from dbbstation.plan.circle import Direction
+
+COLUMNS = ("t_s", "length_mm", "status")
+"""What the station records."""
+
+
+class Storage:
+    """Writes a session as it happens; an observer of the station.
+
+    Args:
+        writer: of the session folder.
+        now: the time of day with its zone.
+        programs: NC program, kept in the session already, by test and direction.
+    """
+
+    def __init__(
+        self,
+        writer: SessionWriter,
+        now: Callable[[], datetime] | None = None,
+        programs: Mapping[tuple[str, Direction], Program] | None = None,
+    ) -> None:
+        self._writer = writer
+        self._now = now or (lambda: datetime.now(UTC))
+        self._programs = programs or {}
+        self._journal: RunWriter | None = None
+        self._sealed: RunEntry | None = None
+
+    def __call__(self, event: events.Event) -> None:
+        """Keep what the event says.
+
+        Raises:
+            OutputError: the disk refuses; what was written before stays.
+        """
+        match event:
+            case events.RunStarted():
+                self._start(event.run)
+            case events.SamplesRecorded():
+                self._append(event.samples)
+            case events.RunCompleted() if self._journal is not None:
+                self._sealed = self._writer.finish_run(self._journal)
+                self._journal = None
+            case events.RunAccepted() if self._sealed is not None:
+                self._writer.judge(self._sealed, accepted=True)
+            case events.RunRejected() if self._sealed is not None:
+                self._writer.judge(self._sealed, accepted=False, reason=event.reason)
+            case events.SessionStopped() | events.Fault():
+                self.close()
+            case _:
+                pass
+
+    def close(self) -> None:
+        """Bring a run that goes on to disk as far as it came; its file stays a `.part`."""
+        if self._journal is None:
+            return
+        journal, self._journal = self._journal, None
+        try:
+            journal.sync()
+        finally:
+            journal.close()
+
+    def _start(self, run: events.RunId) -> None:
+        self._sealed = None
+        self._journal = self._writer.start_run(
+            run.test,
+            run.direction,
+            COLUMNS,
+            started=self._now(),
+            mounting=run.mounting,
+            program=self._programs.get((run.test, run.direction)),
+        )
+        expected = self._writer.session.folder / "runs" / f"{run.label}.csv"
+        if self._journal.sealed_path != expected:
+            raise OutputError(
+                f"the run was to be {expected.name}, which is taken",
+                where=str(expected.parent),
+                remedy="another program writes into this session: end it, then continue",
+            )
+
+    def _append(self, samples: tuple[events.Sample, ...]) -> None:
+        if self._journal is None:
+            raise RuntimeError("samples came without a run")
+        for sample in samples:
+            if sample.length_mm is None:
+                raise RuntimeError("a recorded sample has a number")
+            self._journal.append((sample.t_s, sample.length_mm, sample.status))
+
+
+def time_of_day(clock: Callable[[], float], last: datetime | None = None) -> Callable[[], datetime]:
+    """Return the time of day that goes as fast as `clock`, so that runs on scaled time lie apart as their samples do.
+
+    Args:
+        clock: machine time [s].
+        last: start of the last run of a session that goes on; time of day never falls behind it.
+    """
+    begun_s = clock()
+    begun = datetime.now(UTC) if last is None else max(datetime.now(UTC), last)
+    return lambda: begun + timedelta(seconds=clock() - begun_s)

@@ -65,6 +65,39 @@ class Masses:
     centre_of_gravity_above_tip_mm: float
 
 
+@dataclass(frozen=True)
+class Compliance:
+    """How much a strut stretches under an axial force, by design [GRAV eq 7].
+
+    Attributes:
+        at_1000mm_mm_per_n: elongation per force of a strut of 1000 mm between its joints [mm/N].
+        growing_share: part of that which grows with the strut's length, as a rod does; the rest (screw, nut,
+            bearings, joints) is the same at every length [1].
+    """
+
+    at_1000mm_mm_per_n: float
+    growing_share: float = 0.9
+
+
+@dataclass(frozen=True)
+class StrutMasses:
+    """What each of the six struts weighs, on a line through its two joints [GRAV Fig 2].
+
+    Attributes:
+        strut_kg: what lies evenly between base joint and platform joint, whatever the length [kg].
+        motor_kg: what sits behind the base joint, turning with the strut [kg].
+        motor_length_mm: of that part; its centre is half of it behind the joint [mm].
+        screw_kg: screw that ends at the platform joint and slides through the base joint [kg].
+        screw_length_mm: of that screw; its rear end sticks out behind the joint [mm].
+    """
+
+    strut_kg: float
+    motor_kg: float
+    motor_length_mm: float
+    screw_kg: float = 0.0
+    screw_length_mm: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Machine:
     """The nominal machine: what its controller believes.
@@ -79,6 +112,8 @@ class Machine:
         masses: what gravity acts on; None where not known.
         joint_tolerance_mm: standard deviation of a base-joint coordinate after assembly [mm]; None
             where not known.
+        compliance: of the struts as designed; None where not known.
+        strut_masses: of the struts as designed; None where not known.
     """
 
     name: str
@@ -88,3 +123,5 @@ class Machine:
     screw_lead_mm: float | None = None
     masses: Masses | None = None
     joint_tolerance_mm: float | None = None
+    compliance: Compliance | None = None
+    strut_masses: StrutMasses | None = None

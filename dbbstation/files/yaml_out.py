@@ -14,6 +14,7 @@ _ONE_LINE, _ONE_LINE_IN_LIST = 140, 500
 
 _PLAIN = re.compile(
     r"[A-Za-z]([A-Za-z0-9 ._/()+-]*[A-Za-z0-9_/()+-])?"
+    r"|\d+-[A-Za-z][A-Za-z0-9-]*"
     r"|\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z"
     r"|(?=[0-9e]*[a-df])[0-9a-f]{64}"
 )

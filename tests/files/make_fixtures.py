@@ -1,0 +1,100 @@
+"""Makes `fixtures/sessions/small` and `fixtures/models/small.yaml` anew: `python -m tests.files.make_fixtures`.
+
+The recordings come from the independent virtual machine of tests/plant; the numbers of the model are made up.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+
+from dbbstation.files.models import write_model
+from dbbstation.files.plan_file import read_inline_plan
+from dbbstation.files.session import Bar, read_session
+from dbbstation.files.session_writer import SessionDetails, SessionWriter
+from dbbstation.model.identified import IdentifiedModel
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.plan.circle import Direction
+from dbbstation.sources.contract import Fitted
+from dbbstation.sources.registry import known_sources
+from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.plan import subset, table_ii_plan
+from tests.plant.session import BEGUN, record
+
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+PROGRAM = (
+    b"(test a cw, 1 um of rounding in the centre)\nG21 G90 G17 G94\nG1 X151.5 Y-0.04 Z-1149.99 A0 B0 C0 F1000\nM2\n"
+)
+
+
+def make_session(folder: Path) -> None:
+    with tempfile.TemporaryDirectory() as scratch:
+        recorded = Path(scratch) / "recorded"
+        record(
+            recorded,
+            seed=7,
+            plan=subset(table_ii_plan(7), "agl"),
+            mechanisms=[RandomKinematics()],
+            rate_hz=5.0,
+            crc=True,
+        )
+        source = read_session(recorded)
+        bar = Bar("DBB-0042", 150.0003, 0.0005, BEGUN - timedelta(minutes=20), 20.3, 10.6)
+        details = SessionDetails("PM600-0007", "first shift", 20.4, bar)
+        writer = SessionWriter.create(folder, source.machine, read_inline_plan(recorded / "plan.yaml"), details)
+        runs = [source.runs[0], source.runs[1], *source.runs[1:]]
+        for index, run in enumerate(runs):
+            bumped = index == 1
+            extra = {}
+            if bumped:
+                x, y, z = source.circle(run).centre_mm
+                extra = {
+                    "program": writer.add_program("a-cw.ngc", PROGRAM, model_sha256="c0" * 32),
+                    "centre_mm": (round(x, 3), round(y, 3), round(z, 3)),
+                }
+            samples = source.load(run).recording
+            names = ("t_s", "length_mm", "bar_temp_c", "status")
+            started = BEGUN + timedelta(minutes=3 * index)
+            journal = writer.start_run(run.test, run.direction, names, started=started, mounting=run.mounting, **extra)
+            with journal:
+                for t_s, length_mm in zip(samples.t_s, samples.length_mm, strict=True):
+                    journal.append((t_s, length_mm, 20.3, "ok"))
+                entry = writer.finish_run(journal)
+            writer.judge(entry, accepted=not bumped, reason="operator")
+        with writer.start_run("l", Direction.CW, names, started=started, mounting=3) as journal:
+            journal.append((0.0, 151.5, 20.3, "ok"))
+
+
+def make_model(path: Path) -> None:
+    session = read_session(FIXTURES / "sessions" / "small")
+    known, machine = known_sources(), session.machine
+    run = session.runs[0]
+    setup = session.setup(run)
+    rng = np.random.default_rng(7)
+    fitted = (
+        Fitted(known["strut-reference-length"], rng.normal(0.0, 0.05, 6).round(5)),
+        Fitted(known["bar-offset"], np.array([0.0002]), setup.session),
+        Fitted(known["mounting"], np.array([0.0003, -0.0001, 0.0005]), setup.mounting),
+    )
+    rows = tuple((one.source.name, one.shared, p.name) for one in fitted for p in one.source.parameters(machine))
+    mixed = np.diag(np.array([2e-4] * 6 + [4e-4] + [5e-4] * 3)) @ (np.eye(10) + 0.3 * rng.standard_normal((10, 10)))
+    covariance = np.array([[float(f"{value:.4g}") for value in row] for row in mixed @ mixed.T])
+    model = IdentifiedModel(
+        MachineModel(machine, fitted),
+        rows,
+        covariance,
+        ("all six base joints together along Z",),
+        {"residual_rms_um": 0.52, "parameters_identified": 6, "made_up": True},
+        {session.name: session.sha256},
+    )
+    write_model(path, model, force=True)
+
+
+if __name__ == "__main__":
+    shutil.rmtree(FIXTURES / "sessions" / "small", ignore_errors=True)
+    make_session(FIXTURES / "sessions" / "small")
+    make_model(FIXTURES / "models" / "small.yaml")

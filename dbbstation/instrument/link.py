@@ -115,10 +115,15 @@ class Link:
 
     def close(self) -> None:
         """Close the port if this link opened it."""
-        close = getattr(self._port, "close", None)
-        if self._owned and close is not None:
-            with suppress(*_ERRORS):
-                close()
+        if not self._owned:
+            return
+        # pyserial forgets to close a socket whose other side hung up: its shutdown fails first.
+        inner = getattr(self._port, "_socket", None)
+        for opened in (self._port, inner):
+            close = getattr(opened, "close", None)
+            if close is not None:
+                with suppress(*_ERRORS):
+                    close()
 
     def _gone(self, error: Exception) -> InstrumentError:
         return InstrumentError(

@@ -132,10 +132,10 @@ class VirtualInstrument:
     # Faults, for tests and for showing what they look like.
 
     def go_silent(self) -> None:
-        """Send nothing any more, as with a cable pulled out at the instrument."""
+        """Send nothing any more after the frame that is under way, as an instrument that is switched off."""
         with self._lock:
             self._silent = True
-            self._outgoing.clear()
+            self._outgoing = deque(frame for frame in self._outgoing if frame.sent)
 
     def speak_again(self) -> None:
         """End the silence."""

@@ -91,10 +91,11 @@ def test_monitor_counts_and_logs_and_replay_reads_the_log(tmp_path: Path) -> Non
     assert "3 readings, 0 lost" in talk or "4 readings, 0 lost" in talk
     text, talk = run(replay, str(log))
     assert text.count("150.00030 mm\n") >= 3
-    assert "0 lost, 0 bytes not understood" in talk
+    assert ", 0 lost, " in talk
     shown = json.loads(run(replay, str(log), "--instrument", ND.name, "--json")[0])
     assert shown["readings"][0]["length_mm"] == 150.0003
-    assert shown["not_understood"] == []
+    # Nothing, or the reply that was under way when the monitor stopped.
+    assert {row["why"] for row in shown["not_understood"]} <= {"the log ends within it"}
 
 
 def test_monitor_prints_json_lines_only() -> None:

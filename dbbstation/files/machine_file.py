@@ -1,5 +1,6 @@
 """`dbb-machine/1`: the nominal machine, as its controller believes it."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,7 +11,7 @@ from pydantic import Field
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
 from dbbstation.files.schema import Schema, read_document, validate
-from dbbstation.machine.geometry import Hexapod, Machine, Masses, Travel
+from dbbstation.machine.geometry import Compliance, Hexapod, Machine, Masses, StrutMasses, Travel
 from dbbstation.machine.rotation import Rotation
 
 _Millimetre = Annotated[float, Quantity("mm", 0, 20, signed=True)]
@@ -46,6 +47,30 @@ class MassesSchema(Schema):
     """Height of the platform's centre of gravity above the tool tip, along the platform's axis, up positive [mm]."""
 
 
+class ComplianceSchema(Schema):
+    """How much a strut stretches under an axial force, by design."""
+
+    at_1000mm_mm_per_n: Annotated[float, Quantity("mm/N", 1e-9, 1e-2)]
+    """Elongation per force of a strut of 1000 mm between its joints, pulling positive [mm/N]."""
+    growing_share: Annotated[float, Quantity("", 0, 1)] = 0.9
+    """Part of that which grows with the strut's length; the rest is the same at every length [1]."""
+
+
+class StrutMassesSchema(Schema):
+    """What each of the six struts weighs, on the line through its joints."""
+
+    strut_kg: Annotated[float, Quantity("kg", 0, 2_000)]
+    """What lies evenly between base joint and platform joint, whatever the length [kg]."""
+    motor_kg: Annotated[float, Quantity("kg", 0, 2_000)]
+    """What sits behind the base joint, turning with the strut [kg]."""
+    motor_length_mm: Annotated[float, Quantity("mm", 5, 5_000, or_zero=True)]
+    """Length of that part; its centre is half of it behind the joint [mm]."""
+    screw_kg: Annotated[float, Quantity("kg", 0, 2_000)] = 0.0
+    """Screw that ends at the platform joint and slides through the base joint [kg]."""
+    screw_length_mm: Annotated[float, Quantity("mm", 5, 10_000, or_zero=True)] = 0.0
+    """Length of that screw; its rear end sticks out behind the joint [mm]."""
+
+
 class MachineParts(Schema):
     """The machine itself: what a machine file holds beside its `format` line, and a model holds inline."""
 
@@ -76,10 +101,14 @@ class MachineParts(Schema):
     calibration is regularised."""
     masses: MassesSchema | None = None
     """What gravity acts on; needed by the sources that model it."""
+    compliance: ComplianceSchema | None = None
+    """Compliance of the struts as designed; needed by the sources that model gravity."""
+    strut_masses: StrutMassesSchema | None = None
+    """Weight of struts and motors; needed by the source that models it."""
 
     def to_domain(self) -> Machine:
         """Return the machine that calculations use."""
-        masses = self.masses
+        masses, compliance, strut_masses = self.masses, self.compliance, self.strut_masses
         return Machine(
             name=self.name,
             hexapod=Hexapod(
@@ -92,6 +121,8 @@ class MachineParts(Schema):
             screw_lead_mm=self.screw_lead_mm,
             masses=None if masses is None else Masses(**masses.model_dump()),
             joint_tolerance_mm=self.joint_tolerance_mm,
+            compliance=None if compliance is None else Compliance(**compliance.model_dump()),
+            strut_masses=None if strut_masses is None else StrutMasses(**strut_masses.model_dump()),
         )
 
 
@@ -101,7 +132,6 @@ def machine_parts(machine: Machine) -> MachineParts:
     def points(joints: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
         return tuple(tuple(joint) for joint in joints.tolist())
 
-    masses = machine.masses
     return MachineParts.model_validate(
         {
             "name": machine.name,
@@ -109,10 +139,12 @@ def machine_parts(machine: Machine) -> MachineParts:
             "base_joints_mm": points(machine.hexapod.base_joints_mm),
             "platform_joints_mm": points(machine.hexapod.platform_joints_mm),
             "reference_length_error_mm": tuple(machine.reference_length_error_mm.tolist()),
-            "travel": {name: getattr(machine.travel, name) for name in TravelSchema.model_fields},
+            "travel": asdict(machine.travel),
             "screw_lead_mm": machine.screw_lead_mm,
             "joint_tolerance_mm": machine.joint_tolerance_mm,
-            "masses": masses and {name: getattr(masses, name) for name in MassesSchema.model_fields},
+            "masses": machine.masses and asdict(machine.masses),
+            "compliance": machine.compliance and asdict(machine.compliance),
+            "strut_masses": machine.strut_masses and asdict(machine.strut_masses),
         }
     )
 

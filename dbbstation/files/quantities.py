@@ -55,8 +55,8 @@ class Quantity:
             return value
         raise PydanticCustomError(
             "implausible",
-            "{value} {unit} is not plausible, expected {range} {unit}{guess}",
-            {"value": f"{value:g}", "unit": self.unit, "range": self._range(), "guess": self.guess(value)},
+            "{value} is not plausible, expected {range}{guess}",
+            {"value": f"{value:g} {self.unit}".strip(), "range": self._range(), "guess": self.guess(value)},
         )
 
     def guess(self, value: float) -> str:
@@ -69,9 +69,11 @@ class Quantity:
         return ""
 
     def _range(self) -> str:
+        sizes = f"{self.least:g} to {self.most:g}"
+        if self.signed:
+            sizes = f"±({sizes})" if self.least else f"-{self.most:g} to {self.most:g}"
         zero = "0 or " if self.or_zero and self.least > 0 else ""
-        sign = "±" if self.signed else ""
-        return f"{zero}{sign}{self.least:g} to {sign}{self.most:g}"
+        return f"{zero}{sizes} {self.unit}".strip()
 
     def __get_pydantic_core_schema__(self, source: type[Any], handler: GetCoreSchemaHandler) -> CoreSchema:
         """Check after the number itself was checked."""

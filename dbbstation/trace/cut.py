@@ -30,6 +30,11 @@ FEED_SIGMAS = 6.0
 """A disagreement counts only where the overlap shows it this clearly above its noise."""
 
 
+OUTSIDE_FEEDINGS = 6.0
+INSIDE_FEEDINGS = 3.0
+"""How far from an edge, in durations of the feed-in, its two levels are read."""
+
+
 def cut(recording: Recording, circle: Circle) -> RawCircle:
     """Return the full turn of a recording.
 
@@ -50,7 +55,12 @@ def cut(recording: Recording, circle: Circle) -> RawCircle:
 
 
 def _middle(recording: Recording, circle: Circle) -> float:
-    """Time midway between the edges where the length crosses half the feed-in [s]."""
+    """Time midway between the edges of feed-in and feed-out [s].
+
+    The edges lie at different angles, so the machine's own error there, a tenth of a millimetre or more, would move
+    them by different amounts against one common threshold: by 0.02 degrees, which costs more than the noise of a
+    whole run. Each edge is therefore taken halfway between the lengths on its two sides.
+    """
     threshold = circle.bar_mm + circle.feed_in_mm / 2.0
     inside = np.flatnonzero(recording.length_mm < threshold)
     if len(inside) == 0 or inside[0] == 0 or inside[-1] == len(recording) - 1:
@@ -62,10 +72,9 @@ def _middle(recording: Recording, circle: Circle) -> float:
             remedy="record from before the feed-in until after the feed-out, and check bar length and feed-in of the "
             "plan",
         )
-    first, last = int(inside[0]), int(inside[-1])
-    t, length = recording.t_s, recording.length_mm
-    edge_in = _crossing(t[first - 1 : first + 1], length[first - 1 : first + 1], threshold)
-    edge_out = _crossing(t[last : last + 2], length[last : last + 2], threshold)
+    edge_in = _edge(recording.t_s, recording.length_mm, circle, int(inside[0]))
+    backwards = recording.t_s[::-1], recording.length_mm[::-1]
+    edge_out = _edge(*backwards, circle, len(recording) - 1 - int(inside[-1]))
     travelled = (edge_out - edge_in) * circle.turning_deg_s
     if travelled < circle.swept_deg * (1.0 - FEED_SEARCH):
         raise TraceError(
@@ -77,9 +86,25 @@ def _middle(recording: Recording, circle: Circle) -> float:
     return (edge_in + edge_out) / 2.0
 
 
-def _crossing(t: NDArray[np.float64], length: NDArray[np.float64], threshold: float) -> float:
-    """Time at which the line through two samples reaches the threshold [s]."""
-    return float(t[0] + (t[1] - t[0]) * (threshold - length[0]) / (length[1] - length[0]))
+def _edge(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle, first: int) -> float:
+    """Time of an edge, seen on the way in: halfway between the lengths outside and inside of it [s].
+
+    Args:
+        t: times, rising or falling, shape (n,) [s].
+        length: lengths, shape (n,) [mm].
+        circle: as commanded.
+        first: index of the first sample below half the feed-in.
+    """
+    feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
+    after_s = np.abs(t - t[first]) * np.where(np.arange(len(t)) < first, -1.0, 1.0)
+    outside = (after_s > -OUTSIDE_FEEDINGS * feeding_s) & (after_s < -feeding_s)
+    inside = (after_s > feeding_s) & (after_s < INSIDE_FEEDINGS * feeding_s)
+    halfway = circle.bar_mm + circle.feed_in_mm / 2.0
+    if outside.any() and inside.any():
+        halfway = (float(np.median(length[outside])) + float(np.median(length[inside]))) / 2.0
+    below = first + int(np.argmax(length[first - 1 :] < halfway)) - 1
+    share = (halfway - length[below - 1]) / (length[below] - length[below - 1])
+    return float(t[below - 1] + (t[below] - t[below - 1]) * share)
 
 
 def _check_feed(recording: Recording, circle: Circle, middle: float) -> None:

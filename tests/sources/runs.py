@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dbbstation.machine.geometry import Compliance, Machine, Masses, StrutMasses
 from dbbstation.machine.rotation import Rotation
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.base_joints import BaseJoints
 from dbbstation.sources.contract import Motion, Setup
+from dbbstation.sources.strut_reference_length import StrutReferenceLength
 
 # [GRAV Table 4]: centre X, Y [mm], tilt A, B [deg]; all at Z = -1008 mm with a radius of 144 mm.
 CONDITIONS = {
@@ -117,3 +121,33 @@ def random_run(rng, count=300) -> Motion:
     setup = Setup("session", "mounting", "ball", "bar", np.array([10.0, 20.0, -1150.0]), 1e-3, 1e-3, 5e-4)
     time_s = np.sort(rng.uniform(0, 5000, count))
     return Motion(poses, is_path=True, kept=slice(20, None), time_s=time_s, setup=setup)
+
+
+def concealed(machine: Machine, runs: list[Motion], derivative) -> tuple[NDArray, NDArray, int]:
+    """What the 24 kinematic parameters take of bar readings, by least squares at the nominal machine.
+
+    Args:
+        machine: nominal.
+        runs: motions with a set-up.
+        derivative: effect of each of p signatures on a motion.
+
+    Returns:
+        Signatures (n, p) [mm], what remains of them (n, p) [mm], number of parameters that the runs can see.
+    """
+    columns, signatures = [], []
+    for motion in runs:
+        reading = MachineModel(machine).bar(motion)
+        kinematic = (StrutReferenceLength(), BaseJoints())
+        by = [reading.by_parameters(source.derivative(motion, machine, np.zeros(24))) for source in kinematic]
+        columns.append(np.hstack(by))
+        signatures.append(reading.by_parameters(derivative(motion)))
+    left, singular, _ = np.linalg.svd(np.vstack(columns), full_matrices=False)
+    seen = left[:, singular > 1e-9 * singular[0]]
+    signature = np.vstack(signatures)
+    return signature, signature - seen @ (seen.T @ signature), seen.shape[1]
+
+
+def concealed_share(machine: Machine, runs: list[Motion], derivative) -> NDArray:
+    """Share of each signature's sum of squares that the kinematic parameters take, shape (p,) [1]."""
+    signature, remains, _ = concealed(machine, runs, derivative)
+    return 1 - (remains**2).sum(axis=0) / (signature**2).sum(axis=0)

@@ -1,0 +1,79 @@
+"""Error source: struts that grow as they warm up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.warm_up import time_constant, warmed, warmed_by_constant
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM_M = 1e-6
+"""One µm/m in mm/mm."""
+
+
+class ThermalStruts(ErrorSource):
+    """All struts grow alike, each in proportion to its length: dL_i = L_i e (1 - exp(-t / tau)).
+
+    Counted from the session's first sample, where the growth is zero by definition: e is what the struts still had
+    to grow then, not their growth since the machine was switched on, and what they had grown before is part of their
+    reference lengths. A cold and a warm start are therefore two different values, and a session predicted with this
+    source starts as those did that it was fitted to.
+    """
+
+    name = "thermal-struts"
+    belongs_to = Owner.MACHINE
+    needs = frozenset({Need.POSE, Need.TIME})
+    texts = Texts(
+        what="The struts' screws warm up while the machine works and grow, quickly at first and then ever more slowly. "
+        "The growth given is counted from the first sample of the session.",
+        shows="The same circle, repeated, comes out higher or lower, shifted and of another size than an hour before; "
+        "both directions drift alike.",
+        confirm="Repeat an early test at the end of the session, or measure one circle every ten minutes from a cold "
+        "start. A thermometer on a strut shows about 1 K for each 11 µm/m of steel.",
+        cure="Let the machine warm up with a movement like that of the measurement before it starts; repeat early "
+        "tests at the end, so that the drift does not mix with the height of the ball.",
+        equation="actual minus driven length = L_i e (1 - exp(-t / tau)), t since the session's first sample",
+        origin="linear expansion and the first-order warm-up of a body that is heated evenly",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Growth in the end and time constant."""
+        return (
+            Parameter("growth_um_m", "µm/m", 30.0, "growth of all struts from the first sample to the end of warm-up"),
+            time_constant(3600.0, "the growth"),
+        )
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Growth of each strut.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        per_growth, time_s = self._growth_mm(motion, machine)
+        return Effect(strut_mm=values[0] * warmed(time_s, values[1])[:, None] * per_growth)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """By the growth and by the time constant.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        per_growth, time_s = self._growth_mm(motion, machine)
+        law = np.column_stack([warmed(time_s, values[1]), values[0] * warmed_by_constant(time_s, values[1])])
+        return Effect(strut_mm=per_growth[:, :, None] * law[:, None, :])
+
+    def _growth_mm(self, motion: Motion, machine: Machine) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Growth per µm/m of fully warmed struts, shape (n, 6) [mm], and the times, shape (n,) [s]."""
+        self.require(motion)
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        time_s: NDArray[np.float64] = np.asarray(motion.time_s)
+        return MM_PER_UM_M * inverse(machine.hexapod, frames).length_mm, time_s

@@ -1,0 +1,101 @@
+"""What every error source promises: declared parameters, derivatives that fit the effect, needs refused by name."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from dbbstation.errors import ModelError
+from dbbstation.machine.rotation import Rotation
+from dbbstation.sources.contract import Effect, Need, Owner
+from dbbstation.sources.registry import known_sources, sources_named
+from tests.sources.runs import random_machine, random_run
+
+SOURCES = list(known_sources().values())
+WITHOUT = {
+    Need.PATH: {"is_path": False},
+    Need.TIME: {"time_s": None},
+    Need.TEMPERATURE: {"temperature_degc": {}},
+    Need.CURRENT: {"motor_current_a": None},
+}
+
+
+@pytest.fixture(params=list(Rotation))
+def machine(request, reference, rng):
+    return random_machine(reference, request.param, rng)
+
+
+def some_values(parameters, rng):
+    """Two or three times the usual size, of either sign for what is no time constant."""
+    factor = rng.uniform(0.5, 3, len(parameters))
+    signs = np.array([1.0 if parameter.shape else rng.choice([-1.0, 1.0]) for parameter in parameters])
+    return signs * factor * [parameter.plausible for parameter in parameters]
+
+
+def arrays(effect: Effect):
+    return {f.name: getattr(effect, f.name) for f in fields(effect) if getattr(effect, f.name) is not None}
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.name)
+def test_derivative_is_that_of_the_effect(source, machine, rng):
+    parameters = source.parameters(machine)
+    for _ in range(3):
+        motion, values = random_run(rng), some_values(parameters, rng)
+        derivative = arrays(source.derivative(motion, machine, values))
+        here = arrays(source.effect(motion, machine, values))
+        assert derivative.keys() == here.keys()
+        for k, parameter in enumerate(parameters):
+            step = 1e-5 * parameter.plausible * np.eye(len(parameters))[k]
+            ends = [arrays(source.effect(motion, machine, values + sign * step)) for sign in (1, -1)]
+            for name, exact in derivative.items():
+                after, before = (ends[0][name] - here[name]) / step[k], (here[name] - ends[1][name]) / step[k]
+                # A source with play has kinks, where the derivatives to either side differ; the rest must agree.
+                scale = np.abs(exact[..., k]).max(initial=0) + 1e-300
+                smooth = np.abs(after - before) < 1e-3 * scale
+                assert smooth.mean() > 0.98
+                assert np.abs((after + before) / 2 - exact[..., k])[smooth].max(initial=0) < 1e-4 * scale
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.name)
+def test_nothing_comes_of_nothing_and_amplitudes_are_in_proportion(source, machine, rng):
+    parameters, motion = source.parameters(machine), random_run(rng)
+    nothing = source.effect(motion, machine, np.zeros(len(parameters)))
+    assert all(np.allclose(array, 0, atol=1e-15) for array in arrays(nothing).values())
+    assert set(arrays(source.derivative(motion, machine, np.zeros(len(parameters))))) == set(arrays(nothing))
+    if Need.PATH not in source.needs:  # the range of a play hangs on its width
+        values = some_values(parameters, rng)
+        doubled = values * np.where([bool(p.shape) for p in parameters], 1.0, 2.0)
+        once, twice = (arrays(source.effect(motion, machine, v)) for v in (values, doubled))
+        assert all(np.allclose(twice[name], 2 * once[name], rtol=1e-12) for name in once)
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.name)
+def test_a_motion_without_what_it_needs_is_refused_by_name(source, rng):
+    complete = random_run(rng)
+    source.require(complete)
+    for need in source.needs - {Need.POSE}:
+        with pytest.raises(ModelError, match=f"the error source {source.name} needs {need}"):
+            source.require(replace(complete, **WITHOUT[need]))
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda s: s.name)
+def test_parameters_and_texts_are_complete(source, machine):
+    parameters = source.parameters(machine)
+    assert len({parameter.name for parameter in parameters}) == len(parameters) > 0
+    for parameter in parameters:
+        unit = parameter.unit.lower().replace("µ", "u").replace("/", "_")
+        assert parameter.name.endswith(f"_{unit}")
+        assert parameter.plausible > 0
+        assert len(parameter.meaning.split()) > 3
+        assert not parameter.shape or min(parameter.shape) <= parameter.plausible <= max(parameter.shape)
+    for f in fields(source.texts):
+        assert len(getattr(source.texts, f.name)) > 9, f.name
+    assert source.belongs_to in Owner
+    assert sources_named([source.name]) == (source,)
+
+
+def test_an_unknown_source_is_refused_with_those_that_exist():
+    with pytest.raises(ModelError, match=r"no error source is called 'gravitation'; known are .*gravity"):
+        sources_named(["gravitation"])

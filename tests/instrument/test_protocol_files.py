@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from typing import TYPE_CHECKING
 
 import pytest
@@ -90,3 +92,12 @@ def test_every_fault_is_told_at_once(tmp_path: Path) -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.yaml"):
         load_instrument(tmp_path / "none.yaml")
+
+
+def test_the_instruments_need_nothing_of_ours_but_errors_and_files() -> None:
+    code = (
+        "import sys, dbbstation.instrument.driver, dbbstation.instrument.replay; "
+        "print(*{name.split('.')[1] for name in sys.modules if name.startswith('dbbstation.')})"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) == {"errors", "files", "instrument"}

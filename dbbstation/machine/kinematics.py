@@ -108,24 +108,36 @@ def strut_jacobian(struts: Struts) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class BarSensitivity:
-    """A bar's length and its derivatives at given poses, per unit of each machine error.
+class Response:
+    """How one measured or predicted quantity answers to the machine's errors, at given poses.
 
     Attributes:
-        length_mm: distance between the ball centres, shape (n,) [mm].
-        direction: unit vector from the fixed to the moving ball, shape (n, 3) [1].
-        per_strut: dl/dL, shape (n, 6) [mm/mm].
-        per_base_joint: dl/dQ, shape (n, 6, 3) [mm/mm].
-        per_platform_joint: dl/dP, platform axes, shape (n, 6, 3) [mm/mm].
-        per_tool_ball: dl/do, platform axes, with the platform held, shape (n, 3) [mm/mm].
+        per_strut: per strut length, shape (n, 6) [unit/mm].
+        per_base_joint: per base joint, machine axes, shape (n, 6, 3) [unit/mm].
+        per_platform_joint: per platform joint, platform axes, shape (n, 6, 3) [unit/mm].
+        per_tool_ball: per shift of tool tip and ball against the platform, platform axes, shape (n, 3) [unit/mm].
     """
 
-    length_mm: NDArray[np.float64]
-    direction: NDArray[np.float64]
     per_strut: NDArray[np.float64]
     per_base_joint: NDArray[np.float64]
     per_platform_joint: NDArray[np.float64]
     per_tool_ball: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BarSensitivity:
+    """A bar's length and its derivatives at given poses.
+
+    Attributes:
+        length_mm: distance between the ball centres, shape (n,) [mm].
+        direction: unit vector from the fixed to the moving ball, shape (n, 3) [1]; the length falls by it where
+            the fixed ball moves.
+        response: of the length to the machine's errors [mm/mm].
+    """
+
+    length_mm: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    response: Response
 
 
 def bar_sensitivity(
@@ -168,10 +180,27 @@ def bar_sensitivity(
     if (outcome != kernels.CONVERGED).any():
         where = int(np.argmax(outcome != kernels.CONVERGED))
         _refuse(where, frames, hexapod, struts.length_mm, singular=True)
+    return BarSensitivity(length, direction, _response(gain, struts, frames, direction))
+
+
+def position_responses(hexapod: Hexapod, frames: Frames) -> tuple[Response, Response, Response]:
+    """How X, Y and Z of the tool tip answer to the machine's errors, at the poses `frames`."""
+    struts = inverse(hexapod, frames)
+    pose_per_strut = np.asarray(np.linalg.inv(strut_jacobian(struts)), dtype=np.float64)
+    x, y, z = (
+        _response(pose_per_strut[:, k, :], struts, frames, np.broadcast_to(np.eye(3)[k], (len(frames), 3)))
+        for k in range(3)
+    )
+    return x, y, z
+
+
+def _response(gain: NDArray[np.float64], struts: Struts, frames: Frames, direction: NDArray[np.float64]) -> Response:
+    """Response of a quantity that strut errors change by `gain`, shape (n, 6), and the tool ball along `direction`.
+
+    A shift dQ of a base joint acts as a strut error u dQ, one of a platform joint as -u R dP.
+    """
     per_base = gain[:, :, None] * struts.unit
-    return BarSensitivity(
-        length_mm=length,
-        direction=direction,
+    return Response(
         per_strut=gain,
         per_base_joint=per_base,
         per_platform_joint=-per_base @ frames.rotation,

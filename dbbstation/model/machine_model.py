@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import BarSensitivity, bar_sensitivity, forward, inverse
+from dbbstation.machine.kinematics import BarSensitivity, Response, bar_sensitivity, forward, inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, Fitted, Motion, Owner
 
@@ -116,24 +116,34 @@ class BarReading:
 
     def by_parameters(self, derivative: Effect) -> NDArray[np.float64]:
         """Derivative of the reading by p parameters, shape (n, p), from that of an effect; kept rows only."""
-        s, kept = self.sensitivity, self.motion.kept
-        channels = (
-            (derivative.strut_mm, s.per_strut, 1),
-            (derivative.base_joint_mm, s.per_base_joint, 2),
-            (derivative.platform_joint_mm, s.per_platform_joint, 2),
-            (derivative.tool_tip_mm, s.per_tool_ball, 1),
-            (derivative.fixed_ball_mm, -s.direction, 1),
-        )
-        total: NDArray[np.float64] | float = 0.0
-        for array, gain, axes in channels:
-            if array is not None:
-                total = total + _contract(gain[kept], array if array.ndim == axes + 1 else array[kept], axes)
+        kept = self.motion.kept
+        total = by_parameters(derivative, self.sensitivity.response, kept)
+        if derivative.fixed_ball_mm is not None:
+            total = total - _contract(self.sensitivity.direction[kept], _rows(derivative.fixed_ball_mm, 1, kept), 1)
         if derivative.reading_mm is not None:
-            reading = derivative.reading_mm
-            total = total + (reading if reading.ndim == 1 else reading[kept])
-        count = len(self.length_mm)
+            total = total + _rows(derivative.reading_mm, 0, kept)
         parameters = np.shape(total)[-1] if np.ndim(total) else 0
-        return np.ascontiguousarray(np.broadcast_to(total, (count, parameters)))
+        return np.ascontiguousarray(np.broadcast_to(total, (len(self.length_mm), parameters)))
+
+
+def by_parameters(derivative: Effect, response: Response, kept: slice) -> NDArray[np.float64] | float:
+    """Derivative of any quantity by p parameters through struts, joints and tool, shape (n, p); 0.0 where none."""
+    channels = (
+        (derivative.strut_mm, response.per_strut, 1),
+        (derivative.base_joint_mm, response.per_base_joint, 2),
+        (derivative.platform_joint_mm, response.per_platform_joint, 2),
+        (derivative.tool_tip_mm, response.per_tool_ball, 1),
+    )
+    total: NDArray[np.float64] | float = 0.0
+    for array, gain, axes in channels:
+        if array is not None:
+            total = total + _contract(gain[kept], _rows(array, axes, kept), axes)
+    return total
+
+
+def _rows(array: NDArray[np.float64], axes: int, kept: slice) -> NDArray[np.float64]:
+    """Rows that count of a derivative that has one entry per sample; all of one that holds for every sample."""
+    return array if array.ndim == axes + 1 else array[kept]
 
 
 def _contract(gain: NDArray[np.float64], array: NDArray[np.float64], axes: int) -> NDArray[np.float64]:

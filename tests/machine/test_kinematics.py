@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation as Turn
 
 from dbbstation.errors import KinematicsError
 from dbbstation.machine.geometry import Hexapod
-from dbbstation.machine.kinematics import bar_sensitivity, forward, inverse, strut_jacobian
+from dbbstation.machine.kinematics import bar_sensitivity, forward, inverse, position_responses, strut_jacobian
 from dbbstation.machine.rotation import Frames, Rotation, rotation_matrices
 from dbbstation.machine.travel import _hold
 
@@ -144,7 +144,7 @@ def test_bar_sensitivities_by_finite_differences(hexapod, rng):
     for i in range(6):
         strut = np.eye(6)[i]
         by_strut = slope(lambda d, s=strut: actual_length(actual, lengths + d * s, commanded, BALL, TOOL_BALL))
-        assert np.allclose(by_strut, got.per_strut[:, i], atol=2e-6)
+        assert np.allclose(by_strut, got.response.per_strut[:, i], atol=2e-6)
         for k in range(3):
             joint = np.outer(strut, np.eye(3)[k])
             by_base = slope(
@@ -153,14 +153,38 @@ def test_bar_sensitivities_by_finite_differences(hexapod, rng):
             by_platform = slope(
                 lambda d, j=joint: actual_length(actual.moved(none, d * j), lengths, commanded, BALL, TOOL_BALL)
             )
-            assert np.allclose(by_base, got.per_base_joint[:, i, k], atol=2e-6)
-            assert np.allclose(by_platform, got.per_platform_joint[:, i, k], atol=2e-6)
+            assert np.allclose(by_base, got.response.per_base_joint[:, i, k], atol=2e-6)
+            assert np.allclose(by_platform, got.response.per_platform_joint[:, i, k], atol=2e-6)
     for k in range(3):
         axis = np.eye(3)[k]
         by_tool = slope(lambda d, a=axis: actual_length(actual, lengths, commanded, BALL, TOOL_BALL + d * a))
         by_ball = slope(lambda d, a=axis: actual_length(actual, lengths, commanded, BALL + d * a, TOOL_BALL))
-        assert np.allclose(by_tool, got.per_tool_ball[:, k], atol=2e-6)
+        assert np.allclose(by_tool, got.response.per_tool_ball[:, k], atol=2e-6)
         assert np.allclose(by_ball, -got.direction[:, k], atol=2e-6)
+
+
+def test_position_responses_by_finite_differences(hexapod, rng):
+    commanded = Frames.from_poses(some_poses(rng, 6), hexapod.rotation)
+    lengths = inverse(hexapod, commanded).length_mm
+    responses = position_responses(hexapod, commanded)
+    h, none = 1e-4, np.zeros((6, 3))
+
+    def position(joints, struts):
+        return forward(joints, struts, commanded).position_mm
+
+    for i in range(6):
+        strut = h * np.eye(6)[i]
+        by_strut = (position(hexapod, lengths + strut) - position(hexapod, lengths - strut)) / (2 * h)
+        shift = np.outer(strut, [0.6, 0.0, 0.8])
+        by_base = position(hexapod.moved(shift, none), lengths) - position(hexapod.moved(-shift, none), lengths)
+        by_platform = position(hexapod.moved(none, shift), lengths) - position(hexapod.moved(none, -shift), lengths)
+        for k, response in enumerate(responses):
+            assert np.allclose(by_strut[:, k], response.per_strut[:, i], atol=2e-6)
+            assert np.allclose(by_base[:, k] / (2 * h), response.per_base_joint[:, i] @ [0.6, 0, 0.8], atol=2e-6)
+            assert np.allclose(
+                by_platform[:, k] / (2 * h), response.per_platform_joint[:, i] @ [0.6, 0, 0.8], atol=2e-6
+            )
+            assert np.allclose(response.per_tool_ball, commanded.rotation[:, k], atol=1e-12)
 
 
 def test_many_poses_in_blocks_equal_few(hexapod, rng):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -111,3 +112,27 @@ def test_monitor_prints_json_lines_only() -> None:
 def test_monitor_of_a_port_that_is_not_there() -> None:
     with pytest.raises(InstrumentError, match="there is no such port"):
         run(monitor, "--instrument", ND.name, "--port", "/dev/ttyNONE9")
+
+
+def test_ctrl_c_ends_the_monitor_with_its_totals() -> None:
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from dbbstation.cli import main; main()"
+    with VirtualInstrument(ENCODER, lambda _: 150.0) as virtual:
+        command = [
+            sys.executable,
+            "-c",
+            code,
+            "monitor",
+            "--instrument",
+            ENCODER.name,
+            "--port",
+            virtual.port,
+            "--json",
+        ]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as monitoring:
+            assert monitoring.stdout is not None
+            monitoring.stdout.readline()
+            monitoring.send_signal(signal.SIGINT)
+            text, talk = monitoring.communicate(timeout=20)
+    assert monitoring.returncode == 0, talk
+    assert talk == ""
+    assert json.loads(text.splitlines()[-1])["totals"]["garbage_bytes"] == 0

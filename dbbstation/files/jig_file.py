@@ -96,14 +96,14 @@ def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Pro
     Args:
         document: holds `balls`.
         jig: the mapping with the bores.
-        holders: the mapping of holders.
+        holders: the mapping of holders, or their names.
         faults: grows.
     """
     bores = _plain_bores(jig)
     for location, ball in document.entries("balls"):
         holder = ball.get("holder")
-        if isinstance(holders, dict) and isinstance(holder, str) and holder not in holders:
-            known = ", ".join(map(str, holders)) or "none"
+        if isinstance(holders, dict | set) and isinstance(holder, str) and holder not in holders:
+            known = ", ".join(sorted(map(str, holders))) or "none"
             what = f"{dotted(location)}: the holder `{holder}` is not in `holders`"
             faults.append(document.problem((*location, "holder"), what, f"known: {known}"))
         bore, centre = ball.get("bore"), ball.get("centre_mm")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
@@ -101,7 +101,10 @@ class PlanFile(Schema):
     """What people call the plan."""
     path: PathSchema
     """How the circles are travelled."""
-    jig: JigSchema | str
+    jig: Annotated[
+        Annotated[JigSchema, Tag("inline")] | Annotated[str, Tag("path")],
+        Discriminator(lambda jig: "path" if isinstance(jig, str) else "inline"),
+    ]
     """The plate; or the path of a `dbb-jig/1` file, from this file's folder, that holds plate, holders and balls."""
     holders: dict[str, HolderSchema] = Field(default_factory=dict)
     """Holders by name."""

@@ -99,8 +99,10 @@ def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
         what = "the file is empty" if not data.strip() else "there is no line that names the columns"
         faults.append(Problem(file, at, 0, what, f"a run starts with the line `{','.join(columns.REQUIRED)}`"))
         return None
-    text = decode(all_lines[at], file, faults)
+    bad: list[Problem] = []
+    text = decode(all_lines[at], file, bad)
     if text is None:
+        faults.extend(replace(problem, line=at + 1) for problem in bad)
         return None
     names = tuple(name.strip() for name in text.split(","))
     _check_columns(names, file, at + 1, faults)

@@ -91,7 +91,7 @@ def _problem(document: YamlDocument, schema: type[Schema], detail: ErrorDetails)
     if kind == "missing":
         missing = str(detail["loc"][-1])
         return document.problem(location, f"{_within(location)}the key `{missing}` is missing", "add it")
-    if kind == "extra_forbidden":
+    if kind in {"extra_forbidden", "invalid_key"}:
         allowed = list(keys_at(schema, location[:-1]))
         near = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
         remedy = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(sorted(allowed))}"
@@ -162,7 +162,8 @@ def keys_at(schema: type[Schema], location: Location) -> Iterator[str]:
     def alternatives(part: dict[str, Any]) -> list[dict[str, Any]]:
         if "$ref" in part:
             return alternatives(definitions[part["$ref"].rsplit("/", maxsplit=1)[-1]])
-        return [found for option in part["anyOf"] for found in alternatives(option)] if "anyOf" in part else [part]
+        options = part.get("anyOf") or part.get("oneOf")
+        return [found for option in options for found in alternatives(option)] if options else [part]
 
     parts = alternatives(root)
     for step in location:

@@ -1,0 +1,99 @@
+"""Tables of poses as CSV: `x_mm,y_mm,z_mm,a_deg,b_deg,c_deg`, further columns kept as they are."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.atomic import write_text
+from dbbstation.files.source_text import decode, read_bytes
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+UNCERTAINTY_COLUMNS = ("u_x_mm", "u_y_mm", "u_z_mm")
+MOST_FAULTS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTable:
+    """Poses of a file.
+
+    Attributes:
+        poses: shape (n, 6) [mm, deg].
+        others: texts of further columns by name, kept for the output.
+    """
+
+    poses: NDArray[np.float64]
+    others: dict[str, list[str]]
+
+
+def read_poses(path: Path) -> PoseTable:
+    """Read a table of poses.
+
+    Raises:
+        InputError: every missing column and every cell that is no finite number, with its line.
+    """
+    faults: list[Problem] = []
+    data = read_bytes(path, faults)
+    text = None if data is None else decode(data, str(path), faults)
+    if text is None:
+        raise InputError(faults)
+    reader = csv.DictReader(io.StringIO(text, newline=""), skipinitialspace=True)
+    names = list(reader.fieldnames or [])
+    missing = [name for name in POSE_COLUMNS if name not in names]
+    if missing:
+        remedy = f"the first line must name {', '.join(POSE_COLUMNS)}"
+        raise InputError([Problem(str(path), 1, 1, f"no column {', '.join(missing)}", remedy)])
+    rows: list[list[float]] = []
+    others: dict[str, list[str]] = {name: [] for name in names if name not in POSE_COLUMNS}
+    for row in reader:
+        rows.append([_number(row[name], name, path, reader.line_num, faults) for name in POSE_COLUMNS])
+        for name, cells in others.items():
+            cells.append(row[name] or "")
+    if faults:
+        raise InputError(faults[:MOST_FAULTS])
+    if not rows:
+        raise InputError([Problem(str(path), 1, 1, "no pose follows the header", "give one pose per line")])
+    return PoseTable(np.array(rows), others)
+
+
+def _number(cell: str | None, name: str, path: Path, line: int, faults: list[Problem]) -> float:
+    try:
+        value = float(cell or "")
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        faults.append(Problem(str(path), line, 0, f"{name} is {cell!r}, not a number", "correct or remove the line"))
+    return value
+
+
+def write_poses(
+    path: Path,
+    poses: NDArray[np.float64],
+    uncertainty_mm: NDArray[np.float64],
+    others: dict[str, list[str]],
+    *,
+    force: bool = False,
+) -> None:
+    """Write poses, shape (n, 6) [mm, deg], their standard uncertainties, shape (n, 3) [mm], and further columns.
+
+    Raises:
+        OutputError: the file exists and `force` is not given, or it cannot be written.
+    """
+    kept = {name: cells for name, cells in others.items() if name not in UNCERTAINTY_COLUMNS}
+    out = io.StringIO(newline="")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*POSE_COLUMNS, *UNCERTAINTY_COLUMNS, *kept])
+    for k, (pose, uncertainty) in enumerate(zip(poses, uncertainty_mm, strict=True)):
+        numbers = [f"{value:.9f}" for value in pose] + [f"{value:.7f}" for value in uncertainty]
+        writer.writerow([*numbers, *(cells[k] for cells in kept.values())])
+    write_text(path, out.getvalue(), force=force)

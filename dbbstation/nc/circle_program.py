@@ -1,0 +1,107 @@
+"""The toolpath of one ball-bar run: dwell, feed-in along the bar, overshoot, full turn, overshoot, feed-out, dwell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.nc.toolpath import Step, Toolpath, ToolpathBuilder
+from dbbstation.plan.circle import FULL_TURN_DEG
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.plan.circle import Circle
+
+STEP_DEG = 0.1
+"""Angle between programmed points: 3600 per turn [GRAV 4.1]."""
+
+OUTER_DWELL_S = 1.0
+"""Stop outside the circle: the recording must hold some samples before the feed-in."""
+
+CORNER_DWELL_S = 0.3
+"""Stop between feed-in and arc: what the path does not round, the machine's own swinging does not blur."""
+
+LEAST_CORNER_MM = 1e-4
+"""The control may round the corners of the polygon by this much; 0.1 µm is below what a bar can see."""
+
+BAR_ON = "put the bar on its balls, start recording, then continue"
+BAR_OFF = "stop recording, take the bar off, then continue"
+
+
+@dataclass(frozen=True)
+class Approach:
+    """How the machine comes to the first point, and leaves the last.
+
+    Attributes:
+        clear_mm: height above these points that rapids go to: clear of ball, holder and bar [mm].
+    """
+
+    clear_mm: float = 20.0
+
+
+def circle_toolpath(
+    circle: Circle,
+    name: str,
+    *,
+    step_deg: float = STEP_DEG,
+    approach: Approach | None = Approach(),
+) -> Toolpath:
+    """Return the nominal path of a run.
+
+    Arcs are straight moves every `step_deg`, so that a nominal and a compensated program differ in nothing but
+    their numbers. A chord lies `chord_error_mm` inside the circle at most.
+
+    Args:
+        circle: what to run, with its direction.
+        name: of the program, for messages.
+        step_deg: greatest angle between points of the arc [deg].
+        approach: where rapids go and the program waits for the bar to be put on and taken off; None: the bar is on
+            already and stays on, so the program starts with a feed move to its first point and ends at its last.
+    """
+    first, last = circle.poses(_ends_deg(circle), circle.feed_in_mm)
+    path = ToolpathBuilder(name)
+    path.corner_mm = max(LEAST_CORNER_MM, chord_error_mm(circle, step_deg))
+    if approach is not None:
+        path.rapid(_raised(first, approach.clear_mm))
+    path.feed(first[None], circle.feed_mm_min)
+    if approach is not None:
+        path.say(Step.PAUSE, BAR_ON)
+    path.dwell(OUTER_DWELL_S)
+    arc = circle.poses(circle.theta_deg(arc_phi_deg(circle, step_deg)))
+    path.feed(arc[:1], circle.feed_mm_min)
+    path.dwell(CORNER_DWELL_S)
+    path.feed(arc[1:], circle.feed_mm_min)
+    path.dwell(CORNER_DWELL_S)
+    path.feed(last[None], circle.feed_mm_min)
+    path.dwell(OUTER_DWELL_S)
+    if approach is not None:
+        path.say(Step.PAUSE, BAR_OFF)
+        path.rapid(_raised(last, approach.clear_mm))
+    return path.built()
+
+
+def arc_phi_deg(circle: Circle, step_deg: float) -> NDArray[np.float64]:
+    """Progress of the programmed points, overshoot arcs included: both ends of the turn are points [deg]."""
+    edges = [-circle.overshoot_deg, 0.0, FULL_TURN_DEG, FULL_TURN_DEG + circle.overshoot_deg]
+    parts = [np.array(edges[:1])]
+    for start, stop in pairwise(edges):
+        count = int(np.ceil((stop - start) / step_deg - 1e-9))
+        parts.append(np.linspace(start, stop, count + 1)[1:])
+    return np.concatenate(parts)
+
+
+def chord_error_mm(circle: Circle, step_deg: float) -> float:
+    """How far the middle of a chord lies inside the circle, r (1 - cos(step / 2)) [mm]."""
+    return circle.radius_mm * float(1.0 - np.cos(np.radians(step_deg) / 2.0))
+
+
+def _ends_deg(circle: Circle) -> NDArray[np.float64]:
+    return circle.theta_deg(np.array([-circle.overshoot_deg, FULL_TURN_DEG + circle.overshoot_deg]))
+
+
+def _raised(pose: NDArray[np.float64], by_mm: float) -> NDArray[np.float64]:
+    return pose + np.array([0.0, 0.0, by_mm, 0.0, 0.0, 0.0])

@@ -1,0 +1,45 @@
+"""What a dialect is: one control's way to write and read a toolpath."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.toolpath import Toolpath
+
+
+class Dialect(ABC):
+    """One control's language. Each stands in a file of its own in `dialects/` and carries no state."""
+
+    name: ClassVar[str]
+    extension: ClassVar[str]
+    """Of its program files, with the dot."""
+    what: ClassVar[str]
+    """The control, in one line."""
+
+    @abstractmethod
+    def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
+        """Return the program, with the header's lines as comments before anything else.
+
+        The same toolpath and header give the same text: no date, nothing of the computer it was written on.
+        """
+
+    @abstractmethod
+    def read(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
+        """Return what a program commands.
+
+        Args:
+            text: the program.
+            name: file it came from, for messages.
+            start: pose before the program, shape (6,) [mm, deg]; None where unknown: then its first move must
+                name all six axes.
+
+        Raises:
+            InputError: faults with line and column.
+        """

@@ -1,0 +1,101 @@
+"""Arcs in the XY plane as straight moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+CHORD_ERROR_MM = 5e-5
+"""How far a chord may lie inside its arc: 0.05 µm, which is 3800 chords for a full turn of 150 mm."""
+
+RADIUS_ABSOLUTE_MM, RADIUS_RELATIVE, RADIUS_WORST = 0.02 * math.sqrt(2.0), 1e-3, 100.0
+"""Radii to start and end of an arc may differ: by less than the first, or by less than the second share of the radius
+while below the first times the third. Such an arc is a spiral. [LinuxCNC's own limits]"""
+
+REACH_MM = 0.00127
+"""By how much the radius of an arc given by R may be too short for its ends. [LinuxCNC's own limit]"""
+
+FULL_TURN_RAD = 1e-6
+"""Below this angle between start and end an arc is a full turn. [LinuxCNC's own limit]"""
+
+
+@dataclass(frozen=True)
+class Arc:
+    """An arc in XY, with everything else moving evenly along it.
+
+    Attributes:
+        start: pose before it, shape (6,) [mm, deg].
+        end: pose after it, shape (6,) [mm, deg].
+        centre_mm: X and Y of its centre [mm].
+        clockwise: seen from +Z.
+        turns: 1 for less than a full turn or one; each more adds a full turn.
+    """
+
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    centre_mm: tuple[float, float]
+    clockwise: bool
+    turns: int = 1
+
+    def radii_mm(self) -> tuple[float, float]:
+        """Distances of start and end from the centre [mm]."""
+        x, y = self.centre_mm
+        return math.hypot(self.start[0] - x, self.start[1] - y), math.hypot(self.end[0] - x, self.end[1] - y)
+
+    def is_round(self) -> bool:
+        """Whether both ends lie on one circle, within what LinuxCNC allows."""
+        first, last = self.radii_mm()
+        off, radius = abs(first - last), max(first, last)
+        if min(first, last) <= 0.0 or off > RADIUS_ABSOLUTE_MM * RADIUS_WORST:
+            return False
+        return off <= RADIUS_ABSOLUTE_MM or off <= RADIUS_RELATIVE * radius
+
+    def poses(self) -> NDArray[np.float64]:
+        """End points of the chords, shape (k, 6) [mm, deg]."""
+        (x, y), (first, last) = self.centre_mm, self.radii_mm()
+        sign = -1.0 if self.clockwise else 1.0
+        begin = math.atan2(self.start[1] - y, self.start[0] - x)
+        swept = math.fmod(sign * (math.atan2(self.end[1] - y, self.end[0] - x) - begin), math.tau)
+        while swept <= FULL_TURN_RAD:
+            swept += math.tau
+        swept += (self.turns - 1) * math.tau
+        count = max(1, math.ceil(swept / math.sqrt(8.0 * CHORD_ERROR_MM / max(first, last))))
+        share = np.arange(1, count + 1) / count
+        poses = self.start + share[:, None] * (self.end - self.start)
+        radius, angle = first + share * (last - first), begin + sign * share * swept
+        poses[:, 0] = x + radius * np.cos(angle)
+        poses[:, 1] = y + radius * np.sin(angle)
+        poses[-1] = self.end
+        return poses
+
+
+def centre_by_radius(
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    radius_mm: float,
+    *,
+    clockwise: bool,
+) -> tuple[float, float] | None:
+    """Centre of the arc through two points, shapes (2,) or longer, with this radius; None where there is none.
+
+    Args:
+        start: where it begins [mm].
+        end: where it ends [mm].
+        radius_mm: positive for the arc of at most half a turn, negative for the other [mm].
+        clockwise: seen from +Z.
+    """
+    dx, dy = float(end[0] - start[0]), float(end[1] - start[1])
+    half = math.hypot(dx, dy) / 2.0
+    if half == 0.0 or half - abs(radius_mm) > REACH_MM:
+        return None
+    height = math.sqrt(max(radius_mm**2 - half**2, 0.0))
+    # Left of the chord lies the centre of a short counter-clockwise arc, and of a long clockwise one.
+    side = 1.0 if clockwise == (radius_mm < 0.0) else -1.0
+    scale = side * height / (2.0 * half)
+    return float(start[0] + end[0]) / 2.0 - dy * scale, float(start[1] + end[1]) / 2.0 + dx * scale

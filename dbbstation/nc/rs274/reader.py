@@ -1,0 +1,227 @@
+"""From blocks to a toolpath: the modal state of a control, and what each block does to it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.nc.rs274.arcs import Arc, centre_by_radius
+from dbbstation.nc.rs274.blocks import Block, blocks
+from dbbstation.nc.rs274.codes import Group, name
+from dbbstation.nc.rs274.tokens import BadLine
+from dbbstation.nc.toolpath import Step, Toolpath, ToolpathBuilder
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+AXES = "XYZABC"
+MM_PER_INCH = 25.4
+MESSAGE = "MSG,"
+RAPID, LINEAR, CLOCKWISE, COUNTER_CLOCKWISE = 0.0, 1.0, 2.0, 3.0
+
+
+def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
+    """Return what a program commands.
+
+    Args:
+        text: the program.
+        file: for messages, and the name of the toolpath.
+        start: pose before the program, shape (6,) [mm, deg]; None where unknown.
+
+    Raises:
+        InputError: faults with line and column; all unreadable words at once, or the first block that makes no sense.
+    """
+    faults: list[Problem] = []
+    program = blocks(text, file, faults)
+    if faults:
+        raise InputError(faults)
+    interpreter = _Interpreter(ToolpathBuilder(file, start), start)
+    try:
+        for block in program:
+            interpreter.run(block)
+    except BadLine as fault:
+        raise InputError([fault.problem]) from None
+    path = interpreter.path.built()
+    if not path.is_move.any():
+        raise InputError([Problem(file, 0, 0, "this program moves nothing", "check that it is the file you mean")])
+    return path
+
+
+class _Interpreter:
+    """Modal state; begins as LinuxCNC does, with millimetres where the program does not say."""
+
+    def __init__(self, path: ToolpathBuilder, start: NDArray[np.float64] | None) -> None:
+        self.path = path
+        self._pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64)
+        self._moved = False
+        self._motion: float | None = None
+        self._feed_mm_min = 0.0
+        self._unit_mm = 1.0
+        self._absolute = True
+        self._absolute_centres = False
+
+    def run(self, block: Block) -> None:
+        """Execute one block in the order that RS274/NGC gives [RS274/NGC 3.8]."""
+        for comment in block.comments:
+            if comment:
+                self.path.say(Step.COMMENT, comment, line=block.place.line)
+        self._units(block)
+        self._feed(block)
+        self._functions(block)
+        if Group.DWELL in block.codes:
+            self.path.dwell(self._dwell_s(block), line=block.place.line)
+        self._modes(block)
+        self._move(block)
+        if block.code(Group.STOP) in {0.0, 1.0}:
+            self._pause(block)
+        self._nothing_left(block)
+
+    def _units(self, block: Block) -> None:
+        units = block.code(Group.UNITS)
+        if units is None:
+            return
+        unit_mm = MM_PER_INCH if units == 20.0 else 1.0  # noqa: PLR2004
+        if unit_mm != self._unit_mm and "F" in block.words:
+            # LinuxCNC sets the feed before it changes units, so F would still count in the old ones.
+            column, code = block.words["F"].column, name("G", units)
+            what = f"F in the line of {code} counts in the units before it on some controls and after it on others"
+            raise block.place.fault(column, what, f"write {code} in a line before")
+        self._unit_mm = unit_mm
+
+    def _feed(self, block: Block) -> None:
+        word = block.words.pop("F", None)
+        if word is not None:
+            if word.value < 0.0:
+                raise block.place.fault(word.column, f"the feed is negative (F{word.value:g})", "give a positive feed")
+            self._feed_mm_min = word.value * self._unit_mm
+
+    def _functions(self, block: Block) -> None:
+        said = [block.words.pop("S", None), block.codes.get(Group.SPINDLE), block.codes.get(Group.COOLANT)]
+        text = " ".join(name(word.letter, word.value) for word in said if word is not None)
+        if text:
+            self.path.say(Step.FUNCTION, text, line=block.place.line)
+
+    def _dwell_s(self, block: Block) -> float:
+        word = block.words.pop("P", None)
+        if word is None or word.value < 0.0:
+            column = block.codes[Group.DWELL].column
+            raise block.place.fault(column, "G4 needs the seconds to wait", "write G4 P0.5 for half a second")
+        return word.value
+
+    def _modes(self, block: Block) -> None:
+        distance, centres = block.code(Group.DISTANCE), block.code(Group.ARC_DISTANCE)
+        if distance is not None:
+            self._absolute = distance == 90.0  # noqa: PLR2004
+        if centres is not None:
+            self._absolute_centres = centres == 90.1  # noqa: PLR2004
+        if Group.CYCLE in block.codes:
+            self._motion = None
+        if Group.PATH in block.codes:
+            self._path_control(block)
+
+    def _path_control(self, block: Block) -> None:
+        word = block.codes[Group.PATH]
+        corner = 0.0
+        if word.value == 64.0:  # noqa: PLR2004
+            allowed, _ = block.words.pop("P", None), block.words.pop("Q", None)
+            # LinuxCNC takes P0 for no bound, as if P were not there.
+            corner = allowed.value * self._unit_mm if allowed is not None and allowed.value > 0.0 else math.inf
+        if self._moved and corner != self.path.corner_mm:
+            what = f"{name('G', word.value)} changes how corners are rounded on the way"
+            raise block.place.fault(word.column, what, "set path control once, before the first move")
+        self.path.corner_mm = corner
+
+    def _move(self, block: Block) -> None:
+        motion = block.code(Group.MOTION)
+        if motion is not None:
+            self._motion = motion
+        named = [letter for letter in AXES if letter in block.words]
+        if not named:
+            return
+        if self._motion is None:
+            word = block.words[named[0]]
+            raise block.place.fault(word.column, f"{word.letter} without a motion code", "write G0 or G1 before it")
+        machine = block.codes.get(Group.MACHINE)
+        if machine is not None and self._motion not in {RAPID, LINEAR}:
+            raise block.place.fault(machine.column, "G53 goes with G0 and G1 only", "remove it")
+        target = self._target(block)
+        if self._motion == RAPID:
+            self.path.rapid(target, line=block.place.line)
+        else:
+            column = block.words[named[0]].column
+            if self._feed_mm_min <= 0.0:
+                raise block.place.fault(column, f"{name('G', self._motion)} without a feed", "give F before or in it")
+            poses = target[None] if self._motion == LINEAR else self._arc(block, target).poses()
+            self.path.feed(poses, self._feed_mm_min, line=block.place.line)
+        for letter in named:
+            del block.words[letter]
+        self._pose, self._moved = target, True
+
+    def _target(self, block: Block) -> NDArray[np.float64]:
+        """Pose that a block leads to, shape (6,)."""
+        target = self._pose.copy()
+        absolute = self._absolute or Group.MACHINE in block.codes
+        for axis, letter in enumerate(AXES):
+            word = block.words.get(letter)
+            if word is not None:
+                value = word.value * (self._unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
+                target[axis] = value if absolute else target[axis] + value
+        unknown = [letter for letter, value in zip(AXES, target, strict=True) if np.isnan(value)]
+        if unknown:
+            what = f"nobody knows where {', '.join(unknown)} stand{'s' if len(unknown) == 1 else ''} before this move"
+            remedy = "name all six axes in the first move, absolutely (G90), or say where the machine stands"
+            raise block.place.fault(min(word.column for word in block.words.values()), what, remedy)
+        return target
+
+    def _arc(self, block: Block, target: NDArray[np.float64]) -> Arc:
+        clockwise = self._motion == CLOCKWISE
+        word = block.words.get("X", block.words.get("Y", block.words.get("Z")))
+        column = min(other.column for other in block.words.values()) if word is None else word.column
+        radius = block.words.pop("R", None)
+        offsets = [block.words.pop(letter, None) for letter in "IJ"]
+        turns = self._turns(block)
+        if radius is not None:
+            if any(offsets):
+                raise block.place.fault(radius.column, "an arc has R, or I and J, not both", "remove one")
+            by_radius = centre_by_radius(self._pose, target, radius.value * self._unit_mm, clockwise=clockwise)
+            if by_radius is None:
+                what = f"no arc of R{radius.value:g} leads from the point before to this one"
+                raise block.place.fault(radius.column, what, "check R, or write a full turn with I and J")
+            return Arc(self._pose, target, by_radius, clockwise=clockwise, turns=turns)
+        if not any(offsets):
+            raise block.place.fault(column, f"{name('G', self._motion or 0.0)} needs I and J, or R", "give the centre")
+        centre = np.array([0.0 if word is None else word.value * self._unit_mm for word in offsets])
+        if not self._absolute_centres:
+            centre += self._pose[:2]
+        elif not all(offsets):
+            raise block.place.fault(column, "G90.1 needs both I and J", "give both, or G91.1")
+        arc = Arc(self._pose, target, (float(centre[0]), float(centre[1])), clockwise=clockwise, turns=turns)
+        if not arc.is_round():
+            first, last = arc.radii_mm()
+            what = f"start and end of the arc lie {first:.4f} and {last:.4f} mm from its centre"
+            raise block.place.fault(column, what, "check end point and centre")
+        return arc
+
+    def _turns(self, block: Block) -> int:
+        word = block.words.pop("P", None)
+        if word is None:
+            return 1
+        if word.value < 1.0 or word.value != int(word.value):
+            raise block.place.fault(word.column, f"P{word.value:g} is no number of turns", "give a whole number from 1")
+        return int(word.value)
+
+    def _pause(self, block: Block) -> None:
+        text = ""
+        if self.path.last_text.startswith(MESSAGE):
+            text = self.path.taken_back().removeprefix(MESSAGE).strip()
+        self.path.say(Step.PAUSE, text, line=block.place.line)
+
+    def _nothing_left(self, block: Block) -> None:
+        """Refuse words that nothing in the block has used: a control would stop there, or do something else."""
+        for letter, word in block.words.items():
+            if letter != "N":
+                what = f"nothing in this line uses {letter}{word.value:g}"
+                raise block.place.fault(word.column, what, "remove it, or give the code that it belongs to")

@@ -1,0 +1,102 @@
+"""Tokens of one line of RS274/NGC: words (a letter and a number) and comments, each with its column."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+# White space inside a number is legal: `X1 0` is X10 to LinuxCNC, and so it must be here.
+_TOKEN = re.compile(
+    r"""[ \t]*(?:
+        (?P<letter>[A-Za-z])[ \t]*(?P<number>[+-]?[ \t]*(?:\d[\d \t]*(?:\.[\d \t]*)?|\.[ \t]*\d[\d \t]*))
+      | \((?P<comment>[^()]*)\)
+      | ;(?P<rest>.*)
+      | (?P<end>$)
+    )""",
+    re.VERBOSE,
+)
+
+_NOT_READ = {
+    "#": ("a parameter (#) is not read", "write its value"),
+    "[": ("an expression ([ ]) is not read", "write its value"),
+    "/": ("a line that can be skipped (/) is not read", "decide: remove the line, or the slash"),
+    "(": ("a comment without its end, or inside another", "close it with ) before the line ends"),
+    "%": ("% stands alone on the first and the last line", "remove it"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A letter, in capitals, with its number.
+
+    Attributes:
+        letter: A to Z.
+        value: the number.
+        column: of the letter, counted from 1.
+    """
+
+    letter: str
+    value: float
+    column: int
+
+
+class BadLine(Exception):  # noqa: N818 - never leaves this package
+    """One fault in one line, as a `Problem`."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        super().__init__(str(problem))
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A line of a program, for messages."""
+
+    file: str
+    line: int
+
+    def fault(self, column: int, what: str, remedy: str) -> BadLine:
+        """Return the exception that says what is wrong here."""
+        return BadLine(Problem(self.file, self.line, column, what, remedy))
+
+
+def tokens(text: str, place: Place) -> Iterator[Word | str]:
+    """Words and comments of a line, in order; comments as plain text.
+
+    Raises:
+        BadLine: something that is neither.
+    """
+    position = 0
+    while True:
+        match = _TOKEN.match(text, position)
+        if match is None:
+            raise _unreadable(text, position, place)
+        position = match.end()
+        if match["letter"]:
+            number = match["number"].replace(" ", "").replace("\t", "")
+            yield Word(match["letter"].upper(), float(number), match.start("letter") + 1)
+        elif match["end"] is not None:
+            return
+        else:
+            comment = match["comment"] if match["comment"] is not None else match["rest"]
+            yield comment.strip()
+
+
+def _unreadable(text: str, position: int, place: Place) -> BadLine:
+    while text[position] in " \t":
+        position += 1
+    letter = text[position]
+    following = text[position + 1 :].lstrip()[:1]
+    if letter.isascii() and letter.isalpha():
+        if following in {"#", "["}:
+            return place.fault(position + 1, *_NOT_READ[following])
+        what = f"the letter {letter.upper()} has no number"
+        return place.fault(position + 1, what, f"write a number after {letter.upper()}, or remove it")
+    what, remedy = _NOT_READ.get(letter, (f"{letter!r} does not belong in a program", "remove it"))
+    return place.fault(position + 1, what, remedy)

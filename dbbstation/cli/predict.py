@@ -1,0 +1,62 @@
+"""`dbbstation predict`: actual poses for commanded ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
+@click.option("--poses", required=True, type=click.Path(path_type=Path), help="CSV of commanded poses.")
+@click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="CSV of actual poses.")
+@click.option("--force", is_flag=True, help="Overwrite the output file.")
+@click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON.")
+def predict(*, model: Path, poses: Path, out: Path, force: bool, as_json: bool) -> None:
+    r"""Say where the tool really goes for commanded poses, and how well that is known.
+
+    Columns in: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Out: the same, actual, with u_x_mm,u_y_mm,u_z_mm, one standard
+    uncertainty each. Further columns are carried over. Directions that the calibration could not see are not part
+    of the uncertainty; they are named.
+
+    \b
+    Examples:
+      dbbstation predict --model model.yaml --poses commanded.csv --out actual.csv
+    """
+    import numpy as np
+
+    from dbbstation.cli.output import print_json, say
+    from dbbstation.files.atomic import refuse_existing
+    from dbbstation.files.models import read_model
+    from dbbstation.files.pose_table import read_poses, write_poses
+    from dbbstation.machine.travel import check_travel
+    from dbbstation.model.uncertainty import position_uncertainty_mm
+    from dbbstation.sources.contract import Motion
+    from dbbstation.sources.registry import known_sources
+
+    refuse_existing(out, force=force)
+    identified = read_model(model, known_sources())
+    table = read_poses(poses)
+    check_travel(identified.model.machine, table.poses, where=str(poses))
+    motion = Motion(table.poses)
+    actual = identified.model.of_the_machine().actual_poses(motion)
+    uncertainty_mm = position_uncertainty_mm(identified, motion)
+    write_poses(out, actual, uncertainty_mm, table.others, force=force)
+    error_um = 1e3 * np.linalg.norm(actual[:, :3] - table.poses[:, :3], axis=1)
+    worst_u_um = 1e3 * float(np.linalg.norm(uncertainty_mm, axis=1).max())
+    if as_json:
+        print_json(
+            {
+                "file": str(out),
+                "poses": len(actual),
+                "greatest_error_um": float(error_um.max()),
+                "greatest_uncertainty_um": worst_u_um,
+                "directions_lost": list(identified.directions_lost),
+            }
+        )
+        return
+    say(f"{len(actual)} poses written to {out}")
+    say(f"greatest position error {error_um.max():.1f} µm, known to {worst_u_um:.1f} µm (one standard deviation)")
+    for text in identified.directions_lost:
+        say(f"not known, and not in the uncertainty: {text}")

@@ -1,0 +1,56 @@
+"""`dbbstation simulate`: noise-free recordings of a plan, as a model predicts them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
+@click.option("--plan", required=True, type=click.Path(path_type=Path), help="Test plan.")
+@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder to make.")
+@click.option("--samples", default=720, show_default=True, type=click.IntRange(36), help="Samples per turn.")
+@click.option("--interval-s", default=200.0, show_default=True, help="Time from the start of one run to the next [s].")
+def simulate(*, model: Path, plan: Path, out: Path, samples: int, interval_s: float) -> None:
+    r"""Write the session that a ball bar would record on the machine of a model, without noise.
+
+    Balls stand where the plan has them; only the machine's own error sources act. Rows carry their angles, lengths
+    are written to 1 nm.
+
+    \b
+    Examples:
+      dbbstation simulate --model model.yaml --plan table2.yaml --out predicted
+      dbbstation evaluate predicted --model other-model.yaml
+    """
+    from datetime import UTC, datetime, timedelta
+
+    from dbbstation.calibration.observability import setup_of
+    from dbbstation.cli.output import say
+    from dbbstation.errors import OutputError
+    from dbbstation.files.models import read_model
+    from dbbstation.files.plan_file import read_inline_plan
+    from dbbstation.files.session_writer import FinishedRun, write_session
+    from dbbstation.model.simulation import simulate_circle
+    from dbbstation.sources.registry import known_sources
+
+    if out.exists():
+        raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
+    identified = read_model(model, known_sources())
+    machine_model = identified.model.of_the_machine()
+    inline = read_inline_plan(plan)
+    tests = inline.to_domain()
+    tests.check(machine_model.machine)
+    begun = datetime(2000, 1, 1, tzinfo=UTC)  # a date that nobody takes for a measurement's
+    order = [(test, 1) for test in tests.tests.values()] + [(tests.tests[name], 2) for name in tests.repeat_at_end]
+    runs: list[FinishedRun] = []
+    for mounting, (test, repeat) in enumerate(order, start=1):
+        for direction in test.directions:
+            started_s = len(runs) * interval_s
+            turn = simulate_circle(machine_model, test.run(direction), setup_of(test), samples, started_s)
+            columns = {"t_s": turn.t_s, "length_mm": turn.length_mm, "theta_deg": turn.theta_deg}
+            started = begun + timedelta(seconds=started_s)
+            runs.append(FinishedRun(test.name, direction, columns, repeat, mounting, started))
+    write_session(out, machine_model.machine, inline, runs)
+    say(f"{len(runs)} runs written to {out}")

@@ -1,0 +1,64 @@
+"""What a model predicts that a bar would record: whole turns without noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.model.observation import LEAD_IN_STEP_DEG
+from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.sources.contract import Motion
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.plan.circle import Circle
+    from dbbstation.sources.contract import Setup
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedCircle:
+    """One turn, shapes (n,).
+
+    Attributes:
+        t_s: time since the first sample [s].
+        theta_deg: angle from +X towards +Y [deg].
+        length_mm: predicted reading [mm].
+    """
+
+    t_s: NDArray[np.float64]
+    theta_deg: NDArray[np.float64]
+    length_mm: NDArray[np.float64]
+
+
+def simulate_circle(
+    model: MachineModel, circle: Circle, setup: Setup, samples: int, started_s: float | None = None
+) -> SimulatedCircle:
+    """Predict the reading along one turn, with the overshoot arc before it as history.
+
+    Args:
+        model: machine and measurement effects.
+        circle: as commanded.
+        setup: ball and bar.
+        samples: equally spaced over the turn.
+        started_s: start of the turn after that of the session [s]; None where the model needs no time.
+
+    Raises:
+        KinematicsError: a pose that the machine cannot take.
+        ModelError: a source needs temperatures or currents, which a simulation does not have.
+    """
+    lead_in = np.arange(-circle.overshoot_deg, 0.0, LEAD_IN_STEP_DEG)
+    turn = np.linspace(0.0, FULL_TURN_DEG, samples, endpoint=False, dtype=np.float64)
+    phi = np.concatenate([lead_in, turn])
+    motion = Motion(
+        poses=circle.poses(circle.theta_deg(phi)),
+        is_path=True,
+        kept=slice(len(lead_in), None),
+        time_s=None if started_s is None else started_s + phi / circle.turning_deg_s,
+        setup=setup,
+    )
+    theta = np.mod(circle.theta_deg(turn), FULL_TURN_DEG)
+    return SimulatedCircle(turn / circle.turning_deg_s, theta, model.bar(motion).length_mm)

@@ -1,0 +1,119 @@
+"""Recorded sessions as observations: where files, traces and NC programs come together for calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.files.session import RunEntry, RunState, SessionFolder, read_session
+from dbbstation.model.observation import Observation
+from dbbstation.nc.commanded import commanded_poses
+from dbbstation.trace.cut import cut
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.trace.circle import RawCircle
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Accepted runs of one or more sessions of one machine.
+
+    Attributes:
+        machine: nominal machine, the same in all sessions.
+        observations: accepted runs in the order they were recorded.
+        sessions: SHA-256 of each session file by session name.
+        warnings: what was found that does not spoil anything, and runs left out.
+    """
+
+    machine: Machine
+    observations: tuple[Observation, ...]
+    sessions: Mapping[str, str]
+    warnings: tuple[str, ...]
+
+
+def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorded:
+    """Read sessions, cut their accepted runs to circles and attach what was commanded.
+
+    Args:
+        paths: session folders or session files.
+        exclude: names of tests to leave out.
+
+    Raises:
+        InputError: every fault of every file and trace; sessions of different machines; no accepted run; an
+            excluded test that no session has.
+    """
+    sessions = _unique_names([read_session(path) for path in paths])
+    _check_one_machine(sessions)
+    _check_excluded(sessions, exclude)
+    observations: list[Observation] = []
+    warnings: list[str] = []
+    problems: list[Problem] = []
+    for session in sessions:
+        wanted = [run for run in session.in_state(RunState.ACCEPTED) if run.test not in exclude]
+        unjudged = session.in_state(RunState.COMPLETE, RunState.RECORDING)
+        warnings += [f"{session.name}: run {run.label} is {run.state}, not accepted: left out" for run in unjudged]
+        for run, read in zip(wanted, session.load_all(wanted), strict=True):
+            warnings += [str(warning) for warning in read.warnings]
+            try:
+                raw = cut(replace(read.recording, name=str(run.path)), session.circle(run))
+                observations.append(_observation(session, run, raw))
+            except StationError as error:
+                problems.append(Problem(str(run.path), 0, 0, error.what, error.remedy))
+    if problems:
+        raise InputError(problems)
+    if not observations:
+        places = ", ".join(str(session.folder) for session in sessions)
+        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
+    hashes = {session.name: session.sha256 for session in sessions}
+    return Recorded(sessions[0].machine, tuple(observations), hashes, tuple(warnings))
+
+
+def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Observation:
+    observation = Observation(run.test, run.repeat, raw, session.setup(run), session.started_s(run))
+    if run.program is None:
+        return observation
+    text = run.program.path.read_text(encoding="utf-8")
+    return replace(observation, commanded=commanded_poses(text, str(run.program.path), observation))
+
+
+def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:
+    """Number sessions whose folders have one name, so that their mountings are not taken for the same."""
+    names = [session.name for session in sessions]
+    return [
+        replace(session, name=f"{session.name} ({names[: k + 1].count(session.name)})")
+        if names.count(session.name) > 1
+        else session
+        for k, session in enumerate(sessions)
+    ]
+
+
+def _check_one_machine(sessions: Sequence[SessionFolder]) -> None:
+    first = sessions[0]
+    for other in sessions[1:]:
+        a, b = first.machine, other.machine
+        same = (
+            np.array_equal(a.hexapod.base_joints_mm, b.hexapod.base_joints_mm)
+            and np.array_equal(a.hexapod.platform_joints_mm, b.hexapod.platform_joints_mm)
+            and a.hexapod.rotation == b.hexapod.rotation
+            and np.array_equal(a.reference_length_error_mm, b.reference_length_error_mm)
+        )
+        if not same:
+            what = f"its nominal machine ({b.name}) is not that of {first.folder} ({a.name})"
+            remedy = "fit sessions together only where the control had the same joints and reference lengths"
+            raise InputError([Problem(str(other.folder), 0, 0, what, remedy)])
+
+
+def _check_excluded(sessions: Sequence[SessionFolder], exclude: Sequence[str]) -> None:
+    tests = {test for session in sessions for test in session.plan.tests}
+    unknown = [name for name in exclude if name not in tests]
+    if unknown:
+        what = f"no session has a test {', '.join(unknown)} to exclude"
+        known = f"tests are {', '.join(sorted(tests))}"
+        raise InputError([Problem(str(sessions[0].folder), 0, 0, what, known)])

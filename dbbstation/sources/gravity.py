@@ -5,24 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import Compliance
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import platform_weight, stretch_mm, strut_tensions
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.weights import MM_PER_N, platform_masses, strut_compliance
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dbbstation.machine.geometry import Machine, Masses
-
-USUAL_UM_KN = 10.0
-"""Compliance of a strut of 1000 mm where the machine file states none: that of the PM-600's kind of machine [µm/kN]."""
-
-MM_PER_N = 1e-6
-"""One µm/kN in mm/N."""
+    from dbbstation.machine.geometry import Machine
 
 
 class Gravity(LinearSource):
@@ -58,7 +51,7 @@ class Gravity(LinearSource):
             ModelError: the machine file has no masses.
         """
         platform_masses(self.name, machine)
-        usual = _design(machine).at_1000mm_mm_per_n / MM_PER_N
+        usual = strut_compliance(machine).at_1000mm_mm_per_n / MM_PER_N
         meaning = "elongation of a strut of 1000 mm per force that pulls it, positive"
         return (Parameter("strut_compliance_um_kn", "µm/kN", usual, meaning),)
 
@@ -73,26 +66,5 @@ class Gravity(LinearSource):
         frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
         struts = inverse(machine.hexapod, frames)
         tension = strut_tensions(struts, platform_weight(frames, masses))
-        unit = replace(_design(machine), at_1000mm_mm_per_n=MM_PER_N)
+        unit = replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N)
         return Effect(strut_mm=stretch_mm(struts, unit, tension)[:, :, None])
-
-
-def _design(machine: Machine) -> Compliance:
-    """Compliance of the struts as the machine file states it, else the usual one."""
-    return machine.compliance or Compliance(at_1000mm_mm_per_n=USUAL_UM_KN * MM_PER_N)
-
-
-def platform_masses(source: str, machine: Machine) -> Masses:
-    """Masses of the platform.
-
-    Raises:
-        ModelError: the machine file has none; names the source and the key.
-    """
-    if machine.masses is None:
-        raise ModelError(
-            f"the error source {source} needs the platform's mass and centre of gravity, and the machine "
-            f"{machine.name!r} has no `masses`",
-            remedy="add `masses: {platform_kg: ..., centre_of_gravity_above_tip_mm: ...}` to the machine file, "
-            "or leave this source out",
-        )
-    return machine.masses

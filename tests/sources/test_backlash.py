@@ -13,6 +13,7 @@ from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.backlash import Backlash, follow
 from dbbstation.sources.contract import Fitted
+from dbbstation.sources.strut_reference_length import StrutReferenceLength
 from tests.sources.runs import concealed_share, jig_runs, random_run, run
 
 BACKLASH = Backlash()
@@ -87,7 +88,7 @@ def test_the_two_directions_differ_by_the_play(reference):
     speed = np.gradient(strut_travel(reference, there), axis=0)[there.kept]
     far = (np.abs(speed) > 0.15).all(axis=1)
     # Away from reversals every strut is off by half its play, against its speed, which turns with the direction.
-    gain = nominal.bar(there).sensitivity.per_strut[there.kept]
+    gain = nominal.bar(there).by_parameters(StrutReferenceLength().derivative(there, reference, np.zeros(6)))
     expected = -0.003 * (gain * np.sign(speed)).sum(axis=1)
     assert far.mean() > 0.5
     assert np.allclose((ccw - cw)[far] / 2, expected[far], atol=2e-6)

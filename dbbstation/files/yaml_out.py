@@ -51,6 +51,8 @@ def _on_one_line(value: object, *, in_list: bool) -> bool:
     items = list(value.values() if isinstance(value, Mapping) else value)  # type: ignore[call-overload]
     if not items or (isinstance(value, Sequence) and not any(map(_is_container, items))):
         return True
+    if isinstance(value, Sequence) and any(isinstance(item, Mapping) for item in items):
+        return False
     if any(isinstance(item, Sequence) and any(map(_is_container, item)) for item in items if _is_container(item)):
         return False
     longest = _ONE_LINE_IN_LIST if in_list and isinstance(value, Mapping) else _ONE_LINE

@@ -43,12 +43,15 @@ class Approach:
     clear_mm: float = 20.0
 
 
+USUAL_APPROACH = Approach()
+
+
 def circle_toolpath(
     circle: Circle,
     name: str,
     *,
     step_deg: float = STEP_DEG,
-    approach: Approach | None = Approach(),
+    approach: Approach | None = USUAL_APPROACH,
 ) -> Toolpath:
     """Return the nominal path of a run.
 

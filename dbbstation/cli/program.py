@@ -1,0 +1,79 @@
+"""`dbbstation program`: NC programs of a plan's circles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+_FILE = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command()
+@click.option("--plan", "plan_file", type=_FILE, required=True, help="Test plan.")
+@click.option("--machine", "machine_file", type=_FILE, required=True, help="Machine file.")
+@click.option("--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language of the control.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
+@click.option("--model", "model_file", type=_FILE, help="Compensate with this calibrated model.")
+@click.option("--test", "tests", multiple=True, metavar="NAME", help="This test only; may be given more than once.")
+@click.option("--step-deg", type=click.FloatRange(0.01, 5.0), default=0.1, show_default=True, help="Point spacing.")
+@click.option("--clearance-mm", type=click.FloatRange(0.0), default=20.0, show_default=True, help="Height of rapids.")
+@click.option("--bar-stays-on", is_flag=True, help="Start and end with the bar on its balls: no rapids, no stops.")
+@click.option("--time-s", type=float, metavar="S", help="When programs start, for models whose sources need time.")
+@click.option("--force", is_flag=True, help="Overwrite programs.")
+@click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
+def program(
+    *,
+    plan_file: Path,
+    machine_file: Path,
+    dialect: str,
+    out: Path,
+    model_file: Path | None,
+    tests: tuple[str, ...],
+    step_deg: float,
+    clearance_mm: float,
+    bar_stays_on: bool,
+    time_s: float | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    r"""Write the NC programs of a plan's circles, one for each test and direction, nominal or compensated.
+
+    Every program is checked against the travel of axes, angles and struts before anything is written; all programs
+    are written or none. A program goes above its first point, comes down to it, waits for the bar to be put on, runs
+    the path of a run and waits for the bar to be taken off.
+
+    \b
+    Examples:
+      dbbstation program --plan table2.yaml --machine machine.yaml --out nominal
+      dbbstation program --plan table2.yaml --machine machine.yaml --model model.yaml --out compensated
+      dbbstation program --plan table2.yaml --machine machine.yaml --test a --test f --out two --json
+    """
+    from dbbstation.cli.output import say
+    from dbbstation.cli.programs import hashed, loaded_inverse, print_programs
+    from dbbstation.files.atomic import refuse_existing, write_folder
+    from dbbstation.files.machine_file import read_machine
+    from dbbstation.files.plan_file import read_plan
+    from dbbstation.nc.circle_program import Approach
+    from dbbstation.nc.export import circle_programs
+    from dbbstation.nc.registry import dialect_named
+
+    written_in = dialect_named(dialect)
+    plan, machine = read_plan(plan_file), read_machine(machine_file)
+    inverse = None if model_file is None else loaded_inverse(model_file, time_s)
+    programs = circle_programs(
+        plan,
+        machine,
+        written_in,
+        inverse=inverse,
+        origin={"plan file": hashed(plan_file), "machine file": hashed(machine_file)},
+        tests=tests,
+        step_deg=step_deg,
+        approach=None if bar_stays_on else Approach(clearance_mm),
+    )
+    for each in programs:
+        refuse_existing(out / each.name, force=force)
+    write_folder(out, {each.name: each.text for each in programs}, force=force)
+    print_programs([(out / each.name, each) for each in programs], written_in.name, model_file, as_json=as_json)
+    if not as_json:
+        say(f"{len(programs)} programs written to {out}, all within the machine's travel")

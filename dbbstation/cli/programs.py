@@ -1,0 +1,109 @@
+"""What `program` and `compensate` share: the model, the hashes, what is printed."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+
+from dbbstation.cli.output import print_json, print_table
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.models import read_model
+from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.nc.export import Inverse
+from dbbstation.sources.registry import known_sources
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.export import Program
+
+
+def loaded_inverse(model_file: Path, time_s: float | None) -> Inverse:
+    """Read the model to compensate with; the header will name it and its sessions by hash.
+
+    Raises:
+        InputError: every fault of the file with its place.
+    """
+    identified = read_model(model_file, known_sources())
+    origin = {"model file": hashed(model_file)}
+    origin |= {f"session {name}": f"sha256 {digest}" for name, digest in identified.sessions.items()}
+    return Inverse(identified.model, origin, time_s)
+
+
+def hashed(path: Path) -> str:
+    """Return a file's name and SHA-256, without its folder: the same file gives the same program anywhere.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    return f"{path.name}, sha256 {hashlib.sha256(_content(path)).hexdigest()}"
+
+
+def read_source(path: Path) -> str:
+    """Return the text of a program.
+
+    Raises:
+        InputError: it cannot be read, or is not UTF-8.
+    """
+    faults: list[Problem] = []
+    text = decode(_content(path), str(path), faults)
+    if text is None:
+        raise InputError(faults)
+    return text
+
+
+def parsed_pose(text: str) -> NDArray[np.float64]:
+    """Return the pose, shape (6,) [mm, deg], that `X,Y,Z,A,B,C` says."""
+    try:
+        pose = np.array([float(number) for number in text.split(",")])
+    except ValueError:
+        pose = np.empty(0)
+    if pose.shape != (6,) or not np.isfinite(pose).all():
+        raise click.BadParameter("six numbers with commas between them are needed", param_hint="--start")
+    return pose
+
+
+def print_programs(
+    written: Sequence[tuple[Path, Program]],
+    dialect: str,
+    model_file: Path | None,
+    *,
+    as_json: bool,
+) -> None:
+    """Print what was written, as a table or as JSON."""
+    if not as_json:
+        rows = [
+            [str(path), each.points, "" if each.greatest_um is None else each.greatest_um] for path, each in written
+        ]
+        print_table(["program", "points", "greatest correction / µm"], rows)
+        return
+    print_json(
+        {
+            "dialect": dialect,
+            "model_sha256": None if model_file is None else hashlib.sha256(_content(model_file)).hexdigest(),
+            "programs": [
+                {
+                    "file": str(path),
+                    "sha256": hashlib.sha256(each.text.encode()).hexdigest(),
+                    "points": each.points,
+                    "greatest_correction_um": each.greatest_um,
+                    "chord_error_um": each.chord_um,
+                }
+                for path, each in written
+            ],
+        }
+    )
+
+
+def _content(path: Path) -> bytes:
+    faults: list[Problem] = []
+    data = read_bytes(path, faults)
+    if data is None:
+        raise InputError(faults)
+    return data

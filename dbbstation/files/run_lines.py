@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import binascii
 import difflib
 import math
 import re
@@ -17,6 +16,10 @@ from dbbstation.files.source_text import decode
 
 _COMMA, _NEWLINE = ord(","), ord("\n")
 _CRC_LENGTH = 8
+_NO_DIGIT = 255
+_HEX_DIGIT = np.full(256, _NO_DIGIT, dtype=np.int64)
+_HEX_DIGIT[np.frombuffer(b"0123456789abcdef", dtype=np.uint8)] = np.arange(16)
+_HEX_PLACES = 16 ** np.arange(_CRC_LENGTH - 1, -1, -1, dtype=np.int64)
 _CRC_TEXT = re.compile(rb"[0-9a-f]{8}")
 _NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 _KNOWN = (*columns.COLUMNS, *columns.TEXTS)
@@ -72,14 +75,16 @@ class Lines:
         """Whether any row's checksum does not match it."""
         if columns.CRC not in self.columns:
             return False
-        try:
-            stated = binascii.unhexlify(b"".join([row[-_CRC_LENGTH:] for row in self.rows]))
-        except binascii.Error:
+        if min(map(len, self.rows), default=0) <= _CRC_LENGTH:
             return True
-        if len(stated) != 4 * len(self.rows) or any(row[-_CRC_LENGTH - 1 : -_CRC_LENGTH] != b"," for row in self.rows):
+        text = np.frombuffer(b"\n".join(self.rows) + b"\n", dtype=np.uint8)
+        ends = np.flatnonzero(text == _NEWLINE)
+        digits = _HEX_DIGIT[text[ends[:, None] - np.arange(_CRC_LENGTH, 0, -1)]]
+        if (text[ends - _CRC_LENGTH - 1] != _COMMA).any() or (digits == _NO_DIGIT).any():
             return True
-        found = np.array([zlib.crc32(row[: -_CRC_LENGTH - 1]) for row in self.rows], dtype=np.uint32)
-        return bool((found != np.frombuffer(stated, dtype=">u4")).any())
+        bodies = [row[: -_CRC_LENGTH - 1] for row in self.rows]
+        found = np.fromiter(map(zlib.crc32, bodies), dtype=np.int64, count=len(bodies))
+        return bool((found != digits @ _HEX_PLACES).any())
 
 
 def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:

@@ -142,7 +142,6 @@ JointMm = Annotated[Point, AfterValidator(Reach(Quantity("mm", 20, 20_000)))]
 """A joint's centre: x, y, z [mm]."""
 TemperatureDegc = Annotated[float, Quantity("degC", -30, 80)]
 ExpansionUmMK = Annotated[float, Quantity("µm/(m K)", 0.01, 50, or_zero=True)]
-Sha256 = str
 
 
 def twice(values: Iterable[Any]) -> list[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,7 @@ from dbbstation.sources.registry import sources_named
 from dbbstation.trace.circle import RawCircle
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -36,7 +36,8 @@ FEWEST_TESTS = 3
 """Fewer circles leave more directions open than they close."""
 
 MOST_STEPS = 20
-CONVERGED_MM = 1e-7
+CONVERGED = 1e-6
+"""Share of the columns' plausible sizes by which the last step may still move: a fifth of a nanometre on joints."""
 FIRST_NOISE_MM = 1e-3
 
 
@@ -46,7 +47,8 @@ class Calibration:
 
     Attributes:
         layout: its columns.
-        solution: values, covariance, directions and what was held, of all columns.
+        x: values of all columns, shape (k,).
+        solution: covariance, directions and what was held, of all columns.
         noise: of one bar reading.
         observations: the runs that went in.
         machine_residual_mm: per run, what the machine's own sources leave [mm].
@@ -55,6 +57,7 @@ class Calibration:
     """
 
     layout: Layout
+    x: NDArray[np.float64]
     solution: Solution
     noise: Noise
     observations: tuple[Observation, ...]
@@ -65,7 +68,7 @@ class Calibration:
     @property
     def model(self) -> MachineModel:
         """Machine model with everything that was fitted."""
-        return self.layout.model(self.solution.x)
+        return self.layout.model(self.x)
 
     @property
     def parameters_identified(self) -> int:
@@ -82,6 +85,7 @@ def calibrate(
     machine: Machine,
     observations: Sequence[Observation],
     sources: Sequence[ErrorSource] | None = None,
+    start: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> Calibration:
     """Fit error sources to raw circles.
 
@@ -93,6 +97,8 @@ def calibrate(
         machine: nominal machine.
         observations: raw runs; all share that machine.
         sources: what to fit; the default sources if None.
+        start: values near the answer by source name, for sources with parameters of shape, which a fit that starts
+            at zero amplitude cannot see.
 
     Raises:
         CalibrationError: centred circles, too few tests, or no convergence.
@@ -101,27 +107,31 @@ def calibrate(
     _check_raw(observations)
     _check_enough(observations)
     layout = lay_out(machine, default_sources() if sources is None else sources, observations)
-    x = np.zeros(len(layout.known.prior))
+    if start:
+        layout = _near(layout, start)
+    x = _start_values(layout, start or {})
     noise = Noise(FIRST_NOISE_MM, 1.0)
     nominal, _ = linearise(layout, observations, x)
     blocks = nominal
     for _ in range(MOST_STEPS):
         held = lost_directions(nominal, layout.known, noise.effective)
         solution, noise = _settled(blocks, layout, noise, held)
-        change = float(np.abs(solution.x - x).max(initial=0.0))
-        x = solution.x
+        update = layout.nominal + solution.x
+        change = float(np.abs((update - x) / layout.known.scale).max(initial=0.0))
+        x = update
         blocks, readings = linearise(layout, observations, x)
-        if change < CONVERGED_MM:
+        if change < CONVERGED:
             break
         left = [o.raw.length_mm - reading.length_mm for o, reading in zip(observations, readings, strict=True)]
         noise = noise_of(left, solution.freedom_used)
     else:
         raise CalibrationError(
-            f"the fit still moves by {1e3 * change:.3g} µm after {MOST_STEPS} steps",
+            f"the fit still moves by {change:.2g} of its parameters' usual sizes after {MOST_STEPS} steps",
             remedy="check that machine, plan and recordings belong together; leave out doubtful tests with --exclude",
         )
     return Calibration(
         layout=layout,
+        x=x,
         solution=solution,
         noise=noise,
         observations=tuple(observations),
@@ -131,10 +141,28 @@ def calibrate(
     )
 
 
+def _near(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> Layout:
+    """Layout whose parameters of shape are nominally those of the start."""
+    nominal = layout.nominal.copy()
+    for term in layout.terms:
+        for k, parameter in enumerate(term.parameters):
+            if parameter.shape and term.source.name in start:
+                nominal[term.columns.start + k] = start[term.source.name][k]
+    return replace(layout, nominal=nominal)
+
+
+def _start_values(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    x = layout.nominal.copy()
+    for term in layout.terms:
+        if term.source.name in start:
+            x[term.columns] = start[term.source.name]
+    return x
+
+
 def linearise(
     layout: Layout, observations: Sequence[Observation], x: NDArray[np.float64]
 ) -> tuple[list[Block], list[BarReading]]:
-    """Compress every run about the values x, shape (k,), so that a solution of the blocks is again a whole x."""
+    """Compress every run about the values x, shape (k,), so that a solution of the blocks is x less its nominal."""
     model = layout.model(x)
     blocks, readings = [], []
     for observation in observations:
@@ -146,7 +174,7 @@ def linearise(
             + [reading.by_parameters(term.source.derivative(motion, layout.machine, x[term.columns])) for term in terms]
         )
         columns = np.concatenate([np.r_[term.columns] for term in terms])
-        target = observation.raw.length_mm - reading.length_mm + jacobian @ x[columns]
+        target = observation.raw.length_mm - reading.length_mm + jacobian @ (x - layout.nominal)[columns]
         blocks.append(compress(columns, jacobian, target))
         readings.append(reading)
     return blocks, readings

@@ -44,11 +44,20 @@ class Term:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Terms of a fit and what is known of their columns beforehand."""
+    """Terms of a fit and what is known of their columns beforehand.
+
+    Attributes:
+        machine: nominal machine.
+        terms: sets of parameters in the order of the columns.
+        known: priors and scales; priors are about `nominal`.
+        nominal: values that columns keep where nothing is seen of them, shape (k,): zero for amplitudes, a usual
+            value for shape parameters such as time constants.
+    """
 
     machine: Machine
     terms: tuple[Term, ...]
     known: Columns
+    nominal: NDArray[np.float64]
 
     @property
     def names(self) -> tuple[tuple[str, str, str], ...]:
@@ -66,15 +75,16 @@ class Layout:
 def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequence[Observation]) -> Layout:
     """Give every source the sets that the observations need.
 
-    A set whose size is stated becomes a random effect; one whose stated size is zero does not exist.
+    A set whose size is stated becomes a random effect; one whose stated size is zero does not exist. Parameters of
+    shape, which say nothing while their amplitude is zero, have their plausible size as prior about a usual value.
 
     Raises:
         ModelError: a source needs what machine file or recordings lack.
     """
     terms: list[Term] = []
-    prior: list[NDArray[np.float64]] = []
+    prior: list[float] = []
+    random: list[bool] = []
     motions = [observation.motion() for observation in observations]
-    count = 0
     for source in sources:
         parameters = source.parameters(machine)
         for shared, motion in {source.shared_by(motion): motion for motion in motions}.items():
@@ -82,9 +92,11 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
             stated = source.stated_mm(motion)
             if stated is not None and not np.any(stated > 0.0):
                 continue
-            terms.append(Term(source, shared, parameters, slice(count, count + len(parameters))))
-            prior.append(np.full(len(parameters), np.inf) if stated is None else stated)
-            count += len(parameters)
-    priors = np.concatenate(prior) if prior else np.zeros(0)
-    scale = np.array([p.plausible for term in terms for p in term.parameters])
-    return Layout(machine, tuple(terms), Columns(priors, scale, np.isfinite(priors)))
+            terms.append(Term(source, shared, parameters, slice(len(prior), len(prior) + len(parameters))))
+            sizes = [np.inf] * len(parameters) if stated is None else [float(size) for size in stated]
+            prior += [p.plausible if p.shape else size for p, size in zip(parameters, sizes, strict=True)]
+            random += [stated is not None] * len(parameters)
+    every = [p for term in terms for p in term.parameters]
+    scale = np.array([p.plausible for p in every])
+    nominal = np.array([p.shape[len(p.shape) // 2] if p.shape else 0.0 for p in every])
+    return Layout(machine, tuple(terms), Columns(np.array(prior), scale, np.array(random, dtype=bool)), nominal)

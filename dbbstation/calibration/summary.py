@@ -66,7 +66,7 @@ def _is_machines(term: Term) -> bool:
 
 
 def _term(calibration: Calibration, term: Term) -> dict[str, Any]:
-    values = calibration.solution.x[term.columns]
+    values = calibration.x[term.columns]
     sigma = np.sqrt(np.maximum(np.diag(calibration.solution.covariance)[term.columns], 0.0))
     parameters = {
         parameter.name: {"value": float(value), "uncertainty": float(u), "unit": parameter.unit}

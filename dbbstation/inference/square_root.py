@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+ROUNDING = 1e-9
+"""A column of which only its prior is known is exactly as uncertain as its scale: rounding must not lose it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Block:
     """All that one run says about its columns.
@@ -155,7 +159,7 @@ def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> ND
     random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
     root, _, _ = _stacked(blocks, known, noise, np.concatenate([random, fitted]))
     directions = directions_of(root[len(random) :, len(random) :] * known.scale[fitted])
-    return directions.vectors[directions.singular < 1.0]
+    return directions.vectors[directions.singular < 1.0 - ROUNDING]
 
 
 def directions_of(seen: NDArray[np.float64]) -> Directions:

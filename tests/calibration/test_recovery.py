@@ -57,7 +57,7 @@ def test_all_24_parameters_within_their_uncertainty(raised):
     truth, _, calibration = raised
     assert calibration.parameters_identified == 24
     assert calibration.directions_lost == ()
-    error = calibration.solution.x[:24] - true_parameters(truth)
+    error = calibration.x[:24] - true_parameters(truth)
     covariance = calibration.solution.covariance[:24, :24]
     # The sum of squares in units of the stated covariance is chi-square with 24 degrees of freedom.
     statistic = error @ np.linalg.solve(covariance, error)
@@ -97,10 +97,10 @@ def test_level_circles_lose_the_height_and_say_so(level):
     assert calibration.directions_lost == ("all six base joints together along Z",)
     height = np.zeros(24)
     height[8::3] = 1 / np.sqrt(6)
-    assert calibration.solution.x[:24] @ height == pytest.approx(0.0, abs=1e-9)
+    assert calibration.x[:24] @ height == pytest.approx(0.0, abs=1e-9)
     # Everything but the height is right within its uncertainty.
     visible = np.eye(24) - np.outer(height, height)
-    error = visible @ (calibration.solution.x[:24] - true_parameters(truth))
+    error = visible @ (calibration.x[:24] - true_parameters(truth))
     covariance = calibration.solution.covariance[:24, :24]
     statistic = error @ np.linalg.pinv(covariance, rcond=1e-9) @ error
     assert chi2.ppf(1e-4, 23) < statistic < chi2.ppf(1 - 1e-4, 23)
@@ -120,13 +120,13 @@ def test_without_noise_and_set_up_errors_the_fit_is_exact(tmp_path):
     recorded = load_sessions([tmp_path / "clean"])
     calibration = calibrate(recorded.machine, recorded.observations)
     # Recordings are rounded to 0.1 µm; that is all that may be left.
-    assert np.abs(calibration.solution.x[:24] - true_parameters(truth)).max() < 1e-3
+    assert np.abs(calibration.x[:24] - true_parameters(truth)).max() < 1e-3
 
 
 def test_mountings_and_balls_come_back_as_their_sum(level):
     """A ball mounted once cannot tell the mounting from the CMM; their sum is known to a micrometre or so."""
     truth, _, calibration = level
-    found = dict(zip(calibration.layout.names, calibration.solution.x, strict=True))
+    found = dict(zip(calibration.layout.names, calibration.x, strict=True))
     for mounting, (number, shift_um) in enumerate(truth.mounting_shift_um.items()):
         ball = truth.scene.plan.balls[mounting].name
         true_um = (shift_um + truth.ball_error_um[ball])[:2]

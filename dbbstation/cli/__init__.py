@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -17,13 +18,17 @@ if TYPE_CHECKING:
 DONE, FAILED, USAGE = 0, 1, 2
 """Exit codes."""
 
+_DEBUG = "--debug"
+
 COMMANDS = {
     "calibrate": "Fit the machine's errors to recorded sessions.",
     "check": "Validate files of any format, and whole sessions.",
     "compensate": "Compensate any NC program with a calibrated model.",
     "demo": "The whole job on a simulated machine, start to end.",
+    "emulate": "A virtual machine with a ball bar, on a line of its own.",
     "evaluate": "Circle by circle: what a model leaves of recordings.",
     "instruments": "Instruments that the program knows.",
+    "measure": "Measure a plan, test by test, into a session folder.",
     "monitor": "Live reading of an instrument.",
     "ports": "What is connected to this computer.",
     "predict": "Actual poses for commanded ones, under a model.",
@@ -47,6 +52,8 @@ class LazyGroup(click.Group):
             return None
         module = importlib.import_module(f"dbbstation.cli.{cmd_name}")
         command: click.Command = getattr(module, cmd_name)
+        # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.
+        command.help = (command.help or "").replace(r"\b", "\b")
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
@@ -57,7 +64,7 @@ class LazyGroup(click.Group):
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="dbbstation")
-@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+@click.option(_DEBUG, is_flag=True, help="Show the traceback of an error; may stand anywhere on the line.")
 def cli(*, debug: bool) -> None:
     """Measure a hexapod machine tool with a double ball bar, calibrate it, find what its model lacks.
 
@@ -71,18 +78,32 @@ def cli(*, debug: bool) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    debug = _DEBUG in given
+    # The option is the program's, but people put it where they notice that they need it: at the end.
+    given = [argument for argument in given if argument != _DEBUG]
     try:
-        code = cli.main(arguments, prog_name="dbbstation", standalone_mode=False)
+        code = cli.main(given, prog_name="dbbstation", standalone_mode=False)
+        sys.stdout.flush()
     except click.ClickException as problem:
         problem.show()
         sys.exit(problem.exit_code)
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted; what was written before stays", err=True)
         sys.exit(FAILED)
+    except BrokenPipeError:
+        # Whoever read the output has seen enough, as `| head` does; the interpreter must not flush into it again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(FAILED)
     except (StationError, OSError) as problem:
-        if "--debug" in arguments:
+        if debug:
             raise
         click.echo(str(problem), err=True)
+        sys.exit(FAILED)
+    except Exception as problem:
+        if debug:
+            raise
+        click.echo(f"{type(problem).__name__}: {problem}", err=True)
+        click.echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)

@@ -1,0 +1,65 @@
+"""Options that say what a session notes beside its runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbbstation.files.session import Bar
+    from dbbstation.files.session_writer import SessionDetails
+
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+_OPTIONS = (
+    click.option("--operator", default="", help="Who measures."),
+    click.option("--serial-number", default="", help="Of the machine."),
+    click.option("--ambient-temp-c", type=float, help="Temperature of the shop [degC]."),
+    click.option("--bar-serial-number", default="", help="Of the bar."),
+    click.option("--bar-length-mm", type=float, help="Calibrated distance between the ball centres [mm]."),
+    click.option("--bar-uncertainty-um", type=float, help="Of that length, one standard deviation [µm]."),
+    click.option("--bar-temp-c", type=float, help="Of the bar when it was calibrated [degC]."),
+)
+
+
+def session_options(function: _Function) -> _Function:
+    """Give a command these options; it takes them as keywords and passes them to `session_details`."""
+    for option in reversed(_OPTIONS):
+        function = option(function)
+    return function
+
+
+def session_details(
+    *,
+    operator: str,
+    serial_number: str,
+    ambient_temp_c: float | None,
+    bar_serial_number: str,
+    bar_length_mm: float | None,
+    bar_uncertainty_um: float | None,
+    bar_temp_c: float | None,
+) -> SessionDetails:
+    """Return what was told of machine, shop and bar.
+
+    Raises:
+        click.UsageError: length without uncertainty, or something of the bar without either.
+    """
+    from dbbstation.files.session_writer import SessionDetails
+
+    bar = _bar(bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c)
+    return SessionDetails(serial_number, operator, ambient_temp_c, bar)
+
+
+def _bar(serial_number: str, length_mm: float | None, uncertainty_um: float | None, temp_c: float | None) -> Bar | None:
+    from dbbstation.files.session import Bar
+
+    if length_mm is None and uncertainty_um is None:
+        if serial_number or temp_c is not None:
+            raise click.UsageError("a bar needs --bar-length-mm and --bar-uncertainty-um")
+        return None
+    if length_mm is None or uncertainty_um is None:
+        raise click.UsageError("--bar-length-mm and --bar-uncertainty-um belong together")
+    return Bar(serial_number, length_mm, uncertainty_um / 1e3, None, temp_c, None)

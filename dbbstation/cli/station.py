@@ -1,0 +1,201 @@
+"""`dbbstation station`: the terminal screen."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import tempfile
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dbbstation.cli.session_options import session_details, session_options
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.station.assembly import Job
+    from dbbstation.station.events import Observer
+    from dbbstation.tui.app import StationApp
+    from dbbstation.tui.runner import Opener, OpenStation
+
+_DEMO = {"plan": "protocols/plans/ten-minute-check.yaml", "machine": "fixtures/machines/reference.yaml"}
+_DEMO_INSTRUMENT = "streaming-encoder"
+_DEMO_SEED = 3
+
+
+@click.command()
+@click.option("--plan", "plan_file", type=click.Path(path_type=Path), help="What is measured.")
+@click.option("--machine", "machine_file", type=click.Path(path_type=Path), help="Nominal machine.")
+@click.option("--instrument", metavar="NAME", help="An instrument that is known, or a protocol file.")
+@click.option("--port", help="Port name, or a URL such as socket://127.0.0.1:4001.")
+@click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), help="Session folder; one that exists goes on."
+)
+@click.option("--virtual", is_flag=True, help="Without hardware: a virtual machine and instrument.")
+@click.option(
+    "--time-scale",
+    type=click.FloatRange(0.01, 50.0),
+    default=1.0,
+    show_default=True,
+    help="Times faster than real, with --virtual.",
+)
+@session_options
+def station(
+    *,
+    plan_file: Path | None,
+    machine_file: Path | None,
+    instrument: str | None,
+    port: str | None,
+    baud: int | None,
+    out: Path | None,
+    virtual: bool,
+    time_scale: float,
+    **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
+) -> int:
+    r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
+
+    Records what `dbbstation measure` records. Quitting loses nothing; the same command goes on where it stopped.
+
+    \b
+    Examples:
+      dbbstation station --virtual                     try it without hardware
+      dbbstation station --virtual --time-scale 10     the same, ten times faster
+      dbbstation station --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
+        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar-length-mm 150.0003 --bar-uncertainty-um 0.5
+    """
+    _check_options(
+        virtual=virtual, time_scale=time_scale, baud=baud, needed=(plan_file, machine_file, instrument, port, out)
+    )
+    _check_terminal()
+    from dbbstation.files.machine_file import read_machine
+    from dbbstation.files.plan_file import read_inline_plan
+    from dbbstation.files.shipped import shipped_folder
+    from dbbstation.instrument.library import load_instrument
+    from dbbstation.station.assembly import Job
+
+    def demo(what: str) -> Path:
+        folder, _, rest = _DEMO[what].partition("/")
+        return shipped_folder(folder) / rest
+
+    details = session_details(**told)
+    plan_file = plan_file or demo("plan")
+    machine, plan = read_machine(machine_file or demo("machine")), read_inline_plan(plan_file)
+    protocol = load_instrument(instrument or _DEMO_INSTRUMENT)
+    folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
+    with ExitStack() as stack:
+        job = Job(machine, plan, folder, details)
+        job.check(str(plan_file))
+        helper = None
+        if virtual:
+            from dataclasses import replace
+
+            from dbbstation.cli.station_virtual import virtual_place
+
+            click.echo("switching on the virtual machine …", err=True)
+            place = stack.enter_context(
+                virtual_place(machine, plan.to_domain(), protocol, time_scale=time_scale, seed=_DEMO_SEED)
+            )
+            job, port, helper = replace(job, clock=place.clock), place.port, place.helper
+        return _run(job, opener(job, protocol, str(port), baud=baud, helper=helper))
+
+
+def _check_options(
+    *, virtual: bool, time_scale: float, baud: int | None, needed: tuple[Path | str | None, ...]
+) -> None:
+    """Refuse what does not go together.
+
+    Raises:
+        click.UsageError: it does not.
+    """
+    names = ("--plan", "--machine", "--instrument", "--port", "--out")
+    if virtual and (needed[3] is not None or baud is not None):
+        raise click.UsageError("--virtual brings its own instrument: leave out --port and --baud")
+    missing = [name for name, value in zip(names, needed, strict=True) if value is None]
+    if not virtual and missing:
+        raise click.UsageError(f"missing {', '.join(missing)}; or --virtual, to try it without hardware")
+    if not virtual and time_scale != 1.0:
+        raise click.UsageError("--time-scale goes with --virtual: real machines take their time")
+
+
+def _check_terminal() -> None:
+    """Refuse to draw into a file.
+
+    Raises:
+        click.UsageError: this is no terminal.
+    """
+    if not (sys.stdin.isatty() and sys.stdout.isatty() and sys.stderr.isatty()):
+        raise click.UsageError("the screen needs a terminal; `dbbstation measure` does the same without one")
+
+
+def opener(
+    job: Job, protocol: Protocol, port: str, *, baud: int | None = None, helper: Observer | None = None
+) -> Opener:
+    """Return what opens instrument and session, each time anew.
+
+    Args:
+        job: what is measured.
+        protocol: of the instrument.
+        port: where it is.
+        baud: where it is not set to the usual rate.
+        helper: told of everything after storage, before the screen.
+    """
+    from dbbstation.instrument.driver import Instrument
+    from dbbstation.station.assembly import assemble
+    from dbbstation.tui.runner import OpenStation
+
+    @contextmanager
+    def opened() -> Iterator[OpenStation]:
+        with Instrument(protocol, port, baud=baud, clock=job.clock) as source:
+            workplace = assemble(job, source)
+            if helper is not None:
+                workplace.station.subscribe(helper)
+            try:
+                yield OpenStation(workplace.station, workplace.schedule, str(job.folder))
+            finally:
+                workplace.close()
+
+    return opened
+
+
+def _run(job: Job, open_station: Opener) -> int:
+    """Show the screen until it is closed; return the exit code.
+
+    Raises:
+        StationError: the fault that ended the sequence, where nothing was done about it.
+    """
+    from dbbstation.tui.app import Shown, StationApp
+    from dbbstation.tui.runner import Runner
+
+    runner = Runner(open_station)
+    app = StationApp(Shown(job.plan.plan.name, job.plan.jig.bores), runner)
+    with _stopped_politely(app):
+        app.run()
+    if runner.crash is not None:
+        raise runner.crash
+    if app.board.tasks:
+        click.echo(f"{job.folder}: {app.board.accepted} of {len(app.board.tasks)} runs accepted", err=True)
+    if app.board.fault is not None:
+        raise app.board.fault.error
+    return app.return_code or 0
+
+
+@contextmanager
+def _stopped_politely(app: StationApp) -> Iterator[None]:
+    """Let a polite kill, or a terminal that is closed, end the sequence between two samples and restore the terminal."""
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        app.leave(sure=True)
+
+    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {number: signal.signal(number, stop) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

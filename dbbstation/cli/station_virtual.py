@@ -1,0 +1,89 @@
+"""A machine and an instrument to try the screen on: both in this process, the line between them a real one."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.station import events
+from dbbstation.station.states import State
+from dbbstation.virtual.cell import VirtualCell
+from dbbstation.virtual.machine import VirtualMachine
+from dbbstation.virtual.truth import random_kinematics
+from dbbstation.virtual.wire import VirtualInstrument
+from dbbstation.virtual.wire_clock import ScaledClock
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.plan import Plan
+
+
+class Helper:
+    """Stands at the virtual machine: puts balls up and starts circles when the station is ready for them.
+
+    An observer of the station.
+
+    Args:
+        cell: what is helped at.
+    """
+
+    def __init__(self, cell: VirtualCell) -> None:
+        self._cell = cell
+        self._announced: events.RunAnnounced | None = None
+
+    def __call__(self, event: events.Event) -> None:
+        """Do what the event asks for.
+
+        Raises:
+            MachineError: the machine refuses.
+        """
+        if isinstance(event, events.RunAnnounced):
+            self._announced = event
+        elif isinstance(event, events.StateChanged) and event.state is State.ARMED and self._announced is not None:
+            # A run that the operator gave up goes on at the machine, until somebody stops it.
+            if self._cell.running:
+                self._cell.stop()
+            run = self._announced.run
+            if self._announced.put_up:
+                self._cell.mount(run.test)
+            self._cell.start(run.test, run.direction)
+
+
+@dataclass(frozen=True)
+class VirtualPlace:
+    """Where the virtual things are.
+
+    Attributes:
+        port: of the instrument.
+        clock: their time [s].
+        helper: to be subscribed to the station.
+        wire: the instrument, for showing what faults look like.
+    """
+
+    port: str
+    clock: ScaledClock
+    helper: Helper
+    wire: VirtualInstrument
+
+
+@contextmanager
+def virtual_place(
+    machine: Machine, plan: Plan, protocol: Protocol, *, time_scale: float, seed: int = 0
+) -> Iterator[VirtualPlace]:
+    """Switch on a machine with errors drawn at random, and an instrument that reads the bar on it.
+
+    Raises:
+        TravelError: a circle leaves the travel.
+    """
+    virtual = VirtualMachine(MachineModel(machine, random_kinematics(machine, seed)), plan, seed=seed)
+    # Also compiles what is computed, so that the first circle does not wait for that.
+    virtual.check()
+    clock = ScaledClock(time_scale)
+    cell = VirtualCell(virtual, clock)
+    with VirtualInstrument(protocol, cell.length_mm_at, clock=clock) as wire:
+        yield VirtualPlace(wire.port, clock, Helper(cell), wire)

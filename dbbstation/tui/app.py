@@ -1,0 +1,185 @@
+"""The screen of the station: one screen for a whole plan. It draws what happened and sends what is pressed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.app import App
+from textual.binding import Binding
+from textual.containers import Horizontal, Vertical
+from textual.widgets import Footer
+
+from dbbstation.station.commands import Accept, Command, Quit, Reject, Repeat, Skip, Start
+from dbbstation.station.states import FINAL, RECORDING
+from dbbstation.tui.board import Board
+from dbbstation.tui.figures_panel import FiguresPanel
+from dbbstation.tui.jig_map import JigMap
+from dbbstation.tui.message_lines import MessageLines
+from dbbstation.tui.now_line import NowLine
+from dbbstation.tui.panel import Panel
+from dbbstation.tui.progress_line import ProgressLine
+from dbbstation.tui.quit_question import QuitQuestion
+from dbbstation.tui.reading_panel import ReadingPanel
+from dbbstation.tui.run_list import RunList
+from dbbstation.tui.set_up_panel import SetUpPanel
+from dbbstation.tui.title_line import TitleLine
+from dbbstation.tui.trace_view import TraceView
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from textual.app import ComposeResult
+    from textual.binding import BindingType
+
+    from dbbstation.tui.runner import Runner
+
+LOOK_S = 0.1
+"""Between looks into the mailbox [s]: ten pictures per second are fluent, more is work that nobody sees."""
+
+_COMMANDS: dict[str, Command] = {
+    "start": Start(),
+    "touched": Start(remounted=True),
+    "accept": Accept(),
+    "repeat": Repeat(),
+    "reject": Reject(),
+    "skip": Skip(),
+}
+
+DARK, LIGHT = "textual-dark", "textual-light"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the screen shows that no event tells.
+
+    Attributes:
+        plan: its name.
+        bores: number of each bore of the jig plate with its x, y on the plate [mm].
+        cell_aspect: height of a terminal's cell over its width.
+    """
+
+    plan: str
+    bores: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    cell_aspect: float = 2.0
+
+
+class StationApp(App[None]):
+    """The screen.
+
+    Args:
+        shown: plan and plate.
+        runner: runs the sequence; started when the screen stands.
+    """
+
+    TITLE = "dbbstation"
+    ENABLE_COMMAND_PALETTE = False
+    CSS = """
+    #middle { height: 1fr; }
+    #trace { width: 1fr; padding: 0 1; }
+    #side { width: 40%; min-width: 38; max-width: 52; padding: 0 1 0 0; }
+    #side > * { margin-bottom: 1; }
+    #table { height: 5; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("enter", "tell('start')", "Start"),
+        ("m", "tell('touched')", "Start, holder touched"),
+        ("a", "tell('accept')", "Accept"),
+        ("r", "tell('repeat')", "Repeat"),
+        ("x", "tell('reject')", "Reject"),
+        ("s", "tell('skip')", "Skip"),
+        ("c", "connect", "Connect again"),
+        ("d", "brightness", "Dark/light"),
+        ("q", "leave", "Quit"),
+        # Textual's own meaning of these keys would close the screen without a question, or copy text.
+        Binding("ctrl+c,ctrl+q", "leave", show=False, priority=True),
+    ]
+
+    def __init__(self, shown: Shown, runner: Runner) -> None:
+        super().__init__()
+        self.board = Board()
+        self._show = shown
+        self._runner = runner
+        self._keys: object = None
+        self._leaving = False
+
+    def compose(self) -> ComposeResult:
+        """Put the parts where they belong."""
+        yield TitleLine(self._show.plan, id="title")
+        yield NowLine(id="now")
+        with Horizontal(id="middle"):
+            yield TraceView(cell_aspect=self._show.cell_aspect, id="trace")
+            with Vertical(id="side"):
+                yield ReadingPanel(id="reading")
+                with Horizontal(id="table"):
+                    yield SetUpPanel(id="set-up")
+                    yield JigMap(self._show.bores, id="map")
+                yield FiguresPanel(id="figures")
+                yield RunList(id="runs")
+        yield ProgressLine(id="progress")
+        yield MessageLines(id="messages")
+        yield Footer()
+
+    def on_mount(self) -> None:
+        """Begin to measure, and to look."""
+        self._runner.start()
+        self.set_interval(LOOK_S, self.look)
+
+    def on_unmount(self) -> None:
+        """Whatever closed the screen, the sequence ends in order."""
+        self._runner.close()
+
+    def look(self) -> None:
+        """Take the mail and draw what changed."""
+        for event in self._runner.mail():
+            self.board.take(event)
+        self.draw()
+        if self._runner.crash is not None or (self._leaving and not self._runner.alive):
+            self.exit()
+
+    def draw(self) -> None:
+        """Draw the board."""
+        base = self.screen_stack[0]
+        for panel in base.query(Panel):
+            panel.show(self.board)
+        base.query_one(TraceView).show(self.board.circle, self.board.traces, self.board.running)
+        keys = (self.board.allowed, self.board.state, self.board.fault is None)
+        if keys != self._keys:
+            self._keys = keys
+            self.refresh_bindings()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Only keys that mean something now stand in the footer and do something."""
+        if action == "tell":
+            return type(_COMMANDS[str(parameters[0])]) in self.board.allowed
+        if action == "connect":
+            return self.board.fault is not None
+        return True
+
+    def action_tell(self, name: str) -> None:
+        """Send a command."""
+        self._runner.send(_COMMANDS[name])
+
+    def action_connect(self) -> None:
+        """Open instrument and session again after a fault."""
+        self._runner.start()
+
+    def action_brightness(self) -> None:
+        """Change between dark and light."""
+        self.theme = LIGHT if self.theme == DARK else DARK
+
+    def action_leave(self) -> None:
+        """Quit, after a question where a circle is being recorded."""
+        run = self.board.announced.run.label if self.board.announced else ""
+        if self.board.state in RECORDING:
+            self.push_screen(QuitQuestion(run), self.leave)
+        else:
+            self.leave(sure=True)
+
+    def leave(self, sure: bool | None) -> None:  # noqa: FBT001 - answer of a question
+        """End the sequence, if they are sure; the screen closes when it has ended."""
+        if not sure:
+            return
+        self._leaving = True
+        if not self._runner.send(Quit()) or self.board.state in FINAL:
+            self.exit()

@@ -1,0 +1,95 @@
+"""Planes of dots that become braille characters: two by four dots in every cell of a terminal.
+
+A plane is a boolean array, shape (4 rows, 2 columns), y downwards. Several planes share the cells: their dots are OR-ed,
+and every cell tells which planes have a dot in it, so that it can be coloured.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Plane: TypeAlias = NDArray[np.bool_]
+
+CELL_WIDE, CELL_HIGH = 2, 4
+"""Dots in a cell."""
+
+BLANK = 0x2800
+"""Code point of the braille character without dots; the lowest eight bits say which dots are raised."""
+
+_BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint8)
+"""Bit of each dot in a cell: three rows in the order of six-dot braille, the fourth was added below [Unicode, U+2800]."""
+
+
+def empty(columns: int, rows: int) -> Plane:
+    """Return a plane without dots for so many cells."""
+    return np.zeros((rows * CELL_HIGH, columns * CELL_WIDE), dtype=np.bool_)
+
+
+def light(plane: Plane, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+    """Raise the dots at points; those outside the plane are left out.
+
+    Args:
+        plane: changes.
+        x: dots to the right of the plane's left edge, shape (n,).
+        y: dots below its upper edge, shape (n,).
+    """
+    with np.errstate(invalid="ignore"):
+        inside = (x >= 0.0) & (x < plane.shape[1]) & (y >= 0.0) & (y < plane.shape[0])
+    plane[y[inside].astype(np.intp), x[inside].astype(np.intp)] = True
+
+
+def connect(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the points with as many more between neighbours that no dot of the line is left out.
+
+    A point that is not a number ends one line and begins the next.
+
+    Args:
+        x: shape (n,) [dots].
+        y: shape (n,) [dots].
+
+    Returns:
+        x and y, the points themselves first; shape (n + m,).
+    """
+    if len(x) < 2:  # noqa: PLR2004 - a line has two ends
+        return x, y
+    step_x, step_y = np.diff(x), np.diff(y)
+    steps = np.ceil(np.maximum(np.abs(step_x), np.abs(step_y)))
+    more = np.where(np.isfinite(steps), np.maximum(steps - 1.0, 0.0), 0.0).astype(np.intp)
+    segment = np.repeat(np.arange(len(more)), more)
+    # Counts 1, 2, … up to `more` within each segment.
+    place = np.arange(len(segment)) - np.repeat(np.cumsum(more) - more, more) + 1
+    share = place / (more[segment] + 1)
+    return (
+        np.concatenate([x, x[segment] + share * step_x[segment]]),
+        np.concatenate([y, y[segment] + share * step_y[segment]]),
+    )
+
+
+def patterns(plane: Plane) -> NDArray[np.uint8]:
+    """Return the dots of every cell as the lowest byte of its character, shape (rows, columns)."""
+    high, wide = plane.shape
+    cells = plane.reshape(high // CELL_HIGH, CELL_HIGH, wide // CELL_WIDE, CELL_WIDE)
+    return np.einsum("rycx,yx->rc", cells, _BITS, dtype=np.uint8)
+
+
+def overlay(planes: Sequence[Plane]) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
+    """Return the characters of planes laid over each other, and whose dots stand in each cell.
+
+    Returns:
+        Code points, shape (rows, columns); and a bit per plane, the first plane's lowest, shape (rows, columns).
+    """
+    codes = np.zeros((planes[0].shape[0] // CELL_HIGH, planes[0].shape[1] // CELL_WIDE), dtype=np.uint32)
+    members = np.zeros(codes.shape, dtype=np.uint8)
+    for number, plane in enumerate(planes):
+        dots = patterns(plane)
+        codes |= dots
+        members |= (dots > 0).astype(np.uint8) << np.uint8(number)
+    # A space where there is nothing: some fonts draw the empty braille character as eight faint rings.
+    return np.where(codes > 0, codes + BLANK, ord(" ")).astype(np.uint32), members

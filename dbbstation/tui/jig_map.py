@@ -1,0 +1,66 @@
+"""A small map of the jig plate: where the ball stands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.content import Content, Span
+
+from dbbstation.tui.panel import Panel
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.tui.board import Board
+
+COLUMNS, ROWS = 13, 5
+
+_LETTERS = 3
+"""A bore's number with the brackets that mark it."""
+
+
+class JigMap(Panel):
+    """Bores by number, X to the right and Y up as on the table; the one of this run stands in brackets, inverted.
+
+    Args:
+        bores: number of each bore with its x, y on the plate [mm].
+    """
+
+    DEFAULT_CSS = f"JigMap {{ width: {COLUMNS}; height: {ROWS}; }}"
+
+    def __init__(self, bores: Mapping[int, tuple[float, float]], *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id=id)
+        self._bores = bores
+
+    def text(self, board: Board) -> Content:
+        """Return the map."""
+        return drawn(self._bores, None if board.announced is None else board.announced.ball.bore)
+
+
+def drawn(bores: Mapping[int, tuple[float, float]], marked: int | None) -> Content:
+    """Return a map of bores, one of them marked; empty where there are none."""
+    if not bores:
+        return Content("")
+    rows = [[" "] * COLUMNS for _ in range(ROWS)]
+    span = None
+    # The marked one last: where bores lie closer than letters, it is the one to be seen.
+    for bore in sorted(bores, key=lambda number: number == marked):
+        row, column = _cell(bores, bore)
+        text = f"[{bore}]" if bore == marked else f" {bore} "
+        if len(text) > _LETTERS:
+            text = text.strip()
+        rows[row][column : column + len(text)] = text
+        if bore == marked:
+            start = row * (COLUMNS + 1) + column
+            span = Span(start, start + len(text), "reverse bold")
+    return Content("\n".join("".join(row[:COLUMNS]) for row in rows), [span] if span else [])
+
+
+def _cell(bores: Mapping[int, tuple[float, float]], bore: int) -> tuple[int, int]:
+    """Row and column where a bore's three letters begin; the plate keeps its shape."""
+    x, y = bores[bore]
+    xs, ys = [place[0] for place in bores.values()], [place[1] for place in bores.values()]
+    reach = max(max(xs) - min(xs), max(ys) - min(ys)) or 1.0
+    right = 0.5 + (x - (max(xs) + min(xs)) / 2.0) / reach
+    up = 0.5 + (y - (max(ys) + min(ys)) / 2.0) / reach
+    return round((1.0 - up) * (ROWS - 1)), round(right * (COLUMNS - _LETTERS))

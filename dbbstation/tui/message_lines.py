@@ -1,0 +1,37 @@
+"""The last messages, newest below."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from dbbstation.tui.messages import Message, Weight
+from dbbstation.tui.panel import Panel, lines
+
+if TYPE_CHECKING:
+    from dbbstation.tui.board import Board
+
+_STYLES = {Weight.NOTE: "", Weight.WARNING: "$text-warning", Weight.FAULT: "bold $text-error"}
+
+
+class MessageLines(Panel):
+    """As many as fit, each in one line; what needs all its words stands above in the sentence of now."""
+
+    DEFAULT_CSS = "MessageLines { height: 2; padding: 0 1; }"
+
+    def text(self, board: Board) -> Content:
+        """Return the last messages."""
+        height = max(self.size.height, 1)
+        if not board.messages:
+            where = f"recording into {board.session}" if board.session else ""
+            return Content.styled(where, "dim")
+        return lines(*(_line(message, self.size.width) for message in list(board.messages)[-height:]))
+
+
+def _line(message: Message, width: int) -> Content:
+    text = message.text if message.weight is Weight.NOTE else f"{message.weight.value}: {message.text}"
+    text = text.replace("\n", " ")
+    if len(text) > width > 1:
+        text = f"{text[: width - 1]}…"
+    return Content.styled(text, _STYLES[message.weight])

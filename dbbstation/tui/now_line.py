@@ -1,0 +1,44 @@
+"""What to do now, in plain words, where nobody overlooks it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from dbbstation.station.states import RECORDING, State
+from dbbstation.tui.panel import Panel
+from dbbstation.tui.sentences import now
+
+if TYPE_CHECKING:
+    from dbbstation.tui.board import Board
+
+_ASKING = {State.ANNOUNCED, State.ARMED, State.COMPLETE}
+"""States in which the station waits for a person."""
+
+
+class NowLine(Panel):
+    """One sentence; grows where a fault needs more words."""
+
+    can_grow = True
+
+    DEFAULT_CSS = """
+    NowLine {
+        height: auto; min-height: 2; max-height: 7; padding: 0 1; text-style: bold;
+        background: $surface; color: $foreground;
+        &.-asking { background: $primary-muted; color: $foreground; }
+        &.-running { background: $surface; }
+        &.-fault { background: $error-muted; color: $foreground; }
+    }
+    """
+
+    def text(self, board: Board) -> Content:
+        """Return the sentence."""
+        return Content(now(board))
+
+    def show(self, board: Board) -> None:
+        """Show the sentence, and whether it asks for something, in colour as well."""
+        super().show(board)
+        self.set_class(board.fault is not None or board.state is State.FLAWED, "-fault")
+        self.set_class(board.fault is None and board.state in _ASKING, "-asking")
+        self.set_class(board.state in RECORDING, "-running")

@@ -1,0 +1,38 @@
+"""A part of the screen that is text: updated only when the text has changed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+from textual.widgets import Static
+
+if TYPE_CHECKING:
+    from dbbstation.tui.board import Board
+
+
+class Panel(Static):
+    """Text made from the board; subclasses say what it is."""
+
+    can_grow = False
+    """Whether the height follows the text; a layout of the screen costs much more than a text."""
+
+    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__("", id=id, markup=False)
+        self._shown = Content()
+
+    def text(self, board: Board) -> Content:
+        """Return what is shown of a board."""
+        raise NotImplementedError
+
+    def show(self, board: Board) -> None:
+        """Show a board."""
+        text = self.text(board)
+        if not text.is_same(self._shown):
+            self._shown = text
+            self.update(text, layout=self.can_grow)
+
+
+def lines(*rows: Content) -> Content:
+    """Return rows under each other."""
+    return Content("\n").join(rows)

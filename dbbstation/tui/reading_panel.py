@@ -1,0 +1,85 @@
+"""The live reading: length, deviation, what the instrument says of it, how many come."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from dbbstation.tui.panel import Panel, lines
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbbstation.station.events import Sample
+    from dbbstation.tui.board import Board
+
+_STALE_S = 1.5
+"""Without a new reading for so long the last one is shown as old: it must not look live [s]."""
+
+_FAR_UM = 9_999.9
+"""Further from the nominal length a deviation in µm says nothing."""
+
+
+class ReadingPanel(Panel):
+    """Two rows.
+
+    Args:
+        clock: real time, for telling an old reading [s].
+    """
+
+    DEFAULT_CSS = "ReadingPanel { height: 2; }"
+
+    def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id=id)
+        self._clock = clock
+        self._total = 0
+        self._new_s = clock()
+
+    def text(self, board: Board) -> Content:
+        """Return length and deviation, below them status, rate and losses."""
+        if board.rate.total != self._total:
+            self._total, self._new_s = board.rate.total, self._clock()
+        sample = board.sample
+        if sample is None:
+            return lines(Content.styled("no reading yet", "dim"), Content(""))
+        old_s = self._clock() - self._new_s
+        stale = old_s > _STALE_S
+        return lines(
+            Content(" ").join([_length(sample, stale=stale), _deviation(sample, board)]),
+            Content(" · ").join([_status(sample), _rate(board, old_s if stale else None), _lost(board)]),
+        )
+
+
+def _length(sample: Sample, *, stale: bool) -> Content:
+    if sample.length_mm is None:
+        return Content.styled("  --.----- mm", "bold")
+    return Content.styled(f"{sample.length_mm:10.5f} mm", "dim" if stale else "bold")
+
+
+def _deviation(sample: Sample, board: Board) -> Content:
+    if sample.length_mm is None or board.announced is None:
+        return Content("")
+    deviation_um = 1e3 * (sample.length_mm - board.announced.circle.bar_mm)
+    if abs(deviation_um) > _FAR_UM:
+        return Content("far off the circle")
+    return Content(f"{deviation_um:+9.1f} µm")
+
+
+def _status(sample: Sample) -> Content:
+    if sample.status == "ok":
+        return Content.styled("ok", "$text-success")
+    return Content.styled(f"{sample.status.upper()} {sample.said}".rstrip(), "bold $text-error")
+
+
+def _rate(board: Board, old_s: float | None) -> Content:
+    if old_s is not None:
+        return Content.styled(f"no reading for {old_s:.0f} s", "bold $text-warning")
+    return Content("…/s" if board.rate.per_s is None else f"{board.rate.per_s:.0f}/s")
+
+
+def _lost(board: Board) -> Content:
+    return (
+        Content(f"{board.lost} lost") if not board.lost else Content.styled(f"{board.lost} lost", "bold $text-warning")
+    )

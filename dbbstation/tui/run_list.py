@@ -1,0 +1,62 @@
+"""Planned runs, test by test, with a sign and a word for how each stands."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from dbbstation.tui.board import Mark
+from dbbstation.tui.panel import Panel, lines
+
+if TYPE_CHECKING:
+    from dbbstation.tui.board import Board
+
+_SIGNS = {
+    Mark.OPEN: ("·", "dim"),
+    Mark.NEXT: ("›", "bold $text-primary"),
+    Mark.RUNNING: ("▶", "bold $text-primary"),
+    Mark.COMPLETE: ("?", "bold $text-warning"),
+    Mark.FLAWED: ("!", "bold $text-error"),
+    Mark.ACCEPTED: ("✓", "$text-success"),
+    Mark.PASSED: ("–", "$text-warning"),
+}
+
+_CELL = 15
+"""Direction, sign and the longest word."""
+
+_SHORTEST_NAME = 4
+
+
+class RunList(Panel):
+    """As many tests as fit, the one of now among them."""
+
+    DEFAULT_CSS = "RunList { height: 1fr; min-height: 2; }"
+
+    def text(self, board: Board) -> Content:
+        """Return a row per test."""
+        numbered = enumerate(zip(board.tasks, board.marks, strict=True), start=1)
+        here = board.announced.number if board.announced else 1
+        room = max(self.size.width - 2 * (_CELL + 1), _SHORTEST_NAME)
+        rows: list[Content] = []
+        current = 0
+        for (name, occurrence), group in groupby(numbered, key=lambda item: (item[1][0].test, item[1][0].occurrence)):
+            cells = []
+            for number, (task, mark) in group:
+                current = len(rows) if number == here else current
+                cells.append(_cell(task.direction.value, mark))
+            title = name if occurrence == 1 else f"{name} again"
+            rows.append(Content(f"{_cut(title, room):{room}} ") + Content(" ").join(cells))
+        height = max(self.size.height, 1)
+        first = min(max(current - height // 2, 0), max(len(rows) - height, 0))
+        return lines(*rows[first : first + height])
+
+
+def _cell(direction: str, mark: Mark) -> Content:
+    sign, style = _SIGNS[mark]
+    return Content.assemble(f"{direction:3} ", (f"{sign} {mark.value}".ljust(_CELL - 4), style))
+
+
+def _cut(name: str, room: int) -> str:
+    return name if len(name) <= room else f"{name[: room - 1]}…"

@@ -1,0 +1,93 @@
+"""What to do now, in one plain sentence; and what is wrong, where, and what helps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.station.states import State
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbbstation.station.events import RunAnnounced
+    from dbbstation.tui.board import Board
+
+_BEGIN = "Opening instrument and session …"
+
+
+def now(board: Board) -> str:
+    """Return what a person does now, or waits for."""
+    if board.fault is not None:
+        return _fault(board)
+    if board.state is None:
+        return _BEGIN
+    if board.finished is not None:
+        return _finished(board)
+    say = _SENTENCES.get(board.state)
+    return say(board) if say else f"The station is {board.state}."
+
+
+def _set_up(board: Board) -> str:
+    announced = board.announced
+    if announced is None:
+        return _BEGIN
+    return f"{announced.instructions[0]}, tilt and bar as shown; then press Enter."
+
+
+def _armed(board: Board) -> str:
+    return f"{_last_step(board.announced)} at the machine; the recording begins and ends by itself."
+
+
+def _dwelling(_board: Board) -> str:
+    return "The bar stands at the feed-in point: the machine feeds in next, touch nothing."
+
+
+def _turning(_board: Board) -> str:
+    return "The machine runs the circle: touch nothing until it has fed out."
+
+
+def _leaving(_board: Board) -> str:
+    return "The circle is through, the machine feeds out: touch nothing."
+
+
+def _verdict(board: Board) -> str:
+    name = board.completed.run.label if board.completed else "The run"
+    return f"{name} is complete: A accepts it, R measures it again, X rejects it and goes on."
+
+
+def _flawed(board: Board) -> str:
+    problem = board.completed.problem if board.completed else ""
+    name = board.completed.run.label if board.completed else "the run"
+    return f"No usable circle in {name}: {problem}. R measures it again, X leaves it out."
+
+
+_SENTENCES: dict[State, Callable[[Board], str]] = {
+    State.ANNOUNCED: _set_up,
+    State.ARMED: _armed,
+    State.DWELLING: _dwelling,
+    State.TURNING: _turning,
+    State.LEAVING: _leaving,
+    State.COMPLETE: _verdict,
+    State.FLAWED: _flawed,
+}
+
+
+def _last_step(announced: RunAnnounced | None) -> str:
+    return announced.instructions[-1] if announced else "Start the circle"
+
+
+def _finished(board: Board) -> str:
+    finished = board.finished
+    missing = ", ".join(finished.missing) if finished else ""
+    rest = f"without an accepted run: {missing}" if missing else "nothing is missing"
+    return f"The plan is through, {board.accepted} of {len(board.tasks)} runs accepted; {rest}. Q leaves."
+
+
+def _fault(board: Board) -> str:
+    if board.fault is None:
+        return ""
+    error, interrupted = board.fault.error, board.fault.interrupted
+    where = f" at {error.where}" if error.where else ""
+    kept = f" {interrupted.label} is kept as far as it came." if interrupted else ""
+    remedy = f" What helps: {error.remedy}." if error.remedy else ""
+    return f"FAULT{where}: {error.what}.{remedy}{kept} Then C connects again, Q leaves."

@@ -1,0 +1,35 @@
+"""The top line: which plan, which of its runs, in which state."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.content import Content
+
+from dbbstation.tui.panel import Panel
+
+if TYPE_CHECKING:
+    from dbbstation.tui.board import Board
+
+
+class TitleLine(Panel):
+    """One line over the whole width.
+
+    Args:
+        plan: name of the plan.
+    """
+
+    DEFAULT_CSS = "TitleLine { height: 1; background: $panel; color: $foreground; }"
+
+    def __init__(self, plan: str, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id=id)
+        self._plan = plan
+
+    def text(self, board: Board) -> Content:
+        """Return the line."""
+        parts = [Content.styled(f" {self._plan}", "bold")]
+        if board.announced is not None and board.finished is None:
+            parts.append(Content(f"run {board.announced.number} of {board.announced.count}"))
+            parts.append(Content.styled(board.announced.run.label, "bold"))
+        parts.append(Content(str(board.state) if board.state else "opening"))
+        return Content(" · ").join(parts)

@@ -1,0 +1,84 @@
+"""The traces that are drawn: one per direction of a test, in arrays that grow."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.plan.circle import Circle
+    from dbbstation.station.events import RunId, Sample
+
+_FIRST_ROOM = 4096
+
+_TURN_DEG = 360.0
+
+
+class LiveTrace:
+    """Angles and deviations of one run, as far as they are known live.
+
+    Only the full turn is kept, not the overshoots; samples that are no length on the circle break the line.
+
+    Args:
+        run: which run.
+        circle: as commanded.
+    """
+
+    def __init__(self, run: RunId, circle: Circle) -> None:
+        self.run = run
+        self.circle = circle
+        self.largest_um = 0.0
+        self._count = 0
+        self._data = np.empty((2, _FIRST_ROOM))
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def theta_deg(self) -> NDArray[np.float64]:
+        """Angles from +X towards +Y, shape (n,) [deg]."""
+        return self._data[0, : self._count]
+
+    @property
+    def deviation_um(self) -> NDArray[np.float64]:
+        """Bar length minus nominal; not a number where the line breaks, shape (n,) [µm]."""
+        return self._data[1, : self._count]
+
+    def add(self, samples: Sequence[Sample]) -> None:
+        """Take samples in time order."""
+        # Strictly inside what is travelled: at its very ends stands the bar while it feeds in and out.
+        first, last = -self.circle.overshoot_deg, _TURN_DEG + self.circle.overshoot_deg
+        on_turn = [
+            sample
+            for sample in samples
+            if sample.phi_deg is not None and first < sample.phi_deg < last and 0.0 <= sample.phi_deg < _TURN_DEG
+        ]
+        if not on_turn:
+            return
+        phi = np.array([sample.phi_deg for sample in on_turn], dtype=np.float64)
+        length = np.array([sample.length_mm for sample in on_turn], dtype=np.float64)
+        usable = np.array([sample.status == "ok" for sample in on_turn])
+        deviation = 1e3 * (length - self.circle.bar_mm)
+        # Beyond half the feed-in it is off the circle: a bar that was lifted, or the feed-out.
+        usable &= np.abs(deviation) < 1e3 * self.circle.feed_in_mm / 2.0
+        behind_gap = np.flatnonzero([sample.lost > 0 for sample in on_turn])
+        self._append(
+            np.insert(self.circle.theta_deg(phi), behind_gap, np.nan),
+            np.insert(np.where(usable, deviation, np.nan), behind_gap, np.nan),
+        )
+        if usable.any():
+            self.largest_um = max(self.largest_um, float(np.abs(deviation[usable]).max()))
+
+    def _append(self, theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]) -> None:
+        end = self._count + len(theta_deg)
+        if end > self._data.shape[1]:
+            wider = np.empty((2, max(2 * self._data.shape[1], end)))
+            wider[:, : self._count] = self._data[:, : self._count]
+            self._data = wider
+        self._data[:, self._count : end] = theta_deg, deviation_um
+        self._count = end

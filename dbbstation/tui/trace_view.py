@@ -1,0 +1,238 @@
+"""The live polar trace on the screen: draws what has come since the last look, and only the rows that it changes."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from rich.segment import Segment
+from textual.geometry import Region, Size
+from textual.strip import Strip
+from textual.widget import Widget
+
+from dbbstation.plan.circle import Direction
+from dbbstation.tui import braille
+from dbbstation.tui.polar import (
+    BAND_SHARE,
+    CELL_ASPECT,
+    NOMINAL_SHARE,
+    SMALLEST_SCALE_UM,
+    Dial,
+    draw_scale,
+    draw_trace,
+    grown_scale_um,
+    share_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+    from rich.style import Style
+
+    from dbbstation.plan.circle import Circle
+    from dbbstation.tui.braille import Plane
+    from dbbstation.tui.trace import LiveTrace
+
+_SCALE, _CCW, _CW, _LABEL = 1, 2, 4, 8
+"""Who has a dot in a cell: the bits of `braille.overlay`, in the order the planes are given, and one for text."""
+
+_HEADS = {Direction.CCW: "●", Direction.CW: "○"}
+"""Marks where a running circle is."""
+
+_START_OFFSET_DEG = 9.0
+"""The word at the start angle stands beside its spoke, so that it covers neither the spoke nor an axis letter."""
+
+_SMALLEST_ROWS = 6
+"""With fewer the lines of text above and below would leave no circle."""
+
+
+class TraceView(Widget):
+    """Deviation of the bar about the nominal circle, both directions of a test in one dial.
+
+    Args:
+        cell_aspect: height of a terminal's cell over its width.
+    """
+
+    COMPONENT_CLASSES: ClassVar[set[str]] = {"trace--scale", "trace--ccw", "trace--cw", "trace--both", "trace--label"}
+
+    DEFAULT_CSS = """
+    TraceView {
+        & > .trace--scale { color: $foreground 50%; }
+        & > .trace--ccw { color: $primary-lighten-1; text-style: bold; }
+        & > .trace--cw { color: $warning; }
+        & > .trace--both { color: $foreground; text-style: bold; }
+        & > .trace--label { color: $foreground 75%; }
+    }
+    """
+
+    def __init__(self, *, cell_aspect: float = CELL_ASPECT, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id=id)
+        self._cell_aspect = cell_aspect
+        self._traces: dict[Direction, LiveTrace] = {}
+        self._drawn: dict[Direction, tuple[LiveTrace, int]] = {}
+        self._head: Direction | None = None
+        self._circle: Circle | None = None
+        self._scale_um = SMALLEST_SCALE_UM
+        self._dial = Dial(1, 1)
+        self._planes: dict[Direction, Plane] = {}
+        self._background = self._dial.empty()
+        self._codes: NDArray[np.uint32] = np.zeros((0, 0), dtype=np.uint32)
+        self._members: NDArray[np.uint8] = np.zeros((0, 0), dtype=np.uint8)
+        self._captioned = ""
+
+    @property
+    def scale_um(self) -> float:
+        """Deviation at the outer ring [µm]."""
+        return self._scale_um
+
+    def show(self, circle: Circle | None, traces: Mapping[Direction, LiveTrace], head: Direction | None = None) -> None:
+        """Draw what has come since the last call.
+
+        Args:
+            circle: what the dial is labelled for; None before the first run.
+            traces: those of one test, by direction.
+            head: the direction that runs now; a mark shows where it is.
+        """
+        fresh = circle is not self._circle or any(
+            traces.get(direction) is not trace for direction, (trace, _) in self._drawn.items()
+        )
+        if fresh:
+            self._scale_um = SMALLEST_SCALE_UM
+        self._circle, self._traces, self._head = circle, dict(traces), head
+        scale = grown_scale_um(self._scale_um, max((trace.largest_um for trace in traces.values()), default=0.0))
+        size = Size(self.size.width, self.size.height - 2)
+        if fresh or scale != self._scale_um or size != (self._dial.columns, self._dial.rows):
+            self._begin(size, scale)
+        self._extend()
+        self._compose_cells()
+
+    def _begin(self, size: Size, scale_um: float) -> None:
+        """Draw everything anew: other traces, another scale or another size."""
+        self._scale_um = scale_um
+        self._dial = Dial(max(size.width, 1), max(size.height, 1), self._cell_aspect)
+        self._background = self._dial.empty()
+        self._planes = {direction: self._dial.empty() for direction in Direction}
+        self._drawn = {}
+        draw_scale(self._background, self._dial, None if self._circle is None else self._circle.start_deg)
+
+    def _extend(self) -> None:
+        for direction, trace in self._traces.items():
+            known, done = self._drawn.get(direction, (trace, 0))
+            count = len(known)
+            if count > done:
+                # From the last point that was drawn, so that the line goes on.
+                since = max(done - 1, 0)
+                draw_trace(
+                    self._planes[direction],
+                    self._dial,
+                    trace.theta_deg[since:count],
+                    trace.deviation_um[since:count],
+                    self._scale_um,
+                    thick=direction is Direction.CCW,
+                )
+            self._drawn[direction] = (trace, count)
+
+    def _compose_cells(self) -> None:
+        """Lay planes and texts over each other, and ask for the rows that look different now."""
+        planes = (self._background, self._planes[Direction.CCW], self._planes[Direction.CW])
+        codes, members = braille.overlay(planes)
+        self._letter(codes, members)
+        if codes.shape != self._codes.shape:
+            self.refresh()
+        else:
+            changed = np.flatnonzero(((codes != self._codes) | (members != self._members)).any(axis=1))
+            if len(changed):
+                self.refresh(*(Region(0, int(row) + 1, self.size.width, 1) for row in changed))
+        self._codes, self._members = codes, members
+        caption = self._caption()
+        if caption != self._captioned:
+            self._captioned = caption
+            self.refresh(Region(0, 0, self.size.width, 1))
+
+    def _letter(self, codes: NDArray[np.uint32], members: NDArray[np.uint8]) -> None:
+        rim = NOMINAL_SHARE + BAND_SHARE
+        self._write(codes, members, "X", *self._dial.cell(0.0, 1.05))
+        self._write(codes, members, "Y", *self._dial.cell(90.0, 1.05))
+        ring = f"+{self._scale_um:g} µm"
+        row, column = self._dial.cell(45.0, rim)
+        self._write(codes, members, ring, row, min(column + 1, max(self._dial.columns - len(ring), 0)))
+        self._write(codes, members, "0", *self._dial.cell(135.0, NOMINAL_SHARE))
+        self._write(codes, members, f"-{self._scale_um:g}", *self._dial.cell(135.0, NOMINAL_SHARE - BAND_SHARE))
+        if self._circle is not None:
+            word = "start"
+            row, column = self._dial.cell(self._circle.start_deg - _START_OFFSET_DEG, 1.0)
+            self._write(codes, members, word, row, min(column, max(self._dial.columns - len(word), 0)))
+        trace = None if self._head is None else self._traces.get(self._head)
+        if trace is not None and self._head is not None and len(trace):
+            theta, deviation = float(trace.theta_deg[-1]), float(trace.deviation_um[-1])
+            if np.isfinite(deviation):
+                cell = self._dial.cell(theta, share_of(deviation, self._scale_um))
+                self._write(codes, members, _HEADS[self._head], *cell)
+
+    def _write(self, codes: NDArray[np.uint32], members: NDArray[np.uint8], text: str, row: int, column: int) -> None:
+        text = text[: max(self._dial.columns - column, 0)]
+        codes[row, column : column + len(text)] = [ord(letter) for letter in text]
+        members[row, column : column + len(text)] = _LABEL
+
+    def on_resize(self) -> None:
+        """Draw for the new size."""
+        self.show(self._circle, self._traces, self._head)
+
+    def notify_style_update(self) -> None:
+        """Colours changed: draw all rows with them."""
+        super().notify_style_update()
+        self.refresh()
+
+    def render_line(self, y: int) -> Strip:
+        """Return one row of the widget."""
+        wide = self.size.width
+        if y == 0:
+            return self._text(self._caption(), wide)
+        if y == self.size.height - 1:
+            return self._legend(wide)
+        if self.size.height < _SMALLEST_ROWS or y - 1 >= len(self._codes):
+            return Strip.blank(wide, self.rich_style)
+        base, styles = self.rich_style, self._styles()
+        row = self._codes[y - 1].astype(np.uint32).tobytes().decode("utf-32-le")
+        segments = []
+        column = 0
+        for member, cells in groupby(self._members[y - 1].tolist()):
+            length = len(list(cells))
+            segments.append(Segment(row[column : column + length], base + styles[member]))
+            column += length
+        return Strip(segments, len(row)).adjust_cell_length(wide, base)
+
+    def _styles(self) -> dict[int, Style]:
+        """Return the style of a cell by whose dots it has: a trace goes before the scale."""
+        scale, ccw, cw, both, label = (
+            self.get_component_rich_style(f"trace--{part}", partial=True)
+            for part in ("scale", "ccw", "cw", "both", "label")
+        )
+        traces = {0: scale, _CCW: ccw, _CW: cw, _CCW | _CW: both}
+        return {member | under: style for member, style in traces.items() for under in (0, _SCALE)} | {_LABEL: label}
+
+    def _caption(self) -> str:
+        if self._circle is None:
+            return "no circle yet"
+        names = " and ".join(trace.run.label for trace in self._traces.values())
+        times = self._dial.magnification(self._scale_um, self._circle.radius_mm)
+        return f"{names or 'no samples yet'}: ring ±{self._scale_um:g} µm, drawn ×{_rounded(times)}"
+
+    def _legend(self, wide: int) -> Strip:
+        base, styles = self.rich_style, self._styles()
+        parts = [("━━ ccw, thick", _CCW), ("   ", 0), ("── cw, thin", _CW), ("   ", 0), ("·· nominal", _SCALE)]
+        segments = [Segment(text, base + styles[member]) for text, member in parts]
+        return Strip(segments).adjust_cell_length(wide, base)
+
+    def _text(self, text: str, wide: int) -> Strip:
+        return Strip([Segment(text, self.rich_style + self._styles()[_LABEL])]).adjust_cell_length(
+            wide, self.rich_style
+        )
+
+
+def _rounded(times: float) -> str:
+    """Return a magnification with two digits that mean something."""
+    place = 10.0 ** max(np.floor(np.log10(max(times, 1.0))) - 1.0, 0.0)
+    return f"{round(times / place) * place:.0f}"

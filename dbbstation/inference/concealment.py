@@ -1,0 +1,62 @@
+"""How much of a signature the fitted parameters swallow, so that a fit looks fine without it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.square_root import Block
+
+SEEN = 1e-5
+"""Relative singular value of fitted columns below which a direction is not identifiable and swallows nothing."""
+
+
+@dataclass(frozen=True)
+class Concealment:
+    """A signature before and after the fitted parameters have taken their share.
+
+    Attributes:
+        share: of the sum of squares that is swallowed, 1 - |rest|²/|whole|².
+        whole_rms: of the signature, in the channel's unit.
+        rest_rms: of what is left of it.
+    """
+
+    share: float
+    whole_rms: float
+    rest_rms: float
+
+
+def concealment(
+    blocks: Sequence[Block], fitted: NDArray[np.int64], columns: NDArray[np.int64], amplitudes: NDArray[np.float64]
+) -> Concealment:
+    """Share of a signature that fitted columns swallow, unweighted over all samples.
+
+    Args:
+        blocks: compressed runs; compression keeps all sums of products.
+        fitted: columns of the fitted parameters, shape (f,).
+        columns: of the signature, shape (p,).
+        amplitudes: that make the signature of its columns, shape (p,).
+    """
+    wanted = np.concatenate([fitted, columns])
+    size = int(max(int(block.columns.max()) for block in blocks)) + 1
+    rows = []
+    for block in blocks:
+        wide = np.zeros((len(block.target), max(size, int(wanted.max()) + 1)))
+        wide[:, block.columns] = block.triangle
+        rows.append(wide[:, wanted])
+    stacked = np.vstack(rows)
+    explaining, signature = stacked[:, : len(fitted)], stacked[:, len(fitted) :] @ amplitudes
+    u, s, _ = np.linalg.svd(explaining / np.maximum(np.linalg.norm(explaining, axis=0), 1e-300), full_matrices=False)
+    u = u[:, s > SEEN * s[0]]
+    rest = signature - u @ (u.T @ signature)
+    count = sum(block.count for block in blocks)
+    whole2, rest2 = float(signature @ signature), float(rest @ rest)
+    share = 1.0 - rest2 / whole2 if whole2 > 0.0 else 0.0
+    return Concealment(share, float(np.sqrt(whole2 / count)), float(np.sqrt(rest2 / count)))

@@ -1,0 +1,216 @@
+"""Candidate terms compared on what a base model leaves: log evidence, amplitudes, combinations.
+
+All columns of base and candidates are compressed once. Then the base, whose values are fitted anew with every
+combination, is eliminated once: what remains is a triangle of the candidates alone, on which any combination costs
+microseconds and is still exact. Amplitudes have Gaussian priors of their plausible size, so that flexibility is
+punished by the evidence itself [MacKay, Bayesian interpolation, Neural Computation 4 (1992), eq 2.5 and 4.1].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import qr
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.square_root import Block, Columns
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """One form of a candidate: columns with priors, and the values of shape that they were made with.
+
+    Attributes:
+        columns: of the whole problem, shape (p,).
+        prior: standard deviation of each amplitude, shape (p,).
+        shape: values of the shape parameters, for reports.
+    """
+
+    columns: NDArray[np.int64]
+    prior: NDArray[np.float64]
+    shape: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """Something that the base model may lack; its variants share the prior probability equally."""
+
+    name: str
+    variants: tuple[Variant, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A candidate with the variant that fits best in a combination."""
+
+    candidate: Candidate
+    variant: Variant
+
+
+@dataclass(frozen=True, eq=False)
+class Amplitudes:
+    """Amplitudes of a combination: values and covariance in the order of the choices' columns."""
+
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+
+class Race:
+    """Candidates on what a base model leaves.
+
+    Args:
+        blocks: compressed runs over all columns, base first.
+        base: what is known of the base columns.
+        held: orthonormal rows of fitted base directions to keep at zero, in units of the scales.
+        columns: number of all columns.
+        noise: standard deviation of one measurement.
+    """
+
+    def __init__(
+        self, blocks: Sequence[Block], base: Columns, held: NDArray[np.float64], columns: int, noise: float
+    ) -> None:
+        count = len(base.prior)
+        whole = _whole(blocks, columns) / noise
+        random, fitted = np.flatnonzero(base.random), np.flatnonzero(~base.random)
+        free = _free(base, fitted, held)
+        eliminated = np.hstack([whole[:, random], whole[:, fitted] @ free])
+        priors = np.zeros((len(random), eliminated.shape[1] + columns - count + 1))
+        priors[np.arange(len(random)), np.arange(len(random))] = 1.0 / base.prior[random]
+        (triangle,) = qr(np.vstack([np.hstack([eliminated, whole[:, count:]]), priors]), mode="r")
+        skip = eliminated.shape[1]
+        self._first = count
+        self._left = np.asarray(triangle, dtype=np.float64)[skip : skip + columns - count + 1, skip:]
+
+    @property
+    def chi2(self) -> float:
+        """Weighted sum of squares that the base leaves."""
+        return float(self._left[:, -1] @ self._left[:, -1])
+
+    def evidence(self, variants: Sequence[Variant]) -> float:
+        """Log evidence of base and variants over that of the base alone."""
+        if not variants:
+            return 0.0
+        prior = np.concatenate([variant.prior for variant in variants])
+        triangle, chi2 = self._solved(variants)
+        occam = np.log(np.abs(np.diag(triangle))).sum() + np.log(prior).sum()
+        return 0.5 * (self.chi2 - chi2) - float(occam)
+
+    def explained(self, variants: Sequence[Variant]) -> float:
+        """Weighted sum of squares that variants take out of what the base leaves, without their priors."""
+        columns = self._left[:, np.concatenate([v.columns for v in variants]) - self._first]
+        fitted, *_ = np.linalg.lstsq(columns, self._left[:, -1], rcond=1e-9)
+        return float(np.sum((columns @ fitted) ** 2))
+
+    def amplitudes(self, variants: Sequence[Variant]) -> Amplitudes:
+        """Most probable amplitudes of a combination, and their covariance."""
+        columns = np.concatenate([v.columns for v in variants]) - self._first
+        prior = np.concatenate([v.prior for v in variants])
+        stacked = np.vstack([self._left[:, columns], np.diag(1.0 / prior)])
+        target = np.concatenate([self._left[:, -1], np.zeros(len(prior))])
+        inverse = np.linalg.pinv(stacked)
+        return Amplitudes(inverse @ target, np.asarray(inverse @ inverse.T, dtype=np.float64))
+
+    def sigma(self, variant: Variant, others: Sequence[Variant] = ()) -> NDArray[np.float64]:
+        """Standard deviation of a variant's amplitudes from the measurement alone, base and others fitted, (p,).
+
+        Infinite where the measurement cannot tell it from those.
+        """
+        columns = [variant.columns, *(other.columns for other in others)]
+        prior = [np.full(len(variant.columns), np.inf), *(other.prior for other in others)]
+        stacked = np.vstack(
+            [self._left[:, np.concatenate(columns) - self._first], np.diag(1.0 / np.concatenate(prior))]
+        )
+        scaled = stacked * np.concatenate([variant.prior, *(other.prior for other in others)])
+        _, s, vt = np.linalg.svd(scaled, full_matrices=False)
+        with np.errstate(divide="ignore"):
+            variance = np.sum((vt[:, : len(variant.columns)] / s[:, None]) ** 2, axis=0)
+        return variant.prior * np.sqrt(variance)
+
+    def best_variant(self, candidate: Candidate, others: Sequence[Variant]) -> tuple[Variant, float]:
+        """Best form of a candidate beside others, and the log evidence of all its forms together."""
+        evidences = np.array([self.evidence([*others, variant]) for variant in candidate.variants])
+        top = float(evidences.max())
+        together = top + float(np.log(np.mean(np.exp(evidences - top))))
+        return candidate.variants[int(evidences.argmax())], together
+
+    def _solved(self, variants: Sequence[Variant]) -> tuple[NDArray[np.float64], float]:
+        columns = np.concatenate([v.columns for v in variants]) - self._first
+        prior = np.concatenate([v.prior for v in variants])
+        size = len(columns)
+        stacked = np.zeros((len(self._left) + size, size + 1))
+        stacked[: len(self._left), :size] = self._left[:, columns]
+        stacked[: len(self._left), -1] = self._left[:, -1]
+        stacked[len(self._left) :, :size] = np.diag(1.0 / prior)
+        (factor,) = qr(stacked, mode="r")
+        triangle = np.asarray(factor, dtype=np.float64)
+        return triangle[:size, :size], float(triangle[size, -1] ** 2)
+
+
+def select(race: Race, candidates: Sequence[Candidate], threshold: float, most: int) -> list[Choice]:
+    """Best combination of candidates, grown and pruned one at a time.
+
+    Args:
+        race: what the base leaves.
+        candidates: to choose from.
+        threshold: log evidence that a candidate must bring.
+        most: candidates at the most.
+    """
+    chosen: list[Choice] = []
+    while len(chosen) < most:
+        others = [choice.variant for choice in chosen]
+        before = race.evidence(others)
+        names = {choice.candidate.name for choice in chosen}
+        trials = [(c, *race.best_variant(c, others)) for c in candidates if c.name not in names]
+        if not trials:
+            break
+        candidate, variant, together = max(trials, key=lambda trial: trial[2])
+        if together - before < threshold:
+            break
+        chosen = _settled(race, [*chosen, Choice(candidate, variant)])
+        kept = [c for c in chosen if _worth(race, chosen, c) >= threshold]
+        if len(kept) < len(chosen) and kept and kept[-1].candidate.name != candidate.name:
+            break
+        chosen = kept
+    return chosen
+
+
+def _worth(race: Race, chosen: Sequence[Choice], one: Choice) -> float:
+    """Log evidence that one of the chosen brings beside the others."""
+    others = [c.variant for c in chosen if c is not one]
+    _, together = race.best_variant(one.candidate, others)
+    return together - race.evidence(others)
+
+
+def _settled(race: Race, chosen: list[Choice]) -> list[Choice]:
+    """Every choice in the form that fits best beside the others."""
+    for k, choice in enumerate(chosen):
+        others = [c.variant for i, c in enumerate(chosen) if i != k]
+        variant, _ = race.best_variant(choice.candidate, others)
+        chosen[k] = Choice(choice.candidate, variant)
+    return chosen
+
+
+def _whole(blocks: Sequence[Block], columns: int) -> NDArray[np.float64]:
+    """One triangle of all blocks, target last, at unit noise."""
+    rows = []
+    for block in blocks:
+        wide = np.zeros((len(block.target), columns + 1))
+        wide[:, block.columns] = block.triangle
+        wide[:, -1] = block.target
+        rows.append(wide)
+    (triangle,) = qr(np.vstack(rows), mode="r", overwrite_a=True)
+    return np.asarray(triangle, dtype=np.float64)[: columns + 1]
+
+
+def _free(base: Columns, fitted: NDArray[np.int64], held: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Fitted columns in units of their scales, along the directions that are not held, shape (f, free)."""
+    if len(held) == 0:
+        return np.diag(base.scale[fitted])
+    _, _, vt = np.linalg.svd(held, full_matrices=True)
+    return base.scale[fitted][:, None] * vt[len(held) :].T

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import queue
-import threading
-from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
 from dbbstation.errors import StationError
@@ -50,7 +48,6 @@ class Station:
         self._source = source
         self._commands: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self._observers: list[Observer] = []
-        self._wake = threading.Event()
 
     @property
     def state(self) -> State:
@@ -62,9 +59,8 @@ class Station:
         self._observers.append(observer)
 
     def send(self, command: Command) -> None:
-        """Put a command into the queue; thread-safe, also from a signal handler."""
+        """Put a command into the queue; from any thread and from signal handlers, for which this queue is made."""
         self._commands.put(command)
-        self._wake.set()
 
     def run(self) -> State:
         """Run until the sequence is finished or stopped; return the state it ended in.
@@ -74,29 +70,28 @@ class Station:
         """
         try:
             self._publish(self._sequencer.begin())
+            idle = False
             while self.state not in FINAL:
-                if not self._step():
-                    self._wake.wait(_TICK_S)
-                self._wake.clear()
+                idle = not self._carry_command(wait=idle) and not self._carry_readings()
         except StationError as error:
             self._tell_of(error)
             raise
         return self.state
 
-    def _step(self) -> bool:
-        """Carry what has come; return whether there was anything."""
-        busy = False
-        with suppress(queue.Empty):
-            while self.state not in FINAL:
-                command = self._commands.get_nowait()
-                busy = True
-                self._publish(self._sequencer.command(command))
-        if self.state in FINAL:
-            return busy
+    def _carry_command(self, *, wait: bool) -> bool:
+        """Carry one command, waiting a moment for it where nothing else is to do; return whether there was one."""
+        try:
+            command = self._commands.get(block=wait, timeout=_TICK_S)
+        except queue.Empty:
+            return False
+        self._publish(self._sequencer.command(command))
+        return True
+
+    def _carry_readings(self) -> bool:
+        """Carry what the instrument has; return whether there was anything."""
         readings = self._source.drain()
-        if readings:
-            self._publish(self._sequencer.readings(readings))
-        return busy or bool(readings)
+        self._publish(self._sequencer.readings(readings))
+        return bool(readings)
 
     def _publish(self, events: Sequence[Event]) -> None:
         for event in events:

@@ -1,0 +1,114 @@
+"""`dbbstation emulate`: a virtual machine with a bar, on a line of its own."""
+
+from __future__ import annotations
+
+import json
+import signal
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import MachineModel
+
+_LOOK_S = 0.2
+
+
+@click.command()
+@click.option("--instrument", required=True, metavar="NAME", help="An instrument that is known, or a protocol file.")
+@click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="Balls and circles.")
+@click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
+@click.option("--truth", type=click.Path(path_type=Path), help="Model with what is wrong with the actual machine.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random.")
+@click.option("--time-scale", type=click.FloatRange(0.01, 200.0), default=1.0, show_default=True, help="Times faster.")
+@click.option("--noise-um", type=click.FloatRange(min=0.0), default=0.3, show_default=True, help="Of a reading [µm].")
+@click.option(
+    "--bar-um", type=click.FloatRange(min=0.0), default=0.5, show_default=True, help="Of the bar length [µm]."
+)
+@click.option("--baud", type=click.IntRange(min=1), help="Baud rate that the virtual instrument is set to.")
+@click.option("--json", "as_json", is_flag=True, help="Print port and control address as one JSON line.")
+def emulate(
+    *,
+    instrument: str,
+    plan_file: Path,
+    machine_file: Path,
+    truth: Path | None,
+    seed: int,
+    time_scale: float,
+    noise_um: float,
+    bar_um: float,
+    baud: int | None,
+    as_json: bool,
+) -> None:
+    r"""Be a hexapod with a ball bar: answer as an instrument on a pseudo-terminal, until Ctrl-C or `quit`.
+
+    Prints the port, and a control address on this computer that starts circles: one line of text per command, one line
+    of JSON per answer. Without --truth the machine has random kinematic errors of 0.1 mm. Its mountings, ball
+    coordinates, bar and readings scatter as plan and options say.
+
+    \b
+    Commands at the control address:
+      start TEST DIRECTION [PROGRAM]   mount TEST   status   truth   stop   quit
+
+    \b
+    Examples:
+      dbbstation emulate --instrument streaming-encoder --plan table2.yaml --machine machine.yaml
+      dbbstation emulate --instrument heidenhain-nd281b --plan p.yaml --machine m.yaml --seed 7 --time-scale 50
+    """
+    from dbbstation.files.machine_file import read_machine
+    from dbbstation.files.plan_file import read_plan
+    from dbbstation.instrument.library import load_instrument
+    from dbbstation.virtual.cell import VirtualCell
+    from dbbstation.virtual.control import CellCommands, ControlServer
+    from dbbstation.virtual.machine import Sizes, VirtualMachine
+    from dbbstation.virtual.wire import VirtualInstrument
+    from dbbstation.virtual.wire_clock import ScaledClock
+
+    protocol = load_instrument(instrument)
+    machine, plan = read_machine(machine_file), read_plan(plan_file)
+    model = _truth(machine, truth, seed)
+    virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))
+    virtual.check()
+    clock = ScaledClock(time_scale)
+    cell = VirtualCell(virtual, clock)
+    commands = CellCommands(cell)
+    with ExitStack() as stack:
+        wire = stack.enter_context(VirtualInstrument(protocol, cell.length_mm_at, clock=clock, baud=baud))
+        control = stack.enter_context(ControlServer(commands))
+        if as_json:
+            click.echo(json.dumps({"port": wire.port, "control": control.url}))
+        else:
+            click.echo(f"port: {wire.port}\ncontrol: {control.url}")
+        # Also where a shell started it in the background, which makes programs deaf to Ctrl-C.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.default_int_handler)
+        try:
+            while not commands.quit.wait(_LOOK_S):
+                pass
+        except KeyboardInterrupt:
+            click.echo("switched off", err=True)
+
+
+def _truth(machine: Machine, file: Path | None, seed: int) -> MachineModel:
+    """Return the actual machine: of a model file, or a random one.
+
+    Raises:
+        InputError: the model file is wrong, or is of another machine.
+    """
+    from dbbstation.errors import InputError, Problem
+    from dbbstation.files.machine_file import machine_data, machine_parts
+    from dbbstation.files.models import read_model
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.sources.registry import known_sources
+    from dbbstation.virtual.truth import random_kinematics
+
+    if file is None:
+        return MachineModel(machine, random_kinematics(machine, seed))
+    model = read_model(file, known_sources()).model.of_the_machine()
+    if machine_data(machine_parts(model.machine)) != machine_data(machine_parts(machine)):
+        what = f"its nominal machine ({model.machine.name}) is not the one given with --machine ({machine.name})"
+        raise InputError([Problem(str(file), 0, 0, what, "give the machine file that the model was made for")])
+    return model

@@ -1,0 +1,200 @@
+"""`dbbstation measure`: the whole sequence of a measurement without a screen."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
+    from dbbstation.files.session import Bar
+    from dbbstation.plan.circle import Direction
+    from dbbstation.station.assembly import Workplace
+    from dbbstation.station.engine import Station
+
+_AUTO_PATIENCE_S = 60.0
+"""A virtual machine comes as soon as it has computed the run, or not at all [s of real time]."""
+
+
+@click.command()
+@click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="What is measured.")
+@click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
+@click.option("--instrument", required=True, metavar="NAME", help="An instrument that is known, or a protocol file.")
+@click.option("--port", required=True, help="Port name, or a URL such as socket://127.0.0.1:4001.")
+@click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
+@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder.")
+@click.option("--auto", metavar="URL", help="Start each circle at this control address of `emulate`, accept every run.")
+@click.option(
+    "--time-scale", type=click.FloatRange(0.01, 200.0), default=1.0, show_default=True, help="As of `emulate`."
+)
+@click.option("--operator", default="", help="Who measures.")
+@click.option("--serial-number", default="", help="Of the machine.")
+@click.option("--ambient-temp-c", type=float, help="Temperature of the shop [degC].")
+@click.option("--bar-serial-number", default="", help="Of the bar.")
+@click.option("--bar-length-mm", type=float, help="Calibrated distance between the ball centres [mm].")
+@click.option("--bar-uncertainty-um", type=float, help="Of that length, one standard deviation [µm].")
+@click.option("--bar-temp-c", type=float, help="Of the bar when it was calibrated [degC].")
+@click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
+def measure(
+    *,
+    plan_file: Path,
+    machine_file: Path,
+    instrument: str,
+    port: str,
+    baud: int | None,
+    out: Path,
+    auto: str | None,
+    time_scale: float,
+    operator: str,
+    serial_number: str,
+    ambient_temp_c: float | None,
+    bar_serial_number: str,
+    bar_length_mm: float | None,
+    bar_uncertainty_um: float | None,
+    bar_temp_c: float | None,
+    as_json: bool,
+) -> None:
+    r"""Measure a plan, test by test, into a session folder.
+
+    Says which ball goes into which bore and how the tool is tilted, waits for Enter, then for the machine: begin and
+    end of a circle are seen in the readings. Every sample is on the disk within a second. Ctrl-C stops; the same
+    command goes on where it stopped.
+
+    \b
+    Examples:
+      dbbstation measure --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
+        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar-length-mm 150.0003 --bar-uncertainty-um 0.5
+      dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `emulate`)
+    """
+    from dbbstation.files.machine_file import read_machine
+    from dbbstation.files.plan_file import read_inline_plan
+    from dbbstation.files.session_writer import SessionDetails
+    from dbbstation.instrument.driver import Instrument
+    from dbbstation.instrument.library import load_instrument
+    from dbbstation.station.assembly import Job, assemble
+    from dbbstation.station.detector import Patience
+    from dbbstation.virtual.wire_clock import ScaledClock
+
+    clock = ScaledClock(time_scale)
+    bar = _bar(bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c)
+    job = Job(
+        machine=read_machine(machine_file),
+        plan=read_inline_plan(plan_file),
+        folder=out,
+        details=SessionDetails(serial_number, operator, ambient_temp_c, bar),
+        patience=Patience() if auto is None else Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)),
+        clock=clock,
+    )
+    job.check(str(plan_file))
+    hands = None if auto is None else VirtualHands(auto)
+    with Instrument(load_instrument(instrument), port, baud=baud, clock=clock) as source:
+        workplace = assemble(job, source)
+        if workplace.writer.runs and job.details != SessionDetails():
+            click.echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)
+        interrupted = _run(workplace, hands, as_json=as_json)
+    if interrupted:
+        raise click.Abort
+
+
+def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> bool:
+    """Run the sequence, say what happens, print the summary; return whether Ctrl-C ended it."""
+    from dbbstation.cli.measure_talk import Keyboard, Summary, Talk
+    from dbbstation.cli.output import print_json
+    from dbbstation.station.autopilot import Autopilot
+
+    station, summary = workplace.station, Summary()
+    station.subscribe(summary)
+    station.subscribe(Talk(asking=hands is None, terminal=sys.stderr.isatty()))
+    if hands is not None:
+        station.subscribe(Autopilot(station.send, hands))
+    else:
+        keyboard = Keyboard(station.send)
+        station.subscribe(keyboard)
+        keyboard.start()
+    try:
+        with _interruptible(station) as interrupted:
+            station.run()
+    finally:
+        workplace.close()
+        if as_json:
+            print_json(summary.of(workplace))
+        else:
+            done, planned = workplace.schedule.accepted, len(workplace.schedule.tasks)
+            click.echo(f"{workplace.writer.session.folder}: {done} of {planned} runs accepted")
+    return interrupted.is_set()
+
+
+@contextmanager
+def _interruptible(station: Station) -> Iterator[threading.Event]:
+    """Let Ctrl-C and a polite kill end the sequence between two samples; a second one breaks off at once."""
+    from dbbstation.station.commands import Quit
+
+    interrupted = threading.Event()
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        interrupted.set()
+        signal.signal(number, signal.default_int_handler)
+        station.send(Quit())
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield interrupted
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class VirtualHands:
+    """Moves the virtual machine of `emulate`.
+
+    Args:
+        url: its control address.
+
+    Raises:
+        MachineError: no such address.
+    """
+
+    def __init__(self, url: str) -> None:
+        from dbbstation.virtual.control_client import ControlClient
+
+        self._client = ControlClient(url)
+
+    def standing(self) -> str | None:
+        """Return the name of the ball that stands on the virtual table."""
+        ball = self._client.ask("status").get("ball")
+        return None if ball is None else str(ball)
+
+    def mount(self, test: str) -> None:
+        """Put up the ball of a test."""
+        self._client.free()
+        self._client.ask("mount", test)
+
+    def start(self, test: str, direction: Direction, program: str) -> None:
+        """Start a circle."""
+        self._client.free()
+        self._client.ask("start", test, direction, *([program] if program else []))
+
+
+def _bar(serial_number: str, length_mm: float | None, uncertainty_um: float | None, temp_c: float | None) -> Bar | None:
+    """Return the bar as far as it was told.
+
+    Raises:
+        click.UsageError: length without uncertainty, or something of the bar without either.
+    """
+    from dbbstation.files.session import Bar
+
+    if length_mm is None and uncertainty_um is None:
+        if serial_number or temp_c is not None:
+            raise click.UsageError("a bar needs --bar-length-mm and --bar-uncertainty-um")
+        return None
+    if length_mm is None or uncertainty_um is None:
+        raise click.UsageError("--bar-length-mm and --bar-uncertainty-um belong together")
+    return Bar(serial_number, length_mm, uncertainty_um / 1e3, None, temp_c, None)

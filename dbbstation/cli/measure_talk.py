@@ -1,0 +1,207 @@
+"""What `dbbstation measure` says and hears: lines on standard error, a bar on a terminal, keys from standard input."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from typing import TYPE_CHECKING, Any, TextIO
+
+import click
+
+from dbbstation.station import events
+from dbbstation.station.commands import Accept, Quit, Reject, Repeat, Skip, Start
+from dbbstation.station.states import State
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbbstation.files.session import RunEntry
+    from dbbstation.station.assembly import Workplace
+    from dbbstation.station.commands import Command
+
+_BAR_WIDTH = 40
+_QUARTERS = 4
+
+_ON_ENTER: dict[State, Command] = {State.ANNOUNCED: Start(), State.COMPLETE: Accept(), State.FLAWED: Repeat()}
+_WORDS: dict[str, Command] = {
+    "m": Start(remounted=True),
+    "a": Accept(),
+    "r": Repeat(),
+    "x": Reject(),
+    "s": Skip(),
+    "q": Quit(),
+}
+_ASKED = {
+    State.ANNOUNCED: "Enter: ready, start the circle   m: ready, the holder was touched   s: skip   q: quit",
+    State.COMPLETE: "Enter: accept   r: repeat   x: reject   q: quit",
+    State.FLAWED: "Enter: repeat   x: reject   q: quit",
+}
+
+
+class Talk:
+    """Tells a person what happens; an observer of the station.
+
+    Args:
+        asking: somebody answers, so say what can be answered.
+        terminal: draw a bar that is overwritten, instead of a line per quarter.
+    """
+
+    def __init__(self, *, asking: bool, terminal: bool) -> None:
+        self._asking = asking
+        self._terminal = terminal
+        self._quarter = 0
+        self._drawn = False
+
+    def __call__(self, event: events.Event) -> None:
+        """Say what the event means."""
+        if isinstance(event, events.Progress):
+            self._progress(event)
+            return
+        for line in _lines(event):
+            self._say(line)
+        if self._asking and isinstance(event, events.StateChanged) and event.state in _ASKED:
+            self._say(f"  {_ASKED[event.state]}")
+
+    def _progress(self, event: events.Progress) -> None:
+        share = min(event.swept_deg / event.of_deg, 1.0)
+        if self._terminal:
+            done = round(share * _BAR_WIDTH)
+            text = f"\r  [{'#' * done}{'-' * (_BAR_WIDTH - done)}] {event.swept_deg:4.0f} of {event.of_deg:.0f}°"
+            click.echo(text, err=True, nl=False)
+            self._drawn = True
+            return
+        quarter = int(share * _QUARTERS)
+        if quarter > self._quarter:
+            click.echo(f"  {event.run.label}: {event.swept_deg:.0f} of {event.of_deg:.0f}°", err=True)
+        self._quarter = quarter
+
+    def _say(self, line: str) -> None:
+        if self._drawn:
+            click.echo(err=True)
+            self._drawn = False
+        click.echo(line, err=True)
+
+
+class Summary:
+    """Collects what `--json` prints; an observer of the station."""
+
+    def __init__(self) -> None:
+        self._completed: dict[str, events.RunCompleted] = {}
+        self._fault = ""
+
+    def __call__(self, event: events.Event) -> None:
+        """Remember the figures of runs, and what went wrong."""
+        if isinstance(event, events.RunCompleted):
+            self._completed[event.run.label] = event
+        elif isinstance(event, events.Fault):
+            self._fault = str(event.error)
+
+    def of(self, workplace: Workplace) -> dict[str, Any]:
+        """Return the session as plain values; figures of the runs that were recorded now."""
+        session, schedule = workplace.writer.session, workplace.schedule
+        return {
+            "session": str(session.folder),
+            "state": workplace.station.state.name.lower(),
+            "fault": self._fault or None,
+            "planned": len(schedule.tasks),
+            "accepted": schedule.accepted,
+            "missing": [task.text for task in schedule.open],
+            "runs": [self._run(run) for run in session.runs],
+        }
+
+    def _run(self, run: RunEntry) -> dict[str, Any]:
+        told: dict[str, Any] = {
+            "test": run.test,
+            "direction": run.direction.value,
+            "repeat": run.repeat,
+            "mounting": run.mounting,
+            "state": run.state.value,
+            "file": f"runs/{run.path.name}",
+        }
+        completed = self._completed.get(f"{run.test}-{run.direction}-{run.repeat}")
+        if completed is None:
+            return told
+        told |= {"samples": completed.samples, "lost": completed.lost, "problem": completed.problem or None}
+        if completed.figures is not None:
+            told |= {
+                "centre_deviation_um": completed.figures.centre_deviation_um,
+                "mean_radial_error_um": completed.figures.mean_radial_error_um,
+                "circularity_um": completed.figures.circularity_um,
+            }
+        return told
+
+
+class Keyboard:
+    """Turns lines of standard input into commands; an observer of the station, which knows what Enter means now.
+
+    Args:
+        send: takes commands.
+        lines: where they are read.
+    """
+
+    def __init__(self, send: Callable[[Command], None], lines: TextIO | None = None) -> None:
+        self._send = send
+        self._lines = lines or sys.stdin
+        self._state = State.BETWEEN
+        # A thread that waits for a line cannot be woken; as a daemon it ends with the program.
+        self._thread = threading.Thread(target=self._listen, name="keyboard", daemon=True)
+
+    def start(self) -> None:
+        """Begin to listen."""
+        self._thread.start()
+
+    def __call__(self, event: events.Event) -> None:
+        """Remember the state."""
+        if isinstance(event, events.StateChanged):
+            self._state = event.state
+
+    def _listen(self) -> None:
+        for line in self._lines:
+            word = line.strip().lower()
+            command = _WORDS.get(word[:1]) if word else _ON_ENTER.get(self._state)
+            if command is not None:
+                self._send(command)
+            elif word:
+                click.echo(f"  `{word}` is no answer", err=True)
+        # The input has ended: nobody will answer any more.
+        self._send(Quit())
+
+
+def _lines(event: events.Event) -> list[str]:
+    """Return what there is to say of an event."""
+    match event:
+        case events.RunAnnounced():
+            head = f"{event.number} of {event.count}: test {event.run.test} {event.run.direction}"
+            head += f" (repeat {event.run.repeat})" if event.run.repeat > 1 else ""
+            return [head, *(f"  - {step}" for step in event.instructions)]
+        case events.SessionFinished() if event.missing:
+            return [f"left out, measure them another time: {', '.join(event.missing)}"]
+        case events.SessionStopped() | events.Fault():
+            run = event.interrupted
+            return [] if run is None else [f"  {run.label}: interrupted, kept as far as it came"]
+        case events.CommandRefused():
+            return [f"  {event.why}"]
+        case (
+            events.RunStarted() | events.RunCompleted() | events.RunAccepted() | events.RunRejected() | events.RunLate()
+        ):
+            return [f"  {event.run.label}: {_of_run(event)}"]
+    return []
+
+
+def _of_run(
+    event: events.RunStarted | events.RunCompleted | events.RunAccepted | events.RunRejected | events.RunLate,
+) -> str:
+    match event:
+        case events.RunStarted():
+            return "recording"
+        case events.RunAccepted():
+            return "accepted"
+        case events.RunRejected():
+            return f"does not count, kept ({event.reason})"
+        case events.RunCompleted(figures=figures) if figures is not None:
+            lost = f", {event.lost} samples lost" if event.lost else ""
+            return (
+                f"{event.samples} samples{lost}; centre off {figures.centre_deviation_um:.1f} µm, "
+                f"mean {figures.mean_radial_error_um:+.1f} µm, circularity {figures.circularity_um:.1f} µm"
+            )
+    return event.problem

@@ -1,0 +1,100 @@
+"""Putting a station together: plan, session folder, storage and sequencer about one instrument."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from dbbstation.files.session_writer import SessionDetails
+from dbbstation.station.detector import Patience
+from dbbstation.station.engine import Station
+from dbbstation.station.opening import last_end, open_session
+from dbbstation.station.preflight import check_plan
+from dbbstation.station.schedule import Schedule
+from dbbstation.station.sequencer import Sequencer
+from dbbstation.station.storage import Storage, time_of_day
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from dbbstation.files.plan_file import InlinePlan
+    from dbbstation.files.session_writer import SessionWriter
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.circle import Direction
+    from dbbstation.station.engine import ReadingSource
+    from dbbstation.station.programs import RunProgram
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What is measured, on what, into what.
+
+    Attributes:
+        machine: nominal machine.
+        plan: with its jig inline, as it goes into the session.
+        folder: of the session; made, or gone on with.
+        details: noted when the session is made; a session that exists keeps what it has.
+        programs: what commands each test and direction; empty: plain nominal circles.
+        patience: how long is waited for the machine.
+        clock: machine time, that of the instrument's readings [s].
+    """
+
+    machine: Machine
+    plan: InlinePlan
+    folder: Path
+    details: SessionDetails = field(default_factory=SessionDetails)
+    programs: Mapping[tuple[str, Direction], RunProgram] = field(default_factory=dict)
+    patience: Patience = field(default_factory=Patience)
+    clock: Callable[[], float] = time.monotonic
+
+    def check(self, plan_file: str) -> None:
+        """Dry-run the plan; to be done before an instrument is opened.
+
+        Raises:
+            InputError: a test that readings cannot follow.
+            TravelError: a circle leaves the machine's travel.
+        """
+        check_plan(self.plan.to_domain(), self.machine, file=plan_file)
+
+
+@dataclass(frozen=True, eq=False)
+class Workplace:
+    """A station ready to run, with what others want to see of it; close it whatever happens.
+
+    Attributes:
+        station: subscribe to it, send it commands, run it.
+        schedule: what is done and left.
+        writer: of the session folder.
+    """
+
+    station: Station
+    schedule: Schedule
+    writer: SessionWriter
+    _storage: Storage
+
+    def close(self) -> None:
+        """Bring everything to disk."""
+        self._storage.close()
+
+
+def assemble(job: Job, source: ReadingSource) -> Workplace:
+    """Open the session and build the station; storage is its first observer.
+
+    Raises:
+        InputError: the folder holds another session, or one with faults.
+        OutputError: the folder cannot be written.
+    """
+    writer = open_session(job.folder, job.machine, job.plan, job.details, with_programs=bool(job.programs))
+    plan = job.plan.to_domain()
+    kept = {
+        key: writer.add_program(program.name, program.content, model_sha256=program.model_sha256)
+        for key, program in job.programs.items()
+    }
+    schedule = Schedule(plan, writer.next_repeat, writer.runs)
+    names = {key: program.name for key, program in job.programs.items()}
+    station = Station(Sequencer(plan, schedule, programs=names, patience=job.patience), source)
+    storage = Storage(writer, time_of_day(job.clock, last_end(writer.session)), kept)
+    station.subscribe(storage)
+    return Workplace(station, schedule, writer, storage)

@@ -1,0 +1,76 @@
+"""Making the session folder, or going on with the one that is there."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.machine_file import machine_data, machine_parts
+from dbbstation.files.plan_file import plan_data, read_inline_plan
+from dbbstation.files.session import RunState
+from dbbstation.files.session_writer import SessionWriter
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.files.plan_file import InlinePlan
+    from dbbstation.files.session import SessionFolder
+    from dbbstation.files.session_writer import SessionDetails
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.circle import Direction
+
+
+def check_session(
+    folder: Path, machine: Machine, plan: InlinePlan, *, with_programs: bool, session: SessionFolder
+) -> None:
+    """Refuse to go on with a session of another machine, another plan, or another way to command the circles.
+
+    Raises:
+        InputError: everything that differs.
+    """
+    faults = []
+    if machine_data(machine_parts(machine)) != machine_data(machine_parts(session.machine)):
+        what = "the machine of this session is another one"
+        faults.append(Problem(str(session.machine_path), 0, 0, what, "give its machine file, or another --out"))
+    if plan_data(plan) != plan_data(read_inline_plan(session.plan_path)):
+        what = "the plan of this session is another one"
+        faults.append(Problem(str(session.plan_path), 0, 0, what, "give its plan file, or another --out"))
+    other = [run for run in session.in_state(RunState.ACCEPTED) if (run.program is not None) is not with_programs]
+    if other:
+        was, now = ("plain circles", "NC programs") if with_programs else ("NC programs", "plain circles")
+        what = f"its runs were commanded by {was}, now {now} are asked for"
+        faults.append(Problem(str(folder), 0, 0, what, "measure them into a session of their own"))
+    if faults:
+        raise InputError(faults)
+
+
+def open_session(
+    folder: Path, machine: Machine, plan: InlinePlan, details: SessionDetails, *, with_programs: bool
+) -> SessionWriter:
+    """Make a session folder; where it exists with the same machine and plan, go on with it as it is.
+
+    Raises:
+        InputError: the folder holds another session, or one with faults.
+        OutputError: it exists and is no session, or cannot be written.
+    """
+    if not (folder / "session.yaml").is_file():
+        return SessionWriter.create(folder, machine, plan, details)
+    writer = SessionWriter.open(folder)
+    check_session(folder, machine, plan, with_programs=with_programs, session=writer.session)
+    return writer
+
+
+def last_end(session: SessionFolder) -> datetime | None:
+    """Return when the last run of a session ended at the latest, None where there is none."""
+    ends = [
+        run.started + timedelta(seconds=2.0 * _turn_s(session, run.test, run.direction))
+        for run in session.runs
+        if run.started is not None
+    ]
+    return max(ends, default=None)
+
+
+def _turn_s(session: SessionFolder, test: str, direction: Direction) -> float:
+    circle = session.plan.tests[test].run(direction)
+    return circle.swept_deg / circle.turning_deg_s

@@ -1,0 +1,114 @@
+"""The virtual measuring cell: machine, ball and bar in virtual time, told what to do by one thread, read by another."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.errors import MachineError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbbstation.plan.circle import Direction
+    from dbbstation.virtual.machine import VirtualMachine, VirtualRun
+    from dbbstation.virtual.path import CommandedPath
+
+
+@dataclass(frozen=True)
+class _Running:
+    run: VirtualRun
+    begin_s: float
+
+
+class VirtualCell:
+    """What the bar reads at any virtual time.
+
+    Before a run and while a ball is put up the bar lies aside. After a run it stands where the run ended.
+
+    Args:
+        machine: the machine.
+        clock: virtual time [s].
+    """
+
+    def __init__(self, machine: VirtualMachine, clock: Callable[[], float]) -> None:
+        self.machine = machine
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._running: _Running | None = None
+        self._origin_s: float | None = None
+
+    def length_mm_at(self, t_s: float) -> float | None:
+        """Reading at a virtual time [mm]; None while the bar lies aside."""
+        with self._lock:
+            running = self._running
+        if running is None:
+            return None
+        return running.run.length_mm_at(t_s - running.begin_s) + self.machine.noise_mm()
+
+    def mount(self, test: str) -> int:
+        """Put up the ball of a test, touching its holder in any case; return the number of the mounting.
+
+        Raises:
+            MachineError: a run goes on, or the plan has no such test.
+        """
+        self._refuse_while_running("put up a ball")
+        if test not in self.machine.plan.tests:
+            names = ", ".join(self.machine.plan.tests)
+            raise MachineError(f"the plan has no test {test}", where="virtual machine", remedy=f"its tests: {names}")
+        with self._lock:
+            self._running = None
+            return self.machine.mount(self.machine.plan.tests[test].ball)
+
+    def start(self, test: str, direction: Direction, path: CommandedPath | None = None) -> VirtualRun:
+        """Start a run now; its ball is put up first where another one stands.
+
+        Raises:
+            MachineError: another run goes on, or this one cannot be run.
+        """
+        self._refuse_while_running("start another run")
+        if self._origin_s is None:
+            self._origin_s = self._clock()
+        # Computing takes some real time, which on a fast clock is a while; time-dependent errors do not mind.
+        run = self.machine.run(test, direction, path=path, begin_s=self._clock() - self._origin_s)
+        with self._lock:
+            self._running = _Running(run, self._clock())
+        return run
+
+    def stop(self) -> None:
+        """Stop the machine where it is and lay the bar aside."""
+        with self._lock:
+            self._running = None
+
+    @property
+    def running(self) -> bool:
+        """Whether the machine moves."""
+        with self._lock:
+            return (
+                self._running is not None and self._clock() < self._running.begin_s + self._running.run.path.duration_s
+            )
+
+    def status(self) -> dict[str, Any]:
+        """What the cell does, as plain values."""
+        with self._lock:
+            running = self._running
+        ball = self.machine.mounted
+        told: dict[str, Any] = {
+            "state": "running" if self.running else "idle",
+            "ball": None if ball is None else ball.name,
+            "mounting": self.machine.mountings or None,
+        }
+        if running is not None:
+            elapsed_s = min(self._clock() - running.begin_s, running.run.path.duration_s)
+            told |= {
+                "test": running.run.test,
+                "direction": running.run.direction.value,
+                "elapsed_s": round(elapsed_s, 3),
+                "duration_s": round(running.run.path.duration_s, 3),
+            }
+        return told
+
+    def _refuse_while_running(self, what: str) -> None:
+        if self.running:
+            raise MachineError(f"cannot {what} while a run goes on", where="virtual machine", remedy="wait, or stop it")

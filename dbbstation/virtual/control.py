@@ -1,0 +1,161 @@
+"""The control address of the virtual machine: one line of text in, one line of JSON out, on the loopback address only.
+
+    mount TEST                       put up the ball of a test, in any case a new mounting
+    start TEST DIRECTION [PROGRAM]   run a circle; its ball is put up first where another one stands
+    status                           what the machine does
+    truth                            everything that is wrong with it
+    stop                             stop the machine, lay the bar aside
+    quit                             end the program
+
+Every answer has `ok`; where that is false, `error` says why.
+"""
+
+from __future__ import annotations
+
+import json
+import selectors
+import socket
+import threading
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.errors import MachineError, StationError
+from dbbstation.plan.circle import Direction
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Self
+
+    from dbbstation.virtual.cell import VirtualCell
+    from dbbstation.virtual.path import CommandedPath
+
+    Programs = Callable[[str, str, Direction], CommandedPath]
+
+LOOPBACK = "127.0.0.1"
+SCHEME = "tcp://"
+
+_TICK_S = 0.05
+_LONGEST = 4096
+"""Bytes of a line; whoever sends more is no friend."""
+
+
+class CellCommands:
+    """Obeys the commands of the protocol.
+
+    Args:
+        cell: what they act on.
+        programs: turns the name of a program, a test and a direction into what it commands; None: there are none.
+    """
+
+    def __init__(self, cell: VirtualCell, programs: Programs | None = None) -> None:
+        self._cell = cell
+        self._programs = programs
+        self.quit = threading.Event()
+
+    def __call__(self, line: str) -> dict[str, Any]:
+        """Obey one line; return the answer.
+
+        Raises:
+            StationError: it cannot be obeyed.
+        """
+        match line.split():
+            case ["mount", test]:
+                return {"mounting": self._cell.mount(test)}
+            case ["start", test, direction, *program] if direction in set(Direction) and len(program) <= 1:
+                run = self._cell.start(test, Direction(direction), self._path(program, test, Direction(direction)))
+                return {"mounting": run.mounting, "duration_s": round(run.path.duration_s, 3)}
+            case ["status"]:
+                return self._cell.status()
+            case ["truth"]:
+                return self._cell.machine.describe()
+            case ["stop"]:
+                self._cell.stop()
+                return {}
+            case ["quit"]:
+                self.quit.set()
+                return {}
+        raise MachineError(
+            f"`{line}` is no command",
+            where="virtual machine",
+            remedy="mount TEST, start TEST ccw|cw [PROGRAM], status, truth, stop, quit",
+        )
+
+    def _path(self, program: list[str], test: str, direction: Direction) -> CommandedPath | None:
+        if not program:
+            return None
+        if self._programs is None:
+            raise MachineError("it has no programs", where="virtual machine", remedy="start `emulate` with --programs")
+        return self._programs(program[0], test, direction)
+
+
+class ControlServer:
+    """Answers on a loopback port, in one thread; use it in a `with` block.
+
+    Args:
+        obey: turns a line into an answer.
+
+    Attributes:
+        url: where it listens.
+    """
+
+    def __init__(self, obey: Callable[[str], dict[str, Any]]) -> None:
+        self._obey = obey
+        self._server = socket.create_server((LOOPBACK, 0))
+        self._server.setblocking(False)  # noqa: FBT003 (the socket module's own signature)
+        self.url = f"{SCHEME}{LOOPBACK}:{self._server.getsockname()[1]}"
+        self._stop = threading.Event()
+        self._selector = selectors.DefaultSelector()
+        self._pending: dict[socket.socket, bytes] = {}
+        self._thread = threading.Thread(target=self._serve, name="control", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._selector.register(self._server, selectors.EVENT_READ)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+        for client in list(self._pending):
+            self._forget(client)
+        self._selector.close()
+        self._server.close()
+
+    def _serve(self) -> None:
+        while not self._stop.is_set():
+            for key, _ in self._selector.select(_TICK_S):
+                if key.fileobj is self._server:
+                    client, _address = self._server.accept()
+                    client.settimeout(1.0)
+                    self._pending[client] = b""
+                    self._selector.register(client, selectors.EVENT_READ)
+                elif isinstance(key.fileobj, socket.socket):
+                    self._hear(key.fileobj)
+
+    def _hear(self, client: socket.socket) -> None:
+        try:
+            came = client.recv(_LONGEST)
+        except OSError:
+            came = b""
+        pending = self._pending[client] + came
+        if not came or len(pending) > _LONGEST:
+            self._forget(client)
+            return
+        *lines, self._pending[client] = pending.split(b"\n")
+        for line in lines:
+            answer = json.dumps(self._answer(line.decode("utf-8", "replace").strip())) + "\n"
+            try:
+                client.sendall(answer.encode())
+            except OSError:
+                self._forget(client)
+                return
+
+    def _answer(self, line: str) -> dict[str, Any]:
+        try:
+            return {"ok": True, **self._obey(line)}
+        except StationError as error:
+            return {"ok": False, "error": str(error)}
+
+    def _forget(self, client: socket.socket) -> None:
+        self._selector.unregister(client)
+        del self._pending[client]
+        client.close()

@@ -1,0 +1,77 @@
+"""Talks to the control address of a virtual machine."""
+
+from __future__ import annotations
+
+import json
+import socket
+from typing import Any
+from urllib.parse import urlsplit
+
+from dbbstation.errors import MachineError
+
+_PATIENCE_S = 30.0
+"""The first run on a new computer waits for the compiler."""
+
+_LOCAL = {"127.0.0.1", "localhost"}
+
+
+class ControlClient:
+    """Sends one command per connection.
+
+    Args:
+        url: as `emulate` prints it, such as `tcp://127.0.0.1:41234`.
+
+    Raises:
+        MachineError: the address is none, or is on another computer: a program must not move a machine that nobody
+            at it can see.
+    """
+
+    def __init__(self, url: str) -> None:
+        parts = urlsplit(url if "//" in url else f"//{url}")
+        try:
+            port = parts.port
+        except ValueError:
+            port = None
+        if parts.hostname not in _LOCAL or not port:
+            raise MachineError(
+                "this is no control address of a virtual machine on this computer",
+                where=url,
+                remedy="give the one that `dbbstation emulate` prints, such as tcp://127.0.0.1:41234",
+            )
+        self.url = url
+        self._address = ("127.0.0.1", port)
+
+    def ask(self, *words: str) -> dict[str, Any]:
+        """Send a command, return its answer.
+
+        Raises:
+            MachineError: nobody answers, or the machine refuses.
+        """
+        try:
+            with socket.create_connection(self._address, timeout=_PATIENCE_S) as line:
+                line.sendall((" ".join(words) + "\n").encode())
+                came = b""
+                while not came.endswith(b"\n"):
+                    chunk = line.recv(65536)
+                    if not chunk:
+                        break
+                    came += chunk
+            answer: dict[str, Any] = json.loads(came)
+        except (OSError, ValueError) as error:
+            raise MachineError(
+                f"the virtual machine does not answer `{' '.join(words)}`: {error}",
+                where=self.url,
+                remedy="is `dbbstation emulate` still running?",
+            ) from None
+        if not answer.get("ok"):
+            raise MachineError(str(answer.get("error", "it refuses")), where=self.url)
+        return answer
+
+    def free(self) -> None:
+        """Stop a run that still goes on, left over from a program that died.
+
+        Raises:
+            MachineError: nobody answers.
+        """
+        if self.ask("status").get("state") == "running":
+            self.ask("stop")

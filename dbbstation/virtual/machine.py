@@ -1,0 +1,181 @@
+"""The virtual machine: a nominal controller drives actual geometry, a bar between two balls reads the distance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.errors import MachineError
+from dbbstation.sources.contract import Motion, Setup
+from dbbstation.virtual.path import circle_path
+from dbbstation.virtual.truth import Scatter
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.plan import Ball, Plan, PlannedTest
+    from dbbstation.sources.contract import Fitted
+    from dbbstation.virtual.path import CommandedPath
+
+_SESSION, _BAR = "virtual session", "virtual bar"
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How well the virtual measurement goes, one standard deviation each.
+
+    Attributes:
+        noise_mm: of one reading [mm].
+        bar_uncertainty_mm: of the bar's length [mm].
+    """
+
+    noise_mm: float = 0.0003
+    bar_uncertainty_mm: float = 0.0005
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualRun:
+    """A run computed before it starts.
+
+    Attributes:
+        test: name of the test.
+        direction: sense of travel.
+        mounting: number of the mounting it was made on.
+        path: as commanded.
+        length_mm: true distance plus the bar's own error at the times of the path, shape (n,) [mm].
+    """
+
+    test: str
+    direction: Direction
+    mounting: int
+    path: CommandedPath
+    length_mm: NDArray[np.float64]
+
+    def length_mm_at(self, t_s: float) -> float:
+        """Distance at a time after the start of the run; it stands still before and after [mm]."""
+        return float(np.interp(t_s, self.path.t_s, self.length_mm))
+
+
+class VirtualMachine:
+    """A machine with known errors, a plan's balls to mount, circles to run.
+
+    Args:
+        truth: nominal machine with what is wrong with the actual one.
+        plan: balls and circles.
+        seed: of mountings, ball coordinates, bar and noise.
+        sizes: how well the measurement goes.
+    """
+
+    def __init__(self, truth: MachineModel, plan: Plan, *, seed: int = 0, sizes: Sizes | None = None) -> None:
+        self.sizes = sizes or Sizes()
+        self.truth = truth.of_the_machine()
+        self.plan = plan
+        self.mountings = 0
+        self.mounted: Ball | None = None
+        self._scatter = Scatter(seed, self.sizes.bar_uncertainty_mm)
+        self._bar = self._scatter.bar(_BAR)
+        self._noise = np.random.default_rng([seed, 5])
+
+    def check(self) -> None:
+        """Compute every run of the plan once, so that what cannot be run is known before anything starts.
+
+        Raises:
+            TravelError: a circle leaves the travel.
+            MachineError: the actual machine cannot take a pose.
+            ModelError: an error source of the truth needs what a virtual machine does not have, such as temperatures.
+        """
+        self.plan.check(self.truth.machine)
+        for test in self.plan.tests.values():
+            path = circle_path(test.circle)
+            self.truth.bar(Motion(path.poses, is_path=True, time_s=path.t_s, setup=self._setup(test.ball)))
+
+    def mount(self, ball: Ball) -> int:
+        """Put a ball up, which makes a new mounting even where it stood there before; return its number."""
+        self.mountings += 1
+        self.mounted = ball
+        return self.mountings
+
+    def run(
+        self, test: str, direction: Direction, *, path: CommandedPath | None = None, begin_s: float = 0.0
+    ) -> VirtualRun:
+        """Compute a run, with its ball put up first where another one stands.
+
+        Args:
+            test: name of the test.
+            direction: sense of travel.
+            path: what a program commands; the plan's circle by default.
+            begin_s: session time at which it will start, for errors that grow with time [s].
+
+        Raises:
+            MachineError: the plan has no such run, or the actual machine cannot take a pose of the path.
+            ModelError: an error source of the truth needs what a virtual machine does not have, such as temperatures.
+        """
+        planned = self._planned(test, direction)
+        if self.mounted is None or self.mounted.name != planned.ball.name:
+            self.mount(planned.ball)
+        path = path or circle_path(planned.run(direction))
+        motion = Motion(
+            poses=path.poses,
+            is_path=True,
+            time_s=begin_s + path.t_s,
+            setup=self._setup(planned.ball),
+        )
+        model = replace(self.truth, sources=(*self.truth.sources, *self._of_the_measurement(planned.ball)))
+        return VirtualRun(test, direction, self.mountings, path, model.bar(motion).length_mm)
+
+    def noise_mm(self) -> float:
+        """Return the error of the next reading [mm]."""
+        return float(self._noise.normal(0.0, self.sizes.noise_mm)) if self.sizes.noise_mm else 0.0
+
+    def describe(self) -> dict[str, Any]:
+        """Everything that is wrong, by source, set and parameter, in the parameters' units."""
+        sources = (*self.truth.sources, self._bar, *self._scatter.all())
+        return {
+            "sources": [
+                {
+                    "name": fitted.source.name,
+                    "belongs_to": fitted.source.belongs_to.value,
+                    "shared": fitted.shared,
+                    "parameters": {
+                        parameter.name: float(value)
+                        for parameter, value in zip(
+                            fitted.source.parameters(self.truth.machine), fitted.values, strict=True
+                        )
+                    },
+                }
+                for fitted in sources
+            ]
+        }
+
+    def _planned(self, test: str, direction: Direction) -> PlannedTest:
+        planned = self.plan.tests.get(test)
+        if planned is None or direction not in planned.directions:
+            names = ", ".join(self.plan.tests)
+            raise MachineError(
+                f"the plan has no run {test} {direction}", where="virtual machine", remedy=f"its tests: {names}"
+            )
+        return planned
+
+    def _setup(self, ball: Ball) -> Setup:
+        return Setup(
+            session=_SESSION,
+            mounting=self._mounting_name,
+            ball=ball.name,
+            instrument=_BAR,
+            fixed_ball_mm=np.array(ball.centre_mm),
+            mounting_repeatability_mm=ball.repeatability_mm,
+            ball_uncertainty_mm=ball.uncertainty_mm,
+            bar_uncertainty_mm=self.sizes.bar_uncertainty_mm,
+        )
+
+    def _of_the_measurement(self, ball: Ball) -> tuple[Fitted, ...]:
+        of_ball = self._scatter.ball(ball, ball.name)
+        return (self._bar, of_ball, self._scatter.mounting(ball, self.mountings, self._mounting_name))
+
+    @property
+    def _mounting_name(self) -> str:
+        return f"mounting {self.mountings}"

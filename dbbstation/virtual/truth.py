@@ -1,0 +1,70 @@
+"""What is wrong with the virtual machine, drawn at random with stated sizes: a seed makes the same machine again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Fitted
+from dbbstation.sources.registry import sources_named
+
+if TYPE_CHECKING:
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.plan import Ball
+
+JOINT_ERROR_MM = 0.1
+"""Standard deviation of strut reference lengths and of joint coordinates of a random machine [mm]."""
+
+_KINEMATIC = ("strut-reference-length", "base-joints")
+
+
+def random_kinematics(machine: Machine, seed: int) -> tuple[Fitted, ...]:
+    """Return the 24 kinematic errors of a random machine."""
+    rng = np.random.default_rng([seed, 1])
+    return tuple(
+        Fitted(source, rng.normal(0.0, JOINT_ERROR_MM, len(source.parameters(machine))))
+        for source in sources_named(_KINEMATIC)
+    )
+
+
+@dataclass
+class Scatter:
+    """Errors of the measurement: of each mounting, of each ball's coordinates, of the bar's length.
+
+    Args:
+        seed: makes the same errors again; those of a ball do not depend on what else was mounted.
+        bar_uncertainty_mm: standard deviation of the bar's length error [mm].
+    """
+
+    seed: int
+    bar_uncertainty_mm: float
+    _of_balls: dict[str, Fitted] = field(default_factory=dict)
+    _of_mountings: dict[int, Fitted] = field(default_factory=dict)
+
+    def bar(self, shared: str) -> Fitted:
+        """Length error of the bar."""
+        rng = np.random.default_rng([self.seed, 2])
+        (source,) = sources_named(("bar-offset",))
+        return Fitted(source, rng.normal(0.0, self.bar_uncertainty_mm, 1), shared)
+
+    def ball(self, ball: Ball, shared: str) -> Fitted:
+        """Error of a ball's coordinates, the same in all its mountings."""
+        if ball.name not in self._of_balls:
+            rng = np.random.default_rng([self.seed, 3, *ball.name.encode()])
+            (source,) = sources_named(("ball-coordinate",))
+            self._of_balls[ball.name] = Fitted(source, rng.normal(0.0, ball.uncertainty_mm, 3), shared)
+        return self._of_balls[ball.name]
+
+    def mounting(self, ball: Ball, number: int, shared: str) -> Fitted:
+        """Where the ball came to stand when it was put up for the `number`-th time."""
+        if number not in self._of_mountings:
+            rng = np.random.default_rng([self.seed, 4, number])
+            (source,) = sources_named(("mounting",))
+            self._of_mountings[number] = Fitted(source, rng.normal(0.0, ball.repeatability_mm, 3), shared)
+        return self._of_mountings[number]
+
+    def all(self) -> tuple[Fitted, ...]:
+        """What was drawn so far, of balls and mountings."""
+        return (*self._of_balls.values(), *self._of_mountings.values())

@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
+    from dbbstation.virtual.path import CommandedPath
 
 _LOOK_S = 0.2
 
@@ -23,6 +26,7 @@ _LOOK_S = 0.2
 @click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
 @click.option("--truth", type=click.Path(path_type=Path), help="Model with what is wrong with the actual machine.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random.")
+@click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of NC programs to run.")
 @click.option("--time-scale", type=click.FloatRange(0.01, 200.0), default=1.0, show_default=True, help="Times faster.")
 @click.option("--noise-um", type=click.FloatRange(min=0.0), default=0.3, show_default=True, help="Of a reading [µm].")
 @click.option(
@@ -37,6 +41,7 @@ def emulate(
     machine_file: Path,
     truth: Path | None,
     seed: int,
+    programs: Path | None,
     time_scale: float,
     noise_um: float,
     bar_um: float,
@@ -74,7 +79,7 @@ def emulate(
     virtual.check()
     clock = ScaledClock(time_scale)
     cell = VirtualCell(virtual, clock)
-    commands = CellCommands(cell)
+    commands = CellCommands(cell, None if programs is None else _programs(programs))
     with ExitStack() as stack:
         wire = stack.enter_context(VirtualInstrument(protocol, cell.length_mm_at, clock=clock, baud=baud))
         control = stack.enter_context(ControlServer(commands))
@@ -112,3 +117,18 @@ def _truth(machine: Machine, file: Path | None, seed: int) -> MachineModel:
         what = f"its nominal machine ({model.machine.name}) is not the one given with --machine ({machine.name})"
         raise InputError([Problem(str(file), 0, 0, what, "give the machine file that the model was made for")])
     return model
+
+
+def _programs(folder: Path) -> Callable[[str], CommandedPath]:
+    """Return what turns the name of a program in a folder into what it commands."""
+    from dbbstation.errors import InputError, Problem
+    from dbbstation.station.programs import read_toolpath
+    from dbbstation.virtual.path import path_of
+
+    def read(name: str) -> CommandedPath:
+        path = folder / name
+        if path.parent != folder or not path.is_file():
+            raise InputError([Problem(str(path), 0, 0, "there is no such program", f"name a file in {folder}")])
+        return path_of(read_toolpath(path, path.read_bytes()))
+
+    return read

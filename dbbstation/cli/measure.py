@@ -7,15 +7,16 @@ import sys
 import threading
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from dbbstation.cli.session_options import session_details, session_options
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
-    from dbbstation.files.session import Bar
     from dbbstation.plan.circle import Direction
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.engine import Station
@@ -35,13 +36,8 @@ _AUTO_PATIENCE_S = 60.0
 @click.option(
     "--time-scale", type=click.FloatRange(0.01, 200.0), default=1.0, show_default=True, help="As of `emulate`."
 )
-@click.option("--operator", default="", help="Who measures.")
-@click.option("--serial-number", default="", help="Of the machine.")
-@click.option("--ambient-temp-c", type=float, help="Temperature of the shop [degC].")
-@click.option("--bar-serial-number", default="", help="Of the bar.")
-@click.option("--bar-length-mm", type=float, help="Calibrated distance between the ball centres [mm].")
-@click.option("--bar-uncertainty-um", type=float, help="Of that length, one standard deviation [µm].")
-@click.option("--bar-temp-c", type=float, help="Of the bar when it was calibrated [degC].")
+@click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")
+@session_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
 def measure(
     *,
@@ -53,14 +49,9 @@ def measure(
     out: Path,
     auto: str | None,
     time_scale: float,
-    operator: str,
-    serial_number: str,
-    ambient_temp_c: float | None,
-    bar_serial_number: str,
-    bar_length_mm: float | None,
-    bar_uncertainty_um: float | None,
-    bar_temp_c: float | None,
+    programs: Path | None,
     as_json: bool,
+    **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> None:
     r"""Measure a plan, test by test, into a session folder.
 
@@ -81,15 +72,17 @@ def measure(
     from dbbstation.instrument.library import load_instrument
     from dbbstation.station.assembly import Job, assemble
     from dbbstation.station.detector import Patience
+    from dbbstation.station.programs import load_programs
     from dbbstation.virtual.wire_clock import ScaledClock
 
     clock = ScaledClock(time_scale)
-    bar = _bar(bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c)
+    machine, plan = read_machine(machine_file), read_inline_plan(plan_file)
     job = Job(
-        machine=read_machine(machine_file),
-        plan=read_inline_plan(plan_file),
+        machine=machine,
+        plan=plan,
         folder=out,
-        details=SessionDetails(serial_number, operator, ambient_temp_c, bar),
+        details=session_details(**told),
+        programs={} if programs is None else load_programs(programs, plan.to_domain(), machine),
         patience=Patience() if auto is None else Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)),
         clock=clock,
     )
@@ -181,20 +174,3 @@ class VirtualHands:
         """Start a circle."""
         self._client.free()
         self._client.ask("start", test, direction, *([program] if program else []))
-
-
-def _bar(serial_number: str, length_mm: float | None, uncertainty_um: float | None, temp_c: float | None) -> Bar | None:
-    """Return the bar as far as it was told.
-
-    Raises:
-        click.UsageError: length without uncertainty, or something of the bar without either.
-    """
-    from dbbstation.files.session import Bar
-
-    if length_mm is None and uncertainty_um is None:
-        if serial_number or temp_c is not None:
-            raise click.UsageError("a bar needs --bar-length-mm and --bar-uncertainty-um")
-        return None
-    if length_mm is None or uncertainty_um is None:
-        raise click.UsageError("--bar-length-mm and --bar-uncertainty-um belong together")
-    return Bar(serial_number, length_mm, uncertainty_um / 1e3, None, temp_c, None)

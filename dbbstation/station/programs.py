@@ -2,7 +2,30 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.nc.commanded import poses_at_progress
+from dbbstation.nc.reach import check_reach
+from dbbstation.nc.registry import dialect_of_file, known_dialects
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.nc.toolpath import Toolpath
+    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.plan.plan import Plan
+
+_MODEL = re.compile(r"model file: .*\bsha256 ([0-9a-f]{64})")
+"""How the header of a compensated program names its model."""
+
+_PHI_DEG = np.linspace(0.0, 359.0, 360)
 
 
 @dataclass(frozen=True)
@@ -18,3 +41,64 @@ class RunProgram:
     name: str
     content: bytes
     model_sha256: str
+
+
+def load_programs(folder: Path, plan: Plan, machine: Machine) -> dict[tuple[str, Direction], RunProgram]:
+    """Read the programs of all runs of a plan, named TEST-DIRECTION with a dialect's extension.
+
+    Raises:
+        InputError: a program is missing, cannot be read, or runs another circle; every fault of every file.
+        TravelError: a program leaves the machine's travel.
+    """
+    faults: list[Problem] = []
+    programs = {}
+    for name, test in plan.tests.items():
+        for direction in test.directions:
+            path = _file_of(folder, f"{name}-{direction}", faults)
+            program = None if path is None else _loaded(path, test.run(direction), machine, faults)
+            if program is not None:
+                programs[name, direction] = program
+    if faults:
+        raise InputError(faults)
+    return programs
+
+
+def read_toolpath(path: Path, content: bytes) -> Toolpath:
+    """Return what a program file commands.
+
+    Raises:
+        InputError: faults with line and column.
+        ModelError: no dialect has files with that extension.
+    """
+    faults: list[Problem] = []
+    text = decode(content, str(path), faults)
+    if text is None:
+        raise InputError(faults)
+    return dialect_of_file(path.name).read(text, str(path))
+
+
+def _file_of(folder: Path, stem: str, faults: list[Problem]) -> Path | None:
+    candidates = [folder / (stem + dialect.extension) for dialect in known_dialects().values()]
+    found = [path for path in candidates if path.is_file()]
+    if len(found) == 1:
+        return found[0]
+    what = f"there is no program {stem}" if not found else f"several programs are called {stem}"
+    names = ", ".join(path.name for path in found or candidates)
+    remedy = f"write it with `dbbstation program` ({names})" if not found else f"leave one of {names}"
+    faults.append(Problem(str(folder), 0, 0, what, remedy))
+    return None
+
+
+def _loaded(path: Path, circle: Circle, machine: Machine, faults: list[Problem]) -> RunProgram | None:
+    content = read_bytes(path, faults)
+    if content is None:
+        return None
+    try:
+        toolpath = read_toolpath(path, content)
+        poses_at_progress(toolpath, circle, _PHI_DEG)
+    except InputError as error:
+        faults.extend(error.problems)
+        return None
+    check_reach(machine, toolpath)
+    named = [match[1] for text in toolpath.text.values() if (match := _MODEL.match(text))]
+    return RunProgram(path.name, content, named[0] if named else "")

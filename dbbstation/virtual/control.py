@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.virtual.cell import VirtualCell
     from dbbstation.virtual.path import CommandedPath
 
-    Programs = Callable[[str, str, Direction], CommandedPath]
+    Programs = Callable[[str], CommandedPath]
 
 LOOPBACK = "127.0.0.1"
 SCHEME = "tcp://"
@@ -43,7 +43,7 @@ class CellCommands:
 
     Args:
         cell: what they act on.
-        programs: turns the name of a program, a test and a direction into what it commands; None: there are none.
+        programs: turns the name of a program into what it commands; None: there are none.
     """
 
     def __init__(self, cell: VirtualCell, programs: Programs | None = None) -> None:
@@ -61,7 +61,7 @@ class CellCommands:
             case ["mount", test]:
                 return {"mounting": self._cell.mount(test)}
             case ["start", test, direction, *program] if direction in set(Direction) and len(program) <= 1:
-                run = self._cell.start(test, Direction(direction), self._path(program, test, Direction(direction)))
+                run = self._cell.start(test, Direction(direction), self._path(program))
                 return {"mounting": run.mounting, "duration_s": round(run.path.duration_s, 3)}
             case ["status"]:
                 return self._cell.status()
@@ -79,12 +79,12 @@ class CellCommands:
             remedy="mount TEST, start TEST ccw|cw [PROGRAM], status, truth, stop, quit",
         )
 
-    def _path(self, program: list[str], test: str, direction: Direction) -> CommandedPath | None:
+    def _path(self, program: list[str]) -> CommandedPath | None:
         if not program:
             return None
         if self._programs is None:
             raise MachineError("it has no programs", where="virtual machine", remedy="start `emulate` with --programs")
-        return self._programs(program[0], test, direction)
+        return self._programs(program[0])
 
 
 class ControlServer:

@@ -128,7 +128,7 @@ def compensated_program(
         what = "this program is compensated already"
         raise StationError(what, where=path.name, remedy="compensate the nominal program that it was made from")
     machine = inverse.model.machine
-    header = [f"program: {path.name}", f"machine: {machine.name}", *_said(origin or {})]
+    header = [f"machine: {machine.name}", *_said(origin or {})]
     return _program(path, machine, dialect, path.name, inverse, chord_mm, header)
 
 

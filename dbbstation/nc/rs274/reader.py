@@ -139,7 +139,8 @@ class _Interpreter:
         if motion is not None:
             self._motion = motion
         named = [letter for letter in AXES if letter in block.words]
-        if not named:
+        is_turn = self._motion in {CLOCKWISE, COUNTER_CLOCKWISE} and ("I" in block.words or "J" in block.words)
+        if not named and not is_turn:
             return
         if self._motion is None:
             word = block.words[named[0]]
@@ -151,7 +152,7 @@ class _Interpreter:
         if self._motion == RAPID:
             self.path.rapid(target, line=block.place.line)
         else:
-            column = block.words[named[0]].column
+            column = _first_column(block)
             if self._feed_mm_min <= 0.0:
                 raise block.place.fault(column, f"{name('G', self._motion)} without a feed", "give F before or in it")
             poses = target[None] if self._motion == LINEAR else self._arc(block, target).poses()
@@ -173,13 +174,12 @@ class _Interpreter:
         if unknown:
             what = f"nobody knows where {', '.join(unknown)} stand{'s' if len(unknown) == 1 else ''} before this move"
             remedy = "name all six axes in the first move, absolutely (G90), or say where the machine stands"
-            raise block.place.fault(min(word.column for word in block.words.values()), what, remedy)
+            raise block.place.fault(_first_column(block), what, remedy)
         return target
 
     def _arc(self, block: Block, target: NDArray[np.float64]) -> Arc:
         clockwise = self._motion == CLOCKWISE
-        word = block.words.get("X", block.words.get("Y", block.words.get("Z")))
-        column = min(other.column for other in block.words.values()) if word is None else word.column
+        column = _first_column(block)
         radius = block.words.pop("R", None)
         offsets = [block.words.pop(letter, None) for letter in "IJ"]
         turns = self._turns(block)
@@ -225,3 +225,8 @@ class _Interpreter:
             if letter != "N":
                 what = f"nothing in this line uses {letter}{word.value:g}"
                 raise block.place.fault(word.column, what, "remove it, or give the code that it belongs to")
+
+
+def _first_column(block: Block) -> int:
+    """Column of the first word that is neither a code nor a line number."""
+    return min(word.column for letter, word in block.words.items() if letter != "N")

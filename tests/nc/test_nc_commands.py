@@ -1,0 +1,154 @@
+"""`dbbstation program` and `dbbstation compensate`, as people call them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from dbbstation.cli.compensate import compensate
+from dbbstation.cli.program import program
+from dbbstation.errors import InputError, ModelError, OutputError, StationError, TravelError
+from dbbstation.files.models import write_model
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model.identified import IdentifiedModel
+
+PLAN = shipped_folder("protocols") / "plans" / "table2.yaml"
+MACHINE = shipped_folder("fixtures") / "machines" / "reference.yaml"
+PART = "G21 G90\nG0 X-100 Y0 Z-1000 A0 B0 C0\nG1 X100 F1000\nM2\n"
+
+
+def run(command, *arguments):
+    result = CliRunner().invoke(command, [str(argument) for argument in arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+@pytest.fixture
+def model_file(tmp_path, crooked):
+    path = tmp_path / "model.yaml"
+    rows = tuple(
+        (fitted.source.name, "", parameter.name)
+        for fitted in crooked.sources
+        for parameter in fitted.source.parameters(crooked.machine)
+    )
+    identified = IdentifiedModel(crooked, rows, 1e-6 * np.eye(len(rows)), sessions={"first": "ab" * 32})
+    write_model(path, identified)
+    return path
+
+
+def test_all_programs_of_a_plan(tmp_path):
+    result = run(program, "--plan", PLAN, "--machine", MACHINE, "--out", tmp_path / "nc", "--json")
+    said = json.loads(result.stdout)
+    names = sorted(path.name for path in (tmp_path / "nc").iterdir())
+    assert names == sorted(f"{test}-{way}.ngc" for test in "abcdefghijklmno" for way in ("ccw", "cw"))
+    assert len(said["programs"]) == 30
+    for each in said["programs"]:
+        assert hashlib.sha256(Path(each["file"]).read_bytes()).hexdigest() == each["sha256"]
+        assert each["points"] == 4505
+        assert each["greatest_correction_um"] is None
+
+
+def test_headers_name_model_and_sessions_by_hash(tmp_path, model_file):
+    arguments = ["--plan", PLAN, "--machine", MACHINE, "--model", model_file, "--test", "c", "--json"]
+    said = json.loads(run(program, *arguments, "--out", tmp_path / "one").stdout)
+    text = (tmp_path / "one" / "c-cw.ngc").read_text()
+    digest = hashlib.sha256(model_file.read_bytes()).hexdigest()
+    assert said["model_sha256"] == digest
+    assert f"; model file: model.yaml, sha256 {digest}\n" in text
+    assert f"; session first: sha256 {'ab' * 32}\n" in text
+    assert "; ball-bar run: test c cw\n" in text
+    assert "; plan: Table II, fifteen circles\n" in text
+    assert said["programs"][0]["greatest_correction_um"] > 10.0
+    run(program, *arguments, "--out", tmp_path / "two")
+    assert (tmp_path / "two" / "c-cw.ngc").read_text() == text
+
+
+def test_nothing_is_overwritten_without_force(tmp_path):
+    arguments = ["--plan", PLAN, "--machine", MACHINE, "--out", tmp_path / "nc"]
+    run(program, *arguments, "--test", "b")
+    (tmp_path / "nc" / "b-cw.ngc").write_text("mine")
+    with pytest.raises(OutputError, match="--force"):
+        run(program, *arguments)
+    assert sorted(path.name for path in (tmp_path / "nc").iterdir()) == ["b-ccw.ngc", "b-cw.ngc"]
+    assert (tmp_path / "nc" / "b-cw.ngc").read_text() == "mine"
+    run(program, *arguments, "--test", "b", "--force")
+    assert (tmp_path / "nc" / "b-cw.ngc").read_text() != "mine"
+
+
+def test_a_circle_outside_the_travel_leaves_nothing_on_disk(tmp_path):
+    high = tmp_path / "plan.yaml"
+    high.write_text(PLAN.read_text().replace("[100.0, 100.0, 280.0]", "[100.0, 160.0, 280.0]"))
+    for force in ([], ["--force"]):
+        with pytest.raises(TravelError, match="test n ccw"):
+            run(program, "--plan", high, "--machine", MACHINE, "--out", tmp_path / "nc", *force)
+    assert not (tmp_path / "nc").exists()
+
+
+def test_an_unknown_test_and_an_unknown_dialect_are_named(tmp_path):
+    arguments = ["--plan", PLAN, "--machine", MACHINE, "--out", tmp_path / "nc"]
+    with pytest.raises(StationError, match="no test z"):
+        run(program, *arguments, "--test", "z")
+    with pytest.raises(StationError, match="'klingon'"):
+        run(program, *arguments, "--dialect", "klingon")
+
+
+def test_a_model_of_another_machine_is_refused(tmp_path, model_file):
+    other = tmp_path / "machine.yaml"
+    other.write_text(MACHINE.read_text().replace("732.203103097", "732.303103097"))
+    with pytest.raises(ModelError, match="another nominal machine"):
+        run(program, "--plan", PLAN, "--machine", other, "--model", model_file, "--out", tmp_path / "nc")
+
+
+def test_compensate_writes_one_file_and_says_what(tmp_path, model_file):
+    part, out = tmp_path / "part.ngc", tmp_path / "true.ngc"
+    part.write_text(PART)
+    said = json.loads(run(compensate, part, "--model", model_file, "--out", out, "--json").stdout)
+    assert said["programs"][0]["sha256"] == hashlib.sha256(out.read_bytes()).hexdigest()
+    assert 0.0 < said["programs"][0]["chord_error_um"] <= 0.1
+    assert out.read_text().startswith("; machine: PM-600-like reference\n; program file: part.ngc, sha256 ")
+    assert str(tmp_path) not in out.read_text()
+    with pytest.raises(OutputError, match="exists already"):
+        run(compensate, part, "--model", model_file, "--out", out)
+
+
+def test_a_part_that_leaves_the_travel_leaves_nothing_on_disk(tmp_path, model_file):
+    part, out = tmp_path / "part.ngc", tmp_path / "true.ngc"
+    part.write_text(PART.replace("X100", "X400"))
+    with pytest.raises(TravelError, match=r"part\.ngc:3"):
+        run(compensate, part, "--model", model_file, "--out", out, "--force")
+    assert not out.exists()
+
+
+def test_a_start_pose_lets_a_program_begin_anywhere(tmp_path, model_file):
+    part, out = tmp_path / "part.nc", tmp_path / "true.ngc"
+    part.write_text("G91 G1 X10 F100\nM2\n")
+    with pytest.raises(StationError, match="no NC dialect"):
+        run(compensate, part, "--model", model_file, "--out", out)
+    with pytest.raises(InputError, match="nobody knows where"):
+        run(compensate, part, "--from", "linuxcnc", "--model", model_file, "--out", out)
+    run(compensate, part, "--from", "linuxcnc", "--start", "0,0,-1000,0,0,0", "--model", model_file, "--out", out)
+    moves = [line for line in out.read_text().splitlines() if line.startswith("G1 ")]
+    assert len(moves) == 1
+    assert float(moves[0].split()[1].removeprefix("X")) == pytest.approx(10.0, abs=1.0)
+    assert run(compensate, part, "--start", "1,2", "--model", model_file, "--out", out).exit_code == 2
+
+
+def test_bad_files_are_told(tmp_path, model_file):
+    with pytest.raises(InputError, match="no such file"):
+        run(compensate, tmp_path / "none.ngc", "--model", model_file, "--out", tmp_path / "x.ngc")
+    (tmp_path / "latin.ngc").write_bytes(b"G0 X1\n(\xb5)\n")
+    with pytest.raises(InputError, match=r"latin\.ngc:2:2"):
+        run(compensate, tmp_path / "latin.ngc", "--model", model_file, "--out", tmp_path / "x.ngc")
+
+
+@pytest.mark.parametrize("command", [program, compensate])
+def test_help_has_examples(command):
+    result = run(command, "--help")
+    assert result.exit_code == 0
+    assert "Examples:" in result.output

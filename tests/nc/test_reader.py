@@ -1,0 +1,144 @@
+"""Programs as people and CAM systems write them, and what is wrong with bad ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbbstation.errors import InputError
+from dbbstation.nc.rs274.reader import read_program
+from dbbstation.nc.toolpath import Step
+
+FIRST = "G21 G90 G94\nG0 X0 Y0 Z-1000 A0 B0 C0\n"
+
+
+def ends(text: str) -> np.ndarray:
+    path = read_program(FIRST + text, "part.ngc")
+    return path.poses[path.is_move][1:]
+
+
+def test_moves_feeds_and_dwells():
+    path = read_program(FIRST + "G1 X10 F600\nY5\nG4 P1.5\nG0 Z-990\n", "part.ngc")
+    assert [Step(kind).name for kind in path.kind] == ["RAPID", "FEED", "FEED", "DWELL", "RAPID"]
+    np.testing.assert_array_equal(path.poses[2], [10, 5, -1000, 0, 0, 0])
+    np.testing.assert_array_equal(path.feed_mm_min[1:3], [600, 600])
+    np.testing.assert_allclose(path.duration_s[1:4], [1.0, 0.5, 1.5])
+    np.testing.assert_array_equal(path.line, [2, 3, 4, 5, 6])
+
+
+def test_inches_increments_numbers_lower_case_and_blanks():
+    np.testing.assert_allclose(ends("g20\nn10 g91 g1 x1 f 1 0\n")[-1], [25.4, 0, -1000, 0, 0, 0])
+    np.testing.assert_allclose(ends("G91 G1 X1 A2 F100\nX1 A2\nG90 Y3\n")[-1], [2, 3, -1000, 4, 0, 0])
+    np.testing.assert_allclose(ends("G1X1 2.5Y-.5F100")[-1], [12.5, -0.5, -1000, 0, 0, 0])
+    assert read_program(FIRST + "G20\nG1 X1 F10", "p").feed_mm_min[-1] == 254.0
+
+
+def test_a_turn_without_a_way_takes_its_feed_in_degrees():
+    path = read_program(FIRST + "G1 A3 B4 F60\nX60 A0\n", "part.ngc")
+    np.testing.assert_allclose(path.duration_s[1:], [5.0, 60.0])
+
+
+def test_comments_pauses_functions_and_the_end():
+    path = read_program("%\n" + FIRST + "(one) ; two\nS1200 M3\n(MSG, look)\nM0\nM1\nM2\nrubbish\n", "part.ngc")
+    assert [path.text.get(row, "") for row in range(1, len(path))] == ["one", "two", "S1200 M3", "look", ""]
+    assert [Step(kind).name for kind in path.kind[1:]] == ["COMMENT", "COMMENT", "FUNCTION", "PAUSE", "PAUSE"]
+    assert len(read_program("%\n" + FIRST + "%\nG0 X5\n", "part.ngc")) == 1
+
+
+@pytest.mark.parametrize(
+    ("arc", "centre", "swept_deg"),
+    [
+        ("G3 X0 Y20 I0 J10 F100", (0, 10), 180.0),
+        ("G2 X0 Y20 I0 J10 F100", (0, 10), -180.0),
+        ("G2 X0 Y0 I5 J0 F100", (5, 0), -360.0),
+        ("G3 I5 F100", (5, 0), 360.0),
+        ("G3 X10 Y10 R10 F100", (0, 10), 90.0),
+        ("G3 X10 Y10 R-10 F100", (10, 0), 270.0),
+        ("G2 X10 Y10 R10 F100", (10, 0), -90.0),
+        ("G2 X10 Y10 R-10 F100", (0, 10), -270.0),
+        ("G90.1\nG3 X10 Y10 I0 J10 F100", (0, 10), 90.0),
+        ("G91\nG3 X10 Y10 J10 P2 F100", (0, 10), 450.0),
+    ],
+)
+def test_arcs_lie_on_their_circle_and_turn_the_right_way(arc, centre, swept_deg):
+    points = np.vstack([[0.0, 0.0], ends(arc)[:, :2]]) - centre
+    radius = np.linalg.norm(points, axis=1)
+    np.testing.assert_allclose(radius, radius[0], atol=1e-9)
+    angle = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    assert np.degrees(angle[-1] - angle[0]) == pytest.approx(swept_deg)
+    assert (np.diff(angle) * np.sign(swept_deg) > 0).all()
+    sagitta = radius[0] * (1 - np.cos(np.abs(np.diff(angle)).max() / 2))
+    assert sagitta < 0.05e-3
+
+
+def test_a_helix_moves_the_other_axes_evenly():
+    poses = ends("G3 X0 Y0 Z-990 A5 I10 P2 F100")
+    np.testing.assert_allclose(np.diff(poses[:, 2]), 10.0 / len(poses), atol=1e-9)
+    np.testing.assert_allclose(poses[-1], [0, 0, -990, 5, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("line", "column", "says"),
+    [
+        ("G43 H1", 1, "G43 is not read"),
+        ("G1 X1 F100 M6", 12, "M6 is not read"),
+        ("G1 X1 E2 F100", 7, "letter E"),
+        ("G1 X1 X2 F100", 7, "a second X"),
+        ("G1 X F100", 4, "the letter X has no number"),
+        ("G1 X#5 F100", 4, "parameter"),
+        ("G1 X[1+2] F100", 4, "expression"),
+        ("  /G1 X1", 3, "skipped"),
+        ("G1 X1 (half", 7, "comment"),
+        ("G1 X1 F100 ?", 12, "'?'"),
+        ("G0 G1 X1", 4, "G1 and G0 exclude each other"),
+        ("G1 X5", 4, "G1 without a feed"),
+        ("G1 X5 F-3", 7, "negative"),
+        ("G4", 1, "seconds"),
+        ("X5 G80", 1, "X without a motion code"),
+        ("G2 X5 F100", 4, "needs I and J, or R"),
+        ("G2 X5 I2 R3 F100", 10, "not both"),
+        ("G2 X50 R3 F100", 8, "no arc of R3"),
+        ("G2 X5 I9 F100", 4, "9.0000 and 4.0000 mm"),
+        ("G2 X5 I2.5 P1.5 F100", 12, "number of turns"),
+        ("G0 X5 P7", 7, "nothing in this line uses P7"),
+        ("G53 G2 X5 R5 F100", 1, "G53 goes with G0 and G1"),
+        ("G20 F10 G1 X1", 5, "counts in the units before it on some controls"),
+        ("G64 P0.01", 1, "on the way"),
+        ("G90.1 G2 X5 I2.5 F10", 10, "both I and J"),
+    ],
+)
+def test_a_fault_names_line_and_column(line, column, says):
+    with pytest.raises(InputError) as caught:
+        read_program(FIRST + line + "\n", "part.ngc")
+    (problem,) = caught.value.problems
+    assert (problem.file, problem.line, problem.column) == ("part.ngc", 3, column)
+    assert says in problem.what
+    assert problem.remedy
+
+
+def test_unreadable_words_are_all_named_at_once():
+    with pytest.raises(InputError) as caught:
+        read_program("G0 X1 ?\nG43\nG0 X1\nO100 call\n", "part.ngc")
+    assert [problem.line for problem in caught.value.problems] == [1, 2, 4]
+
+
+def test_a_program_of_another_language_does_not_flood_the_terminal():
+    with pytest.raises(InputError) as caught:
+        read_program("L X+1 R0 FMAX\n" * 1000, "part.ngc")
+    assert len(caught.value.problems) == 20
+
+
+def test_the_first_move_must_say_where_the_machine_is():
+    with pytest.raises(InputError, match=r"part.ngc:1:4: nobody knows where A, B, C stand before this move"):
+        read_program("G0 X1 Y2 Z-1000\n", "part.ngc")
+    with pytest.raises(InputError, match=r"X, Y, Z, A, B, C stand"):
+        read_program("G91 G0 X1 Y2 Z-1 A0 B0 C0\n", "part.ngc")
+    start = np.array([0.0, 0.0, -1000.0, 1.0, 2.0, 3.0])
+    path = read_program("G91 G0 X1\n", "part.ngc", start=start)
+    np.testing.assert_array_equal(path.poses[0], [1, 0, -1000, 1, 2, 3])
+    assert path.tip_mm[0] == 1.0
+
+
+def test_a_program_without_moves_is_refused():
+    with pytest.raises(InputError, match="moves nothing"):
+        read_program("G21\nM2\n", "part.ngc")

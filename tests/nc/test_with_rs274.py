@@ -1,0 +1,90 @@
+"""LinuxCNC's own interpreter reads what is written, and agrees about what hand-written programs command.
+
+Needs `rs274` from the package `linuxcnc-uspace` (Debian, Ubuntu) on the path.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from dbbstation.nc.circle_program import circle_toolpath
+from dbbstation.nc.compensate import compensate_toolpath
+from dbbstation.nc.toolpath import Step
+
+RS274 = shutil.which("rs274")
+pytestmark = pytest.mark.skipif(RS274 is None, reason="LinuxCNC's interpreter rs274 is not installed")
+
+CALL = re.compile(r"(STRAIGHT_TRAVERSE|STRAIGHT_FEED|ARC_FEED|DWELL|PROGRAM_STOP|SET_FEED_RATE)\(([^)]*)\)")
+
+BY_HAND = """\
+G21 G90 G94 G17 G64 P0.001
+G0 X10 Y0 Z-1000 A1 B2 C0
+G3 X0 Y10 R10 F600
+G2 X10 Y0 R-10
+G3 I-10 P2 Z-990
+G91 G1 X1 Y-.5 A-1 (one) F 3 00
+G4 P.25 G90 g1 x5
+G20
+F10 G1 X1
+G90.1 G3 X-1 I0 J0
+G91.1 G2 X1 I1 B5
+M0
+M2
+"""
+
+
+@pytest.fixture
+def canonical(tmp_path):
+    """What the interpreter hands to the motion controller: kind and numbers of each call."""
+
+    def run(text: str) -> list[tuple[str, list[float]]]:
+        (tmp_path / "tool.tbl").write_text("T1 P1 D0.1 Z0\n")
+        (tmp_path / "rs274.var").write_text("")
+        (tmp_path / "program.ngc").write_text(text)
+        command = [str(RS274), "-g", "-t", "tool.tbl", "-v", "rs274.var", "program.ngc"]
+        done = subprocess.run(
+            command, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=120
+        )
+        assert done.returncode == 0, done.stdout[-1000:] + done.stderr
+        assert "PROGRAM_END()" in done.stdout
+        found = CALL.findall(done.stdout)
+        return [(name, [float(number) for number in numbers.split(",") if number.strip()]) for name, numbers in found]
+
+    return run
+
+
+def moves(calls) -> np.ndarray:
+    return np.array([numbers for name, numbers in calls if name.startswith("STRAIGHT")])
+
+
+@pytest.mark.parametrize("test", ["a", "g", "o"])
+def test_it_reads_nominal_and_compensated_circles_as_meant(canonical, linuxcnc, table2, crooked, test):
+    path = circle_toolpath(table2.tests[test].circle, "run")
+    for written in (path, compensate_toolpath(path, crooked, chord_mm=None).toolpath):
+        calls = canonical(linuxcnc.write(written, ["header (with) brackets", "x" * 400]))
+        np.testing.assert_allclose(moves(calls), written.poses[written.is_move], rtol=0.0, atol=0.51e-4)
+        assert [numbers for name, numbers in calls if name == "DWELL"] == [[1.0], [0.3], [0.3], [1.0]]
+        assert sum(name == "PROGRAM_STOP" for name, _ in calls) == 2
+        assert [numbers for name, numbers in calls if name == "SET_FEED_RATE"][1] == [1000.0]
+
+
+def test_it_agrees_about_programs_written_by_hand(canonical, linuxcnc):
+    path = linuxcnc.read(BY_HAND, "hand.ngc")
+    lasts = [path.poses[(path.line == line) & path.is_move][-1] for line in np.unique(path.line[path.is_move])]
+    told = []
+    for name, numbers in canonical(BY_HAND):
+        if name == "ARC_FEED":
+            x, y, _, _, _, z, a, b, c = numbers
+            told.append([x, y, z, a, b, c])
+        elif name.startswith("STRAIGHT"):
+            told.append(numbers)
+    assert len(told) == len(lasts)
+    for row, (pose, said) in enumerate(zip(lasts, told, strict=True)):
+        unit = 25.4 if row >= 6 else 1.0
+        np.testing.assert_allclose(np.array(said) * ([unit] * 3 + [1.0] * 3), pose, atol=0.51e-4 * unit)
+    assert path.dwell_s[path.kind == Step.DWELL].tolist() == [0.25]

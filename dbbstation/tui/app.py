@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from textual.app import App
 from textual.binding import Binding
@@ -23,6 +23,7 @@ from dbbstation.tui.quit_question import QuitQuestion
 from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.run_list import RunList
 from dbbstation.tui.set_up_panel import SetUpPanel
+from dbbstation.tui.steps_panel import StepsPanel
 from dbbstation.tui.title_line import TitleLine
 from dbbstation.tui.trace_view import TraceView
 
@@ -32,7 +33,8 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
     from textual.binding import BindingType
 
-    from dbbstation.tui.runner import Runner
+    from dbbstation.station.events import Event
+    from dbbstation.tui.board import SequenceOpened
 
 LOOK_S = 0.1
 """Between looks into the mailbox [s]: ten pictures per second are fluent, more is work that nobody sees."""
@@ -46,7 +48,34 @@ _COMMANDS: dict[str, Command] = {
     "skip": Skip(),
 }
 
+_TALL_ROWS = 32
+"""From so many rows on there is room for more than the necessary."""
+
 DARK, LIGHT = "textual-dark", "textual-light"
+
+
+class Sequence(Protocol):
+    """What the screen needs of whatever runs the sequence; `Runner` does."""
+
+    @property
+    def alive(self) -> bool:
+        """Whether a sequence is being run."""
+
+    @property
+    def crash(self) -> Exception | None:
+        """What ended it and should not have: a mistake in the program."""
+
+    def start(self) -> None:
+        """Open instrument and session and run."""
+
+    def send(self, command: Command) -> bool:
+        """Pass a command on; return whether anybody is there to take it."""
+
+    def mail(self) -> list[Event | SequenceOpened]:
+        """Return what has come since the last call."""
+
+    def close(self) -> None:
+        """End the sequence and wait for that."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +109,9 @@ class StationApp(App[None]):
     #side { width: 40%; min-width: 38; max-width: 52; padding: 0 1 0 0; }
     #side > * { margin-bottom: 1; }
     #table { height: 5; }
+    .-low StepsPanel { display: none; }
     """
+    VERTICAL_BREAKPOINTS = [(0, "-low"), (_TALL_ROWS, "-tall")]  # noqa: RUF012 - declared by Textual, as an attribute of instances
     BINDINGS: ClassVar[list[BindingType]] = [
         ("enter", "tell('start')", "Start"),
         ("m", "tell('touched')", "Start, holder touched"),
@@ -95,7 +126,7 @@ class StationApp(App[None]):
         Binding("ctrl+c,ctrl+q", "leave", show=False, priority=True),
     ]
 
-    def __init__(self, shown: Shown, runner: Runner) -> None:
+    def __init__(self, shown: Shown, runner: Sequence) -> None:
         super().__init__()
         self.board = Board()
         self._show = shown
@@ -114,6 +145,7 @@ class StationApp(App[None]):
                 with Horizontal(id="table"):
                     yield SetUpPanel(id="set-up")
                     yield JigMap(self._show.bores, id="map")
+                yield StepsPanel(id="steps")
                 yield FiguresPanel(id="figures")
                 yield RunList(id="runs")
         yield ProgressLine(id="progress")

@@ -48,7 +48,7 @@ class ReadingPanel(Panel):
         stale = old_s > _STALE_S
         return lines(
             Content(" ").join([_length(sample, stale=stale), _deviation(sample, board)]),
-            Content(" · ").join([_status(sample), _rate(board, old_s if stale else None), _lost(board)]),
+            Content(" · ").join(_quality(sample, board, old_s if stale else None)),
         )
 
 
@@ -67,10 +67,11 @@ def _deviation(sample: Sample, board: Board) -> Content:
     return Content(f"{deviation_um:+9.1f} µm")
 
 
-def _status(sample: Sample) -> Content:
-    if sample.status == "ok":
-        return Content.styled("ok", "$text-success")
-    return Content.styled(f"{sample.status.upper()} {sample.said}".rstrip(), "bold $text-error")
+def _quality(sample: Sample, board: Board, old_s: float | None) -> list[Content]:
+    if sample.status != "ok":
+        # What the instrument says needs the room.
+        return [Content.styled(f"{sample.status.upper()} {sample.said}".rstrip(), "bold $text-error")]
+    return [Content.styled("ok", "$text-success"), _rate(board, old_s), _lost(board)]
 
 
 def _rate(board: Board, old_s: float | None) -> Content:

@@ -60,8 +60,8 @@ class TraceView(Widget):
     DEFAULT_CSS = """
     TraceView {
         & > .trace--scale { color: $foreground 50%; }
-        & > .trace--ccw { color: $primary-lighten-1; text-style: bold; }
-        & > .trace--cw { color: $warning; }
+        & > .trace--ccw { color: $text-primary; text-style: bold; }
+        & > .trace--cw { color: $text-warning; }
         & > .trace--both { color: $foreground; text-style: bold; }
         & > .trace--label { color: $foreground 75%; }
     }
@@ -207,8 +207,7 @@ class TraceView(Widget):
     def _styles(self) -> dict[int, Style]:
         """Return the style of a cell by whose dots it has: a trace goes before the scale."""
         scale, ccw, cw, both, label = (
-            self.get_component_rich_style(f"trace--{part}", partial=True)
-            for part in ("scale", "ccw", "cw", "both", "label")
+            self.get_component_rich_style(f"trace--{part}") for part in ("scale", "ccw", "cw", "both", "label")
         )
         traces = {0: scale, _CCW: ccw, _CW: cw, _CCW | _CW: both}
         return {member | under: style for member, style in traces.items() for under in (0, _SCALE)} | {_LABEL: label}
@@ -216,9 +215,10 @@ class TraceView(Widget):
     def _caption(self) -> str:
         if self._circle is None:
             return "no circle yet"
-        names = " and ".join(trace.run.label for trace in self._traces.values())
         times = self._dial.magnification(self._scale_um, self._circle.radius_mm)
-        return f"{names or 'no samples yet'}: ring ±{self._scale_um:g} µm, drawn ×{_rounded(times)}"
+        tests = dict.fromkeys(trace.run.test for trace in self._traces.values())
+        names = f"{' '.join(tests)} {'+'.join(self._traces)}" if tests else "no samples yet"
+        return f"{names} · ring ±{self._scale_um:g} µm · ×{_rounded(times)}"
 
     def _legend(self, wide: int) -> Strip:
         base, styles = self.rich_style, self._styles()

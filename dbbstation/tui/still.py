@@ -1,0 +1,72 @@
+"""A screen that stands still: events in, a picture out. For the documentation, and for tests of what is drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.tui.app import DARK, StationApp
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.station.commands import Command
+    from dbbstation.station.events import Event
+    from dbbstation.tui.app import Shown
+    from dbbstation.tui.board import SequenceOpened
+
+
+class Happened:
+    """Stands where the runner stands: everything has happened already, and nobody takes commands.
+
+    Args:
+        events: all of them, in order.
+
+    Attributes:
+        crash: none.
+        sent: commands that nobody took.
+    """
+
+    alive = False
+    crash: Exception | None = None
+
+    def __init__(self, events: Sequence[Event | SequenceOpened]) -> None:
+        self.sent: list[Command] = []
+        self._events = list(events)
+
+    def start(self) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def send(self, command: Command) -> bool:
+        """Note the command."""
+        self.sent.append(command)
+        return False
+
+    def mail(self) -> list[Event | SequenceOpened]:
+        """Return everything at the first call, nothing later."""
+        events, self._events = self._events, []
+        return events
+
+
+async def still_svg(
+    shown: Shown, events: Sequence[Event | SequenceOpened], *, size: tuple[int, int] = (120, 40), theme: str = DARK
+) -> str:
+    """Return the screen after these events as SVG.
+
+    Args:
+        shown: plan and plate.
+        events: what happened.
+        size: columns and rows.
+        theme: dark or light.
+    """
+    app = StationApp(shown, Happened(events))
+    async with app.run_test(size=size) as pilot:
+        app.theme = theme
+        app.look()
+        await pilot.pause()
+        # Heights that follow their text are known now.
+        app.draw()
+        await pilot.pause()
+        return app.export_screenshot(title="dbbstation station")

@@ -1,0 +1,151 @@
+"""Pages that are written from the code at every build: one per command, one per package."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+import re
+from typing import TYPE_CHECKING
+
+import click
+
+import dbbstation
+from dbbstation.cli import COMMANDS, cli
+from dbbstation.sources.registry import known_sources
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+NOT_PUBLIC = {"cli", "tui", "studies", "__main__"}
+"""Top-level modules that nobody imports: commands, screens, experiments."""
+
+_UNWRAPPED = "\b"
+
+_SOURCES_HEAD = """\
+Every cause that a model can contain, from its own texts in `dbbstation/sources/`. The names are what
+`calibrate --sources` takes."""
+
+
+def write_pages(folder: Path) -> None:
+    """Write all generated pages anew, touching only those that have changed."""
+    pages = {f"commands/{name}.md": text for name, text in _commands()}
+    pages |= {f"api/{name}.rst": text for name, text in _packages()}
+    pages["sources.md"] = _sources()
+    for name, text in pages.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+    for path in [*folder.rglob("*.md"), *folder.rglob("*.rst")]:
+        if str(path.relative_to(folder)) not in pages:
+            path.unlink()
+
+
+def escaped(line: str) -> str:
+    """Escape bars, as in |w|, outside names in backticks."""
+    return "".join(part if part.startswith("`") else part.replace("|", r"\|") for part in re.split(r"(`[^`]*`)", line))
+
+
+def with_drawings(lines: list[str]) -> list[str]:
+    """Make blocks of the paragraphs that are drawn: with indented lines, or columns set apart by blanks."""
+    kept: list[str] = []
+    for paragraph in re.split(r"\n[ \t]*\n", "\n".join(lines)):
+        rows = paragraph.splitlines()
+        drawn = any(row.startswith(" ") or "   " in row for row in rows)
+        kept += ["::", "", *(f"    {row}" for row in rows), ""] if drawn else [*map(escaped, rows), ""]
+    return kept
+
+
+def _commands() -> Iterator[tuple[str, str]]:
+    with click.Context(cli, info_name="dbbstation") as parent:
+        for name in sorted(COMMANDS):
+            command = cli.get_command(parent, name) if importlib.util.find_spec(f"dbbstation.cli.{name}") else None
+            if command is None:
+                continue  # announced, not written yet; tests/cli asks for all of them
+            with click.Context(command, info_name=name, parent=parent) as context:
+                yield name, _command(name, command, context)
+
+
+def _command(name: str, command: click.Command, context: click.Context) -> str:
+    usage = command.get_usage(context).removeprefix("Usage: ")
+    rows = [row for parameter in command.get_params(context) if (row := parameter.get_help_record(context))]
+    options = [f"| `{_cell(option)}` | {_cell(text)} |" for option, text in rows]
+    table = ["| option | |", "| --- | --- |", *options]
+    return "\n".join([f"# {name}", "", "```text", usage, "```", "", *_prose(command.help or ""), *table, ""])
+
+
+def _prose(text: str) -> Iterator[str]:
+    """Give the paragraphs of a help text as Markdown; those that click must not wrap become blocks."""
+    for paragraph in re.split(r"\n\s*\n", text):
+        lines = paragraph.splitlines()
+        if lines and lines[0].strip() == _UNWRAPPED:
+            head, *rest = lines[1:]
+            body = [head, "", "```console", *(_prompted(line) for line in rest), "```"]
+            yield from body
+        else:
+            yield from lines
+        yield ""
+
+
+def _prompted(line: str) -> str:
+    line = line.removeprefix("  ")
+    return f"$ {line}" if line.startswith("dbbstation ") else line
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", r"\|").replace("\n", " ")
+
+
+def _packages() -> Iterator[tuple[str, str]]:
+    for module in pkgutil.iter_modules(dbbstation.__path__):
+        if module.name in NOT_PUBLIC:
+            continue
+        name = f"dbbstation.{module.name}"
+        found = [name]
+        if module.ispkg:
+            inside = importlib.import_module(name).__path__
+            found += [f"{name}.{m.name}" for m in pkgutil.iter_modules(inside) if not m.name.startswith("_")]
+            found += [
+                f"{package}.{m.name}"
+                for package in found[1:]
+                if importlib.util.find_spec(package).submodule_search_locations  # type: ignore[union-attr]
+                for m in pkgutil.iter_modules(importlib.import_module(package).__path__)
+            ]
+        yield name, "\n".join([_headed(name, "="), *(_module(one, first=one == name) for one in found)])
+
+
+def _module(name: str, *, first: bool) -> str:
+    head = "" if first else _headed(name, "-")
+    return f"{head}\n.. automodule:: {name}\n   :members:\n   :show-inheritance:\n"
+
+
+def _headed(title: str, line: str) -> str:
+    return f"{title}\n{line * len(title)}\n"
+
+
+def _sources() -> str:
+    lines = ["# Error sources", "", _SOURCES_HEAD, ""]
+    for name, source in known_sources().items():
+        texts = source.texts
+        needs = ", ".join(sorted(source.needs))
+        lines += [
+            f"## {name}",
+            "",
+            texts.what,
+            "",
+            f"- Belongs to the {source.belongs_to}; needs {needs}.",
+            f"- Shows: {texts.shows}",
+            f"- Confirm: {texts.confirm}",
+            f"- Cure: {texts.cure}",
+            f"- Equation: {_plain(texts.equation)}",
+            f"- From: {_plain(texts.origin)}",
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def _plain(text: str) -> str:
+    """Escape what Markdown would take for markup in an equation or a reference."""
+    return re.sub(r"([\\`*_\[\]<>|])", r"\\\1", text)

@@ -78,7 +78,7 @@ _REMEDIES: dict[float, str] = {
 
 def name(letter: str, value: float) -> str:
     """Return a code as people write it: G1, G91.1."""
-    return f"{letter}{value:g}"
+    return f"{letter}{value:.10g}"
 
 
 def remedy(letter: str, value: float) -> str:

@@ -26,6 +26,7 @@ _LOOK_S = 0.2
 @click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
 @click.option("--truth", type=click.Path(path_type=Path), help="Model with what is wrong with the actual machine.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random.")
+@click.option("--rate-hz", type=click.FloatRange(0.1, 100000.0), help="Samples per second, where it is set to others.")
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of NC programs to run.")
 @click.option("--time-scale", type=click.FloatRange(0.01, 200.0), default=1.0, show_default=True, help="Times faster.")
 @click.option("--noise-um", type=click.FloatRange(min=0.0), default=0.3, show_default=True, help="Of a reading [µm].")
@@ -42,6 +43,7 @@ def emulate(
     truth: Path | None,
     seed: int,
     programs: Path | None,
+    rate_hz: float | None,
     time_scale: float,
     noise_um: float,
     bar_um: float,
@@ -65,14 +67,14 @@ def emulate(
     """
     from dbbstation.files.machine_file import read_machine
     from dbbstation.files.plan_file import read_plan
-    from dbbstation.instrument.library import load_instrument
+    from dbbstation.instrument.library import at_rate, load_instrument
     from dbbstation.virtual.cell import VirtualCell
     from dbbstation.virtual.control import CellCommands, ControlServer
     from dbbstation.virtual.machine import Sizes, VirtualMachine
     from dbbstation.virtual.wire import VirtualInstrument
     from dbbstation.virtual.wire_clock import ScaledClock
 
-    protocol = load_instrument(instrument)
+    protocol = at_rate(load_instrument(instrument), rate_hz)
     machine, plan = read_machine(machine_file), read_plan(plan_file)
     model = _truth(machine, truth, seed)
     virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))

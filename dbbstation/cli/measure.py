@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.engine import Station
 
+_MEMORY_S = 2.0
+"""How long the driver remembers the quickest arrival of samples [s of real time]."""
+
 _AUTO_PATIENCE_S = 60.0
 """A virtual machine comes as soon as it has computed the run, or not at all [s of real time]."""
 
@@ -36,6 +39,7 @@ _AUTO_PATIENCE_S = 60.0
 @click.option(
     "--time-scale", type=click.FloatRange(0.01, 200.0), default=1.0, show_default=True, help="As of `emulate`."
 )
+@click.option("--rate-hz", type=click.FloatRange(0.1, 100000.0), help="Samples per second, where it is set to others.")
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
@@ -50,6 +54,7 @@ def measure(
     auto: str | None,
     time_scale: float,
     programs: Path | None,
+    rate_hz: float | None,
     as_json: bool,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> None:
@@ -69,7 +74,7 @@ def measure(
     from dbbstation.files.plan_file import read_inline_plan
     from dbbstation.files.session_writer import SessionDetails
     from dbbstation.instrument.driver import Instrument
-    from dbbstation.instrument.library import load_instrument
+    from dbbstation.instrument.library import at_rate, load_instrument
     from dbbstation.station.assembly import Job, assemble
     from dbbstation.station.detector import Patience
     from dbbstation.station.programs import load_programs
@@ -88,7 +93,9 @@ def measure(
     )
     job.check(str(plan_file))
     hands = None if auto is None else VirtualHands(auto)
-    with Instrument(load_instrument(instrument), port, baud=baud, clock=clock) as source:
+    protocol = at_rate(load_instrument(instrument), rate_hz)
+    memory_s = _MEMORY_S * max(time_scale, 1.0)
+    with Instrument(protocol, port, baud=baud, clock=clock, memory_s=memory_s) as source:
         workplace = assemble(job, source)
         if workplace.writer.runs and job.details != SessionDetails():
             click.echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)

@@ -58,6 +58,8 @@ class Instrument:
             is always in real seconds.
         log: where every byte is written down; the caller closes it.
         timeout_s: patience before a silent line is an error, instead of the protocol's.
+        memory_s: how long the quickest arrival of a stream's samples is remembered, by `clock`: on a scaled clock as many
+            times longer, because what holds samples up is the computer, in real time.
     """
 
     def __init__(
@@ -69,6 +71,7 @@ class Instrument:
         clock: Callable[[], float] = time.monotonic,
         log: ByteLog | None = None,
         timeout_s: float | None = None,
+        memory_s: float = 2.0,
     ) -> None:
         self.protocol = protocol
         self.tally = Tally()
@@ -77,6 +80,7 @@ class Instrument:
         self._clock = clock
         self._log = log
         self._timeout_s = timeout_s or protocol.timing.timeout_s
+        self._memory_s = memory_s
         self._link: Link | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
@@ -271,7 +275,7 @@ class Instrument:
         gaps = GapCounter(self.protocol.counter_modulus)
         # Behind the answer to a start command the stream begins with a whole frame.
         decoder = Decoder(self.protocol, joining=not (self.protocol.ask.start and self.protocol.ask.start[-1].reply))
-        stamps = StreamStamps(1.0 / self.protocol.fastest_hz(self._baud))
+        stamps = StreamStamps(1.0 / self.protocol.fastest_hz(self._baud), self._memory_s)
         character_s = line.character_s(self._baud)
         good_s = time.monotonic()
         garbled, unread, why = 0, b"", ""

@@ -43,6 +43,13 @@ def load_instrument(name_or_file: str | Path) -> Protocol:
     return read_protocol(instruments_folder() / f"{name}.yaml")
 
 
+def at_rate(protocol: Protocol, rate_hz: float | None) -> Protocol:
+    """Return the protocol of a device that is set to another sample rate than the usual one, where one is given."""
+    if rate_hz is None:
+        return protocol
+    return protocol.model_copy(update={"timing": protocol.timing.model_copy(update={"rate_hz": rate_hz})})
+
+
 def read_protocol(path: Path) -> Protocol:
     """Return the protocol in the file `path`.
 

@@ -79,6 +79,8 @@ def cli(*, debug: bool) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
+    # The matrices are narrow: threads of the linear algebra cost twice what they save. Read when NumPy is imported.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = _DEBUG in given
     # The option is the program's, but people put it where they notice that they need it: at the end.

@@ -1,0 +1,86 @@
+"""Help is quick, complete, and its examples are true."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from importlib.util import find_spec
+
+import click
+import pytest
+
+from dbbstation.cli import COMMANDS, DONE, cli
+
+HEAVY = ("numba", "scipy", "textual", "matplotlib", "pydantic", "numpy")
+
+
+@pytest.fixture(params=sorted(COMMANDS))
+def command(request):
+    if find_spec(f"dbbstation.cli.{request.param}") is None:
+        pytest.skip("announced, not written yet")
+    with click.Context(cli, info_name="dbbstation") as context:
+        return cli.get_command(context, request.param)
+
+
+def examples(text):
+    """Command lines of a help text, continued lines joined."""
+    joined = re.sub(r"\\\n\s*", "", text)
+    return [line.strip() for line in joined.splitlines() if line.strip().startswith("dbbstation ")]
+
+
+def test_each_command_has_help_with_an_example(run, command):
+    outcome = run(command.name, "--help")
+    assert (outcome.code, outcome.err) == (DONE, "")
+    assert outcome.out.startswith(f"Usage: dbbstation {command.name}")
+    assert re.search(r"^  Examples?:$", outcome.out, re.MULTILINE)
+    assert r"\b" not in outcome.out
+    assert examples(outcome.out)
+
+
+def test_examples_use_options_that_exist(command):
+    for line in examples(command.help):
+        # Comments and placeholders are for people.
+        arguments = [word for word in shlex.split(re.sub(r"   \(.*\)$| > .*$", "", line))[2:] if word != "..."]
+        assert shlex.split(line)[1] in COMMANDS, line
+        known = cli.get_command(click.Context(cli), shlex.split(line)[1])
+        known.make_context(known.name, arguments, resilient_parsing=True)
+
+
+def test_each_command_says_in_one_line_what_it_does(run):
+    outcome = run("--help")
+    assert outcome.code == DONE
+    for name, text in COMMANDS.items():
+        assert re.search(rf"^  {name} +{re.escape(text)}$", outcome.out, re.MULTILINE)
+
+
+def test_each_option_says_what_it_is_for(command):
+    bare = [p.name for p in command.params if isinstance(p, click.Option) and not p.help]
+    assert bare == []
+
+
+def test_results_have_a_json_form(command):
+    if command.name not in {"simulate", "demo", "station"}:  # these write recordings, tell a story, draw a screen
+        assert "--json" in {option for parameter in command.params for option in parameter.opts}
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["calibrate", "--help"], ["--version"], ["evaluate"]])
+def test_help_waits_for_no_library(arguments):
+    """SciPy and the compiler take a second and more to import: nobody should wait for them to read a help text."""
+    script = (
+        "import sys\n"
+        "from dbbstation.cli import main\n"
+        "try:\n"
+        f"    main({arguments!r})\n"
+        "except SystemExit:\n"
+        f"    print('loaded:', *[name for name in {HEAVY!r} if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.splitlines()[-1].strip() == "loaded:"
+
+
+def test_without_a_command_the_help_is_shown(run):
+    outcome = run()
+    assert outcome.code in {DONE, 2}
+    assert "Start here:" in outcome.out + outcome.err

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import tempfile
+import threading
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -168,13 +169,14 @@ def _run(job: Job, open_station: Opener) -> int:
 
     Raises:
         StationError: the fault that ended the sequence, where nothing was done about it.
+        click.Abort: a signal ended it.
     """
     from dbbstation.tui.app import Shown, StationApp
     from dbbstation.tui.runner import Runner
 
     runner = Runner(open_station)
     app = StationApp(Shown(job.plan.plan.name, job.plan.jig.bores), runner)
-    with _stopped_politely(app):
+    with _stopped_politely(app) as stopped:
         app.run()
     if runner.crash is not None:
         raise runner.crash
@@ -182,20 +184,29 @@ def _run(job: Job, open_station: Opener) -> int:
         click.echo(f"{job.folder}: {app.board.accepted} of {len(app.board.tasks)} runs accepted", err=True)
     if app.board.fault is not None:
         raise app.board.fault.error
+    if stopped.is_set():
+        raise click.Abort
     return app.return_code or 0
 
 
 @contextmanager
-def _stopped_politely(app: StationApp) -> Iterator[None]:
-    """Let a polite kill, or a terminal that is closed, end the sequence between two samples and restore the terminal."""
+def _stopped_politely(app: StationApp) -> Iterator[threading.Event]:
+    """Let a polite kill, or a terminal that is closed, end the sequence between two samples and restore the terminal.
+
+    Yields:
+        Whether that happened.
+    """
+
+    stopped = threading.Event()
 
     def stop(_number: int, _frame: FrameType | None) -> None:
+        stopped.set()
         app.leave(sure=True)
 
     numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
     before = {number: signal.signal(number, stop) for number in numbers}
     try:
-        yield
+        yield stopped
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

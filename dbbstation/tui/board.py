@@ -156,6 +156,8 @@ class Board:
         before, self.state, self.allowed = self.state, event.state, event.commands
         if event.state is State.BETWEEN:
             self._leave(before)
+        elif event.state in {State.STOPPED, State.FAULTED} and self._announced_mark is not Mark.ACCEPTED:
+            self._mark(Mark.OPEN)
         elif event.state in _RUN_MARKS:
             self._mark(_RUN_MARKS[event.state])
         self.running = self.announced.run.direction if self.announced and event.state is State.TURNING else None

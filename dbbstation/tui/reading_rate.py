@@ -24,9 +24,9 @@ class ReadingRate:
         self.total = 0
 
     def add(self, samples: Sequence[Sample]) -> None:
-        """Count samples in time order; a run's clock begins anew, and so does the count then."""
+        """Count samples in time order; a run has a clock of its own, and where clocks change the count begins anew."""
         last_s = samples[-1].t_s
-        if self._batches and last_s < self._batches[-1][0]:
+        if self._batches and not 0.0 <= samples[0].t_s - self._batches[-1][0] <= _WINDOW_S:
             self._batches.clear()
         self._batches.append((last_s, len(samples)))
         self.total += len(samples)

@@ -213,12 +213,11 @@ class TraceView(Widget):
         return {member | under: style for member, style in traces.items() for under in (0, _SCALE)} | {_LABEL: label}
 
     def _caption(self) -> str:
-        if self._circle is None:
+        if self._circle is None or not self._traces:
             return "no circle yet"
         times = self._dial.magnification(self._scale_um, self._circle.radius_mm)
         tests = dict.fromkeys(trace.run.test for trace in self._traces.values())
-        names = f"{' '.join(tests)} {'+'.join(self._traces)}" if tests else "no samples yet"
-        return f"{names} · ring ±{self._scale_um:g} µm · ×{_rounded(times)}"
+        return f"{' '.join(tests)} {'+'.join(self._traces)} · ring ±{self._scale_um:g} µm · ×{_rounded(times)}"
 
     def _legend(self, wide: int) -> Strip:
         base, styles = self.rich_style, self._styles()

@@ -121,6 +121,7 @@ def test_a_fault_says_what_where_and_what_helps() -> None:
         "FAULT at /dev/ttyUSB0: the line was closed. What helps: plug it in again. t0-ccw-1 is kept as far as it came. "
         "Then C connects again, Q leaves."
     )
+    assert board.marks[0] is Mark.OPEN
     board.take(SequenceOpened(happening.schedule.tasks, happening.schedule.open, "session-7"))
     assert board.fault is None
 
@@ -129,6 +130,11 @@ def test_the_rate_is_counted_in_the_time_of_the_samples() -> None:
     happening = Happening().circle("t0", Direction.CCW, 0.5)
     board = happening.board()
     assert board.rate.per_s == pytest.approx(20.0, rel=0.05)
+    # Behind the run samples have the instrument's clock again, ahead of it others.
+    for start_s in (1000.0, 0.0):
+        for second in range(4):
+            board.take(events.ReadingsSeen((events.Sample(start_s + second, 150.0),)))
+        assert board.rate.per_s == pytest.approx(1.0)
     board.rate.forget()
     assert board.rate.per_s is None
 

@@ -1,0 +1,242 @@
+"""The screen, pressed by a pilot, through whole plans against the virtual machine on a real line."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dbbstation.cli.station import opener
+from dbbstation.cli.station_virtual import VirtualPlace, virtual_place
+from dbbstation.errors import InstrumentError
+from dbbstation.files.machine_file import read_machine
+from dbbstation.files.plan_file import InlinePlan, read_inline_plan
+from dbbstation.files.session import RunState, read_session
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.instrument.library import load_instrument
+from dbbstation.plan.circle import Direction
+from dbbstation.station.assembly import Job
+from dbbstation.station.states import State
+from dbbstation.tui.app import Shown, StationApp
+from dbbstation.tui.quit_question import QuitQuestion
+from dbbstation.tui.runner import Runner
+from dbbstation.tui.trace_view import TraceView
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Iterator
+    from pathlib import Path
+
+    from textual.pilot import Pilot
+
+PATIENCE_S = 30.0
+TIME_SCALE = 5.0
+ENCODER = load_instrument("streaming-encoder")
+
+
+@pytest.fixture
+def short_plan(tmp_path: Path) -> InlinePlan:
+    """One test, both directions, as fast as the machine allows."""
+    return one_circle(tmp_path, feed_mm_min=6000)
+
+
+@pytest.fixture
+def slow_plan(tmp_path: Path) -> InlinePlan:
+    """The same, slow enough for what is pressed in the middle of it, however busy the computer."""
+    return one_circle(tmp_path, feed_mm_min=500)
+
+
+def one_circle(folder: Path, *, feed_mm_min: int) -> InlinePlan:
+    text = (shipped_folder("protocols") / "plans" / "ten-minute-check.yaml").read_text("utf-8")
+    text = text.replace("feed_mm_min: 1000", f"feed_mm_min: {feed_mm_min}").replace(
+        "overshoot_deg: 20", "overshoot_deg: 5"
+    )
+    file = folder / "plan.yaml"
+    file.write_text(
+        "".join(
+            line for line in text.splitlines(keepends=True) if "name: side" not in line and "name: high" not in line
+        ),
+        "utf-8",
+    )
+    return read_inline_plan(file)
+
+
+class Bench:
+    """A virtual machine, a session folder and screens on them."""
+
+    def __init__(self, place: VirtualPlace, job: Job) -> None:
+        self.place = place
+        self.job = job
+        self.app: StationApp | None = None
+
+    def press_all(
+        self, play: Callable[[Pilot[None], StationApp], Awaitable[None]], size: tuple[int, int] = (80, 24)
+    ) -> None:
+        """Open a screen and play on it; the screen is closed whatever happens."""
+        runner = Runner(opener(self.job, ENCODER, self.place.port, helper=self.place.helper))
+        app = StationApp(Shown(self.job.plan.plan.name, self.job.plan.jig.bores), runner)
+
+        async def run() -> None:
+            async with app.run_test(size=size) as pilot:
+                await play(pilot, app)
+
+        asyncio.run(run())
+        assert not runner.alive
+        if runner.crash is not None:
+            raise runner.crash
+
+    def states(self) -> list[tuple[str, RunState]]:
+        return [(f"{run.test}-{run.direction}-{run.repeat}", run.state) for run in read_session(self.job.folder).runs]
+
+
+@contextmanager
+def switched_on(plan: InlinePlan, folder: Path) -> Iterator[Bench]:
+    machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
+    with virtual_place(machine, plan.to_domain(), ENCODER, time_scale=TIME_SCALE) as place:
+        yield Bench(place, Job(machine, plan, folder, clock=place.clock))
+
+
+async def until(pilot: Pilot[None], condition: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s, (
+            f"it did not happen in time: {said(pilot.app)} {pilot.app.board.state} {pilot.app.board.messages}"
+        )
+        await asyncio.sleep(0.01)
+
+
+def said(app: StationApp) -> str:
+    return " ".join(str(app.query_one("#now").visual).split())
+
+
+def row(app: StationApp, part: str) -> str:
+    return str(app.query_one(f"#{part}").visual)
+
+
+def test_a_whole_plan_with_every_verdict(short_plan: InlinePlan, tmp_path: Path) -> None:
+    seen: list[int] = []
+
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        board = app.board
+        await until(pilot, lambda: board.state is State.ANNOUNCED)
+        assert "short holder with the ball 9-short into bore 9" in said(app)
+        assert "[9]" in row(app, "map")
+        assert "tilt A 0° B 0°" in row(app, "set-up")
+        await pilot.press("a")  # means nothing yet
+        await pilot.press("enter")
+        await until(pilot, lambda: board.state is State.TURNING)
+        await until(pilot, lambda: len(board.traces[Direction.CCW]) > 100)
+        seen.append(int((app.query_one(TraceView)._members & 2 > 0).sum()))
+        assert "touch nothing" in said(app)
+        assert "▶ running" in row(app, "runs")
+        await until(pilot, lambda: board.state is State.COMPLETE)
+        await pilot.press("r")
+        await until(pilot, lambda: board.state is State.ANNOUNCED)
+        assert "low-ccw-2" in row(app, "title")
+        await pilot.press("m")
+        await until(pilot, lambda: board.state is State.COMPLETE)
+        await pilot.press("a")
+        await until(pilot, lambda: board.state is State.ANNOUNCED)
+        assert "leave as is" in row(app, "set-up")
+        await pilot.press("enter")
+        await until(pilot, lambda: board.state is State.COMPLETE)
+        await asyncio.sleep(0.3)
+        assert row(app, "figures").count("low-") == 2
+        await pilot.press("x")
+        await until(pilot, lambda: board.finished is not None)
+        await until(pilot, lambda: "without an accepted run: low cw" in said(app))
+        assert "ccw ✓ accepted" in row(app, "runs")
+        assert "1 of 2 accepted" in row(app, "progress")
+        await pilot.press("q")
+
+    with switched_on(short_plan, tmp_path / "session") as bench:
+        bench.press_all(play)
+        assert bench.states() == [
+            ("low-ccw-1", RunState.REJECTED),
+            ("low-ccw-2", RunState.ACCEPTED),
+            ("low-cw-1", RunState.REJECTED),
+        ]
+        assert [run.mounting for run in read_session(bench.job.folder).runs] == [1, 2, 2]
+    assert seen[0] > 5
+
+
+def test_quitting_a_running_circle_asks_first_and_loses_nothing(slow_plan: InlinePlan, tmp_path: Path) -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        board = app.board
+        await until(pilot, lambda: board.state is State.ANNOUNCED)
+        await pilot.press("enter")
+        await until(pilot, lambda: board.state is State.TURNING)
+        await pilot.press("ctrl+c")
+        await until(pilot, lambda: isinstance(app.screen, QuitQuestion))
+        await pilot.press("n")
+        await until(pilot, lambda: not isinstance(app.screen, QuitQuestion))
+        assert board.state is State.TURNING
+        await pilot.press("q", "y")
+        await until(pilot, lambda: board.state is State.STOPPED)
+
+    async def go_on(pilot: Pilot[None], app: StationApp) -> None:
+        await until(pilot, lambda: app.board.state is State.ANNOUNCED)
+        assert "low-ccw-2" in row(app, "title")
+
+    with switched_on(slow_plan, tmp_path / "session") as bench:
+        bench.press_all(play)
+        assert bench.states() == [("low-ccw-1", RunState.RECORDING)]
+        (part,) = (bench.job.folder / "runs").iterdir()
+        assert part.name == "low-ccw-1.csv.part"
+        assert len(part.read_text("utf-8").splitlines()) > 100
+        bench.press_all(go_on)
+
+
+def test_a_fault_of_the_line_is_shown_and_the_line_connected_again(short_plan: InlinePlan, tmp_path: Path) -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        board = app.board
+        await until(pilot, lambda: board.state is State.ANNOUNCED)
+        await pilot.press("c")  # means nothing without a fault
+        await pilot.press("enter")
+        await until(pilot, lambda: board.state is State.TURNING)
+        bench.place.wire.go_silent()
+        await until(pilot, lambda: board.fault is not None)
+        await until(pilot, lambda: "fell silent" in said(app))
+        assert "FAULT at" in said(app)
+        assert "What helps: " in said(app)
+        assert "low-ccw-1 is kept as far as it came" in said(app)
+        assert "fault: " in row(app, "messages")
+        bench.place.wire.speak_again()
+        await pilot.press("c")
+        await until(pilot, lambda: board.fault is None and board.state is State.ANNOUNCED)
+        await until(pilot, lambda: "low-ccw-2" in row(app, "title"))
+        await pilot.press("enter")
+        await until(pilot, lambda: board.state is State.COMPLETE)
+        await pilot.press("a")
+        await until(pilot, lambda: board.accepted == 1)
+
+    with switched_on(short_plan, tmp_path / "session") as bench:
+        bench.press_all(play, (120, 40))
+        assert bench.states() == [("low-ccw-1", RunState.RECORDING), ("low-ccw-2", RunState.ACCEPTED)]
+
+
+def test_a_closed_line_and_a_port_that_is_not_there(short_plan: InlinePlan, tmp_path: Path) -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        board = app.board
+        await until(pilot, lambda: board.state is State.ANNOUNCED)
+        bench.place.wire.hang_up()
+        await until(pilot, lambda: "the line was closed while it was in use" in said(app))
+        await pilot.press("c")
+        # What comes now is the text of a port that cannot be opened.
+        await until(pilot, lambda: len(board.messages) > 1)
+        assert isinstance(board.fault.error, InstrumentError)
+        await until(pilot, lambda: "Then C connects again, Q leaves." in said(app))
+        await pilot.press("q")
+
+    with switched_on(short_plan, tmp_path / "session") as bench:
+        bench.press_all(play)
+
+
+def test_closing_while_the_line_is_being_opened_ends_in_order(short_plan: InlinePlan, tmp_path: Path) -> None:
+    async def play(pilot: Pilot[None], _app: StationApp) -> None:
+        await pilot.press("q")
+
+    with switched_on(short_plan, tmp_path / "session") as bench:
+        bench.press_all(play)

@@ -1,0 +1,124 @@
+"""Pictures of the screen in frozen states, compared with those that were looked at and kept.
+
+    DBBSTATION_KEEP_STILLS=1 pytest tests/tui/test_stills.py
+
+keeps new ones; look at them before committing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import html
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dbbstation.errors import InstrumentError
+from dbbstation.plan.circle import Direction
+from dbbstation.station.commands import Accept
+from dbbstation.tui.app import DARK, LIGHT
+from dbbstation.tui.still import still_svg
+from tests.tui.happenings import Happening
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+KEPT = Path(__file__).parent / "stills"
+KEEP = bool(os.environ.get("DBBSTATION_KEEP_STILLS"))
+
+
+def set_up() -> Happening:
+    return Happening()
+
+
+def second_circle() -> Happening:
+    return Happening().circle("t0", Direction.CCW).command(Accept()).circle("t0", Direction.CW, 0.6)
+
+
+def verdict() -> Happening:
+    return Happening().circle("t0", Direction.CCW).command(Accept()).circle("t0", Direction.CW)
+
+
+def fault() -> Happening:
+    happening = Happening().circle("t0", Direction.CCW, 0.5)
+    error = InstrumentError(
+        "the line was closed while it was in use",
+        where="/dev/ttyUSB0",
+        remedy="plug the instrument in again, then look with `dbbstation ports` whether its port is still called so",
+    )
+    happening.events += happening.sequencer.fail(error)
+    return happening
+
+
+STATES = [set_up, second_circle, verdict, fault]
+
+
+def drawn(svg: str) -> tuple[str, str]:
+    """The rows of text, and the text with its colours: what rows alone would not show.
+
+    Names that are made from a hash of the content, places in points and the order of the style sheet are left out.
+    """
+    styles = {
+        name: ";".join(sorted(part.strip() for part in style.split(";") if part.strip()))
+        for name, style in re.findall(r"\.terminal-\d+-(r\d+) \{([^}]*)\}", svg)
+    }
+    rows: dict[float, list[tuple[float, str, str]]] = {}
+    for name, x, y, text in re.findall(
+        r'<text class="terminal-\d+-(r\d+)" x="([\d.]+)" y="([\d.]+)"[^>]*>([^<]*)</text>', svg
+    ):
+        rows.setdefault(float(y), []).append((float(x), html.unescape(text).replace("\xa0", " "), styles[name]))
+    plain, coloured = [], []
+    for y in sorted(rows):
+        line = ""
+        for x, text, style in sorted(rows[y]):
+            if text.strip():
+                line = line.ljust(round(x / 12.2)) + text.rstrip("\n")
+                coloured.append(f"{round(x / 12.2):3} {style}: {text.strip()}")
+        plain.append(line.rstrip())
+    return "\n".join(plain) + "\n", "\n".join(coloured) + "\n"
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
+@pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
+def test_the_screen_looks_as_it_did(state: Callable[[], Happening], size: tuple[int, int]) -> None:
+    happening = state()
+    text, _ = drawn(asyncio.run(still_svg(happening.shown(), happening.events, size=size)))
+    kept = KEPT / f"{state.__name__}-{size[0]}x{size[1]}.txt"
+    if KEEP:
+        kept.parent.mkdir(exist_ok=True)
+        kept.write_text(text, encoding="utf-8")
+    assert text.splitlines() == kept.read_text(encoding="utf-8").splitlines()
+
+
+@pytest.mark.parametrize("theme", [DARK, LIGHT])
+def test_the_colours_are_as_they_were(theme: str) -> None:
+    happening = second_circle()
+    _, colours = drawn(asyncio.run(still_svg(happening.shown(), happening.events, size=(80, 24), theme=theme)))
+    kept = KEPT / f"colours-{theme}.txt"
+    if KEEP:
+        kept.write_text(colours, encoding="utf-8")
+    assert colours.splitlines() == kept.read_text(encoding="utf-8").splitlines()
+
+
+def test_a_still_is_the_same_each_time() -> None:
+    happening = verdict()
+    one, other = (asyncio.run(still_svg(happening.shown(), list(happening.events))) for _ in range(2))
+    assert drawn(one) == drawn(other)
+
+
+@pytest.mark.parametrize("size", [(20, 8), (60, 18), (200, 60), (80, 10)])
+def test_any_size_is_drawn(size: tuple[int, int]) -> None:
+    happening = second_circle()
+    text, _ = drawn(asyncio.run(still_svg(happening.shown(), happening.events, size=size)))
+    assert text.startswith(" Three bores")
+
+
+def test_light_is_light_and_dark_is_dark() -> None:
+    happening = set_up()
+    dark, light = (asyncio.run(still_svg(happening.shown(), happening.events, theme=theme)) for theme in (DARK, LIGHT))
+    assert drawn(dark)[0] == drawn(light)[0]
+    assert "#121212" in dark
+    assert "#121212" not in light

@@ -1,0 +1,122 @@
+"""The command itself on a terminal of its own: drawn, left, the terminal restored."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import select
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dbbstation.files.session import RunState, read_session
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+PATIENCE_S = 60.0
+MAIN_SCREEN_AGAIN = "\x1b[?1049l"
+CURSOR_AGAIN = "\x1b[?25h"
+
+
+class Terminal:
+    """A program on a pseudo-terminal of 24 rows and 80 columns."""
+
+    def __init__(self, *arguments: str) -> None:
+        self._master, slave = os.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+        self.modes = termios.tcgetattr(slave)
+        environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"}
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "dbbstation", "station", *arguments],
+            stdin=slave,
+            stdout=slave,
+            stderr=slave,
+            env=environment,
+            start_new_session=True,
+        )
+        self._slave = slave
+        self.shown = ""
+
+    def until(self, text: str) -> None:
+        end_s = time.monotonic() + PATIENCE_S
+        since = len(self.shown)
+        while text not in self.shown[since:]:
+            assert time.monotonic() < end_s, f"{text!r} did not come; last: {self.shown[-400:]!r}"
+            self._read()
+
+    def press(self, keys: str) -> None:
+        os.write(self._master, keys.encode())
+
+    def exit_code(self) -> int:
+        end_s = time.monotonic() + PATIENCE_S
+        while self.process.poll() is None:
+            assert time.monotonic() < end_s, "it does not end"
+            self._read()
+        while self._read():
+            pass
+        return self.process.returncode
+
+    def restored(self) -> bool:
+        return (
+            MAIN_SCREEN_AGAIN in self.shown
+            and CURSOR_AGAIN in self.shown
+            and termios.tcgetattr(self._slave) == self.modes
+        )
+
+    def close(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        os.close(self._master)
+        os.close(self._slave)
+
+    def _read(self) -> bool:
+        if not select.select([self._master], [], [], 0.1)[0]:
+            return False
+        self.shown += os.read(self._master, 65536).decode("utf-8", "replace")
+        return True
+
+
+@pytest.fixture
+def terminal(tmp_path: Path) -> Iterator[Terminal]:
+    opened = Terminal("--virtual", "--time-scale", "3", "--out", str(tmp_path / "session"))
+    yield opened
+    opened.close()
+
+
+def test_quit_leaves_the_terminal_as_it_was(terminal: Terminal, tmp_path: Path) -> None:
+    terminal.until("then press Enter")
+    terminal.press("q")
+    assert terminal.exit_code() == 0
+    assert terminal.restored()
+    assert f"{tmp_path / 'session'}: 0 of 6 runs accepted" in terminal.shown
+
+
+def test_a_polite_kill_in_mid_circle_keeps_the_recording_and_the_terminal(terminal: Terminal, tmp_path: Path) -> None:
+    terminal.until("then press Enter")
+    terminal.press("\r")
+    terminal.until("touch nothing until it has fed out")
+    terminal.process.send_signal(signal.SIGTERM)
+    assert terminal.exit_code() == 1
+    assert terminal.restored()
+    (run,) = read_session(tmp_path / "session").runs
+    assert run.state is RunState.RECORDING
+    assert run.path.stat().st_size > 1000
+
+
+def test_what_is_wrong_with_the_files_is_said_before_the_screen_opens(tmp_path: Path) -> None:
+    opened = Terminal("--virtual", "--plan", str(tmp_path / "none.yaml"))
+    try:
+        assert opened.exit_code() == 1
+        assert "none.yaml" in opened.shown
+        assert "\x1b[?1049h" not in opened.shown
+    finally:
+        opened.close()

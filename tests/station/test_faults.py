@@ -1,0 +1,129 @@
+"""What can happen to a line and a program while a circle is recorded; nothing recorded may be lost."""
+
+from __future__ import annotations
+
+import subprocess
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dbbstation.files.run_csv import read_run
+from dbbstation.files.session import RunState, read_session
+from tests.station.bench import POLLED, bench, lines_of, wait_for
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from tests.station.bench import Bench
+
+
+@pytest.fixture
+def one_circle(plan_file: Path) -> Path:
+    text = plan_file.read_text(encoding="utf-8")
+    plan_file.write_text(text.replace("[ccw, cw]", "[ccw]").replace("repeat_at_end: [a]\n", ""), encoding="utf-8")
+    return plan_file
+
+
+def spoilt(place: Bench, out: Path, spoil: Callable[[], None], *, at_lines: int = 300) -> tuple[int, str]:
+    """Measure, do something in mid-run, wait for the end; return the exit code and what was said."""
+    part = out / "runs" / "a-ccw-1.csv.part"
+    with subprocess.Popen(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        wait_for(lambda: lines_of(part) > at_lines, process)
+        spoil()
+        _, said = process.communicate(timeout=60.0)
+    return process.returncode, said
+
+
+def test_killed_in_mid_run_it_loses_nothing_and_goes_on(one_circle: Path, tmp_path: Path) -> None:
+    out = tmp_path / "session"
+    part = out / "runs" / "a-ccw-1.csv.part"
+    with bench(one_circle, scale=30.0) as place:
+        with subprocess.Popen(place.command(out), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as process:
+            wait_for(lambda: lines_of(part) > 300)
+            process.kill()
+        kept = part.read_bytes()
+        half = read_run(part)
+        assert len(half.recording) == lines_of(part) >= 300
+        assert half.warnings == ()
+        done = place.measure(out)
+        assert done.returncode == 0, done.stderr
+    session = read_session(out)
+    assert [(run.label, run.state, run.mounting) for run in session.runs] == [
+        ("a ccw 1", RunState.RECORDING, 1),
+        ("a ccw 2", RunState.ACCEPTED, 1),
+        ("b ccw 1", RunState.ACCEPTED, 2),
+    ]
+    assert part.read_bytes() == kept
+
+
+def test_a_line_closed_in_mid_run(one_circle: Path, tmp_path: Path) -> None:
+    out = tmp_path / "session"
+    with bench(one_circle, scale=30.0) as place:
+        code, said = spoilt(place, out, place.wire.hang_up)
+    assert code == 1
+    assert "the line was closed while it was in use" in said
+    assert "a-ccw-1: interrupted, kept as far as it came" in said
+    assert "Traceback" not in said
+    session = read_session(out)
+    assert [run.state for run in session.runs] == [RunState.RECORDING]
+    assert len(session.load(session.runs[0]).recording) > 300
+    # Plugged in again, the same command goes on.
+    with bench(one_circle) as place:
+        done = place.measure(out)
+    assert done.returncode == 0, done.stderr
+    session = read_session(out)
+    assert [run.state.value for run in session.runs] == ["recording", "accepted", "accepted"]
+    # Another machine stands there now: its ball was put up anew, although the plan did not ask for it.
+    assert session.runs[1].mounting == 2
+
+
+def test_an_instrument_that_falls_silent_in_mid_run(one_circle: Path, tmp_path: Path) -> None:
+    out = tmp_path / "session"
+    with bench(one_circle, scale=30.0) as place:
+        code, said = spoilt(place, out, place.wire.go_silent)
+    assert code == 1
+    assert "fell silent" in said
+    assert "Traceback" not in said
+    session = read_session(out)
+    assert len(session.load(session.runs[0]).recording) > 300
+
+
+def test_garbage_and_half_lines_cost_single_samples(one_circle: Path, tmp_path: Path) -> None:
+    out = tmp_path / "session"
+
+    def spoil() -> None:
+        place.wire.send_garbage(b"\xff\x00#!?,")
+        place.wire.cut_next_frame(9)
+        place.wire.drop_samples(3)
+
+    with bench(one_circle, scale=30.0) as place:
+        code, said = spoilt(place, out, spoil)
+    assert code == 0, said
+    session = read_session(out)
+    assert [run.state for run in session.runs] == [RunState.ACCEPTED, RunState.ACCEPTED]
+    assert "samples lost" in said
+    lengths = session.load(session.runs[0]).recording.length_mm
+    assert lengths.min() > 148.0
+    assert lengths.max() < 152.0
+
+
+def test_a_wrong_baud_rate(one_circle: Path, tmp_path: Path) -> None:
+    out = tmp_path / "session"
+    with bench(one_circle, instrument=POLLED, scale=1.0, rate_hz=None) as place:
+        done = place.measure(out, "--baud", "2400")
+    assert done.returncode == 1
+    assert "baud" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert read_session(out).runs == ()
+
+
+def test_a_port_that_is_not_there_leaves_no_session(one_circle: Path, tmp_path: Path) -> None:
+    out = tmp_path / "session"
+    with bench(one_circle) as place:
+        command = place.command(out)
+        command[command.index("--port") + 1] = "/dev/nothing-here"
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "there is no such port" in done.stderr
+    assert not out.exists()

@@ -1,0 +1,160 @@
+"""`dbbstation measure` in a process of its own, over a pseudo-terminal."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from dbbstation.files.session import RunState, read_session
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.trace.cut import cut
+from dbbstation.virtual.machine import Sizes
+from tests.station.bench import MACHINE_FILE, POLLED, STREAM, bench, lines_of, wait_for
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.files.session import RunEntry, SessionFolder
+    from dbbstation.virtual.machine import VirtualMachine
+
+QUIET = Sizes(noise_mm=0.0003, bar_uncertainty_mm=0.0005)
+
+
+def differences_um(session: SessionFolder, run: RunEntry, machine: VirtualMachine) -> np.ndarray:
+    """Recorded minus true length over the full turn."""
+    raw = cut(session.load(run).recording, session.circle(run))
+    machine.mountings = run.mounting or 0
+    true = machine.run(run.test, run.direction)
+    # The path starts with 1 s of dwell, the feed-in and 0.3 s at the corner; then the arc begins.
+    circle = session.circle(run)
+    arc_s = true.path.duration_s / 2.0 + (raw.phi_deg - 180.0) / circle.turning_deg_s
+    return 1e3 * (raw.length_mm - np.interp(arc_s, true.path.t_s, true.length_mm))
+
+
+def test_a_whole_short_plan_agrees_with_the_truth(plan_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "session"
+    with bench(plan_file, sizes=QUIET) as place:
+        done = place.measure(out, "--operator", "me", "--bar-length-mm", "150", "--bar-uncertainty-um", "0.5", "--json")
+        assert done.returncode == 0, done.stderr
+        summary = json.loads(done.stdout)
+        session = read_session(out)
+        for run in session.runs:
+            off = differences_um(session, run, place.cell.machine)
+            # Noise, and the edges' 40 samples a second on half a millimetre per radian.
+            assert off.std() < 1.0, run.label
+            assert abs(off.mean()) < 1.0, run.label
+    assert (summary["state"], summary["accepted"], summary["planned"], summary["missing"]) == ("finished", 6, 6, [])
+    assert {run["lost"] for run in summary["runs"]} == {0}
+    assert [run.mounting for run in session.runs] == [1, 1, 2, 2, 3, 3]
+    assert {run.state for run in session.runs} == {RunState.ACCEPTED}
+    assert (session.operator, session.bar is not None) == ("me", True)
+    assert "1 of 6: test a ccw" in done.stderr
+    assert "into bore 9" in done.stderr
+    assert "\r" not in done.stderr
+
+
+def test_a_finished_session_has_nothing_left_and_another_plan_is_refused(plan_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "session"
+    text = plan_file.read_text(encoding="utf-8")
+    plan_file.write_text(text.replace("[ccw, cw]", "[ccw]").replace("repeat_at_end: [a]\n", ""), encoding="utf-8")
+    with bench(plan_file) as place:
+        assert place.measure(out).returncode == 0
+        before = (out / "session.yaml").read_bytes()
+        again = place.measure(out)
+        assert (again.returncode, (out / "session.yaml").read_bytes()) == (0, before)
+        plan_file.write_text(text, encoding="utf-8")
+        other = place.measure(out)
+    assert other.returncode == 1
+    assert "the plan of this session is another one" in other.stderr
+    assert "Traceback" not in other.stderr
+
+
+def test_a_polled_display_is_measured_too(plan_file: Path, tmp_path: Path) -> None:
+    text = plan_file.read_text(encoding="utf-8")
+    plan_file.write_text(text.replace("[ccw, cw]", "[cw]").replace("repeat_at_end: [a]\n", ""), encoding="utf-8")
+    out = tmp_path / "session"
+    with bench(plan_file, instrument=POLLED, scale=20.0, rate_hz=None) as place:
+        done = place.measure(out)
+    assert done.returncode == 0, done.stderr
+    assert [run.state for run in read_session(out).runs][-1] is RunState.ACCEPTED
+
+
+def test_a_person_answers_with_keys(plan_file: Path, tmp_path: Path) -> None:
+    """Skips, and quits: no machine is needed for that."""
+    out = tmp_path / "session"
+    with bench(plan_file) as place:
+        done = place.measure(out, auto=False, typed="s\nwhat\nx\nq\n")
+    assert done.returncode == 0, done.stderr
+    assert "Enter: ready" in done.stderr
+    assert "2 of 6: test a cw" in done.stderr
+    assert "`what` is no answer" in done.stderr
+    assert "means nothing while waiting for the set-up" in done.stderr
+    assert "0 of 6 runs accepted" in done.stdout
+
+
+def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(plan_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "session"
+    with bench(plan_file, scale=30.0) as place:
+        part = out / "runs" / "a-cw-1.csv.part"
+        with subprocess.Popen(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+            wait_for(lambda: lines_of(part) > 100, process)
+            process.send_signal(signal.SIGINT)
+            _, said = process.communicate(timeout=30.0)
+        assert process.returncode == 1
+        assert "a-cw-1: interrupted, kept as far as it came" in said
+        assert "Traceback" not in said
+        kept = part.read_bytes()
+        done = place.measure(out)
+        assert done.returncode == 0, done.stderr
+    session = read_session(out)
+    assert [(run.label, run.state.value) for run in session.runs[:3]] == [
+        ("a ccw 1", "accepted"),
+        ("a cw 1", "recording"),
+        ("a cw 2", "accepted"),
+    ]
+    assert part.read_bytes() == kept
+    # Nobody touched the holder meanwhile.
+    assert [run.mounting for run in session.runs[:3]] == [1, 1, 1]
+    starts = [run.started for run in session.runs if run.started is not None]
+    assert starts == sorted(starts)
+
+
+def test_a_circle_outside_the_travel_stops_before_anything_starts(plan_file: Path, tmp_path: Path) -> None:
+    text = plan_file.read_text(encoding="utf-8").replace("radius_mm: 150.0", "radius_mm: 290.0")
+    plan_file.write_text(text, encoding="utf-8")
+    out = tmp_path / "session"
+    words = ["--plan", str(plan_file), "--machine", str(MACHINE_FILE), "--instrument", STREAM]
+    done = subprocess.run(
+        ["dbbstation", "measure", *words, "--port", "/dev/nothing-here", "--out", str(out)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "test b ccw" in done.stderr
+    assert "its travel 0 to 300 mm" in done.stderr
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("url", ["tcp://192.168.1.7:4000", "tcp://127.0.0.1", "nonsense"])
+def test_only_machines_on_this_computer_are_started(url: str, plan_file: Path, tmp_path: Path) -> None:
+    words = ["--plan", str(plan_file), "--machine", str(MACHINE_FILE), "--instrument", STREAM]
+    words += ["--port", "/dev/nothing-here", "--out", str(tmp_path / "session"), "--auto", url]
+    done = subprocess.run(["dbbstation", "measure", *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "no control address of a virtual machine on this computer" in done.stderr
+
+
+def test_the_shipped_plans_can_be_measured() -> None:
+    """Every plan that comes with the package passes the dry run on the reference machine."""
+    from dbbstation.files.machine_file import read_machine
+    from dbbstation.files.plan_file import read_plan
+    from dbbstation.station.preflight import check_plan
+
+    for path in sorted((shipped_folder("protocols") / "plans").glob("*.yaml")):
+        check_plan(read_plan(path), read_machine(MACHINE_FILE), file=str(path))

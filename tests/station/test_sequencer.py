@@ -1,0 +1,218 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dbbstation.errors import InstrumentError
+from dbbstation.files.plan_file import read_plan
+from dbbstation.plan.circle import Direction
+from dbbstation.station import events
+from dbbstation.station.commands import Accept, Quit, Reject, Repeat, Skip, Start
+from dbbstation.station.detector import Patience
+from dbbstation.station.schedule import Schedule
+from dbbstation.station.sequencer import Sequencer
+from dbbstation.station.states import State
+from tests.station.readings import kinds, run_readings, still
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.plan.plan import Plan
+
+
+@pytest.fixture
+def plan(plan_file: Path) -> Plan:
+    return read_plan(plan_file)
+
+
+def made(plan: Plan, **more: Patience) -> Sequencer:
+    taken: dict[tuple[str, Direction], int] = {}
+
+    def next_repeat(test: str, direction: Direction) -> int:
+        return taken.get((test, direction), 0) + 1
+
+    sequencer = Sequencer(plan, Schedule(plan, next_repeat), **more)
+    sequencer.taken = taken  # type: ignore[attr-defined]
+    return sequencer
+
+
+def one_run(sequencer: Sequencer, plan: Plan, test: str, direction: Direction) -> list[events.Event]:
+    circle = plan.tests[test].run(direction)
+    told = sequencer.command(Start()) + sequencer.readings(run_readings(circle))
+    taken = sequencer.taken  # type: ignore[attr-defined]
+    taken[test, direction] = taken.get((test, direction), 0) + 1
+    return told
+
+
+def test_a_run_is_told_from_announcement_to_verdict(plan: Plan) -> None:
+    sequencer = made(plan)
+    (announced, changed) = sequencer.begin()
+    assert isinstance(announced, events.RunAnnounced)
+    assert (announced.run.label, announced.run.mounting, announced.put_up) == ("a-ccw-1", 1, True)
+    assert (announced.number, announced.count) == (1, 6)
+    assert announced.instructions[0] == "Put the short holder with the ball 9-short into bore 9"
+    assert changed == events.StateChanged(State.ANNOUNCED, frozenset({Start, Skip, Quit}))
+    told = one_run(sequencer, plan, "a", Direction.CCW)
+    assert kinds(told) == ["RunStarted", "FeedInSeen", "RunCompleted"]
+    assert [event.state for event in told if isinstance(event, events.StateChanged)] == [
+        State.ARMED,
+        State.DWELLING,
+        State.TURNING,
+        State.LEAVING,
+        State.COMPLETE,
+    ]
+    completed = next(event for event in told if isinstance(event, events.RunCompleted))
+    assert completed.problem == ""
+    assert completed.figures is not None
+    assert completed.figures.circularity_um < 0.2
+    progress = [event.swept_deg for event in told if isinstance(event, events.Progress)]
+    assert progress == sorted(progress)
+    assert progress[-1] > 445.0
+    accepted = sequencer.command(Accept())
+    assert kinds(accepted) == ["RunAccepted", "RunAnnounced"]
+
+
+def test_the_live_angle_is_that_of_the_turn(plan: Plan) -> None:
+    sequencer = made(plan)
+    sequencer.begin()
+    told = one_run(sequencer, plan, "a", Direction.CCW)
+    samples = [sample for event in told if isinstance(event, events.SamplesRecorded) for sample in event.samples]
+    angles = [sample.phi_deg for sample in samples if sample.phi_deg is not None]
+    assert angles[0] == pytest.approx(-45.0, abs=1.0)
+    assert angles[-1] == pytest.approx(405.0, abs=0.01)
+    middle = samples[len(samples) // 2]
+    assert middle.phi_deg == pytest.approx(180.0, abs=3.0)
+
+
+def test_the_whole_plan_with_its_repeats_and_mountings(plan: Plan) -> None:
+    sequencer = made(plan)
+    told = sequencer.begin()
+    announced = []
+    while sequencer.state not in {State.FINISHED, State.FAULTED}:
+        here = next(event for event in told if isinstance(event, events.RunAnnounced))
+        announced.append((here.run.label, here.run.mounting, here.put_up))
+        one_run(sequencer, plan, here.run.test, here.run.direction)
+        told = sequencer.command(Accept())
+    assert announced == [
+        ("a-ccw-1", 1, True),
+        ("a-cw-1", 1, False),
+        ("b-ccw-1", 2, True),
+        ("b-cw-1", 2, False),
+        ("a-ccw-2", 3, True),
+        ("a-cw-2", 3, False),
+    ]
+    assert kinds(told) == ["RunAccepted", "SessionFinished"]
+    finished = next(event for event in told if isinstance(event, events.SessionFinished))
+    assert (finished.accepted, finished.missing) == (6, ())
+
+
+def test_a_holder_that_was_touched_makes_a_new_mounting(plan: Plan) -> None:
+    sequencer = made(plan)
+    sequencer.begin()
+    one_run(sequencer, plan, "a", Direction.CCW)
+    sequencer.command(Accept())
+    sequencer.command(Start(remounted=True))
+    told = sequencer.readings(run_readings(plan.tests["a"].run(Direction.CW)))
+    started = next(event for event in told if isinstance(event, events.RunStarted))
+    assert (started.run.label, started.run.mounting) == ("a-cw-1", 2)
+    announced = next(event for event in sequencer.command(Accept()) if isinstance(event, events.RunAnnounced))
+    assert (announced.run.label, announced.run.mounting) == ("b-ccw-1", 3)
+
+
+@pytest.mark.parametrize("command", [Repeat("a bump"), Reject("a bump")])
+def test_a_run_that_is_thrown_out_is_ended_kept_and_followed(plan: Plan, command: Repeat | Reject) -> None:
+    sequencer = made(plan)
+    sequencer.begin()
+    sequencer.command(Start())
+    sequencer.readings(run_readings(plan.tests["a"].circle)[:400])
+    assert sequencer.state is State.TURNING
+    told = sequencer.command(command)
+    assert kinds(told) == ["RunCompleted", "RunRejected", "RunAnnounced"]
+    announced = next(event for event in told if isinstance(event, events.RunAnnounced))
+    assert announced.run.direction is (Direction.CCW if isinstance(command, Repeat) else Direction.CW)
+
+
+def test_what_was_left_out_is_named_at_the_end(plan: Plan) -> None:
+    sequencer = made(plan)
+    sequencer.begin()
+    told = []
+    for _ in range(6):
+        told = sequencer.command(Skip())
+    finished = next(event for event in told if isinstance(event, events.SessionFinished))
+    assert finished.missing[:2] == ("a ccw", "a cw")
+    assert finished.missing[-1] == "a cw (repeated at the end)"
+
+
+def test_half_a_circle_is_no_circle(plan: Plan) -> None:
+    sequencer = made(plan)
+    sequencer.begin()
+    circle = plan.tests["a"].circle
+    run = run_readings(circle)
+    broken_off = [replace(reading, length_mm=153.0) for reading in run[700:]]
+    told = sequencer.command(Start()) + sequencer.readings(run[:700] + broken_off)
+    assert sequencer.state is State.FLAWED
+    completed = next(event for event in told if isinstance(event, events.RunCompleted))
+    assert completed.figures is None
+    assert "degrees lie between feed-in and feed-out" in completed.problem
+    assert kinds(sequencer.command(Accept())) == ["CommandRefused"]
+    assert kinds(sequencer.command(Repeat())) == ["RunRejected", "RunAnnounced"]
+
+
+def test_a_machine_that_does_not_come_is_announced_again(plan: Plan) -> None:
+    sequencer = made(plan, patience=Patience(for_machine_s=10.0))
+    sequencer.begin()
+    told = sequencer.command(Start()) + sequencer.readings(still(150.0, 15.0))
+    assert kinds(told) == ["RunLate", "RunAnnounced"]
+    assert sequencer.state is State.ANNOUNCED
+    late = next(event for event in told if isinstance(event, events.RunLate))
+    assert "150.750 mm" in late.problem
+
+
+@pytest.mark.parametrize(("length_mm", "what"), [(151.5, "feed-in"), (150.0, "feed-out")])
+def test_a_machine_that_stops_in_the_run_ends_it(plan: Plan, length_mm: float, what: str) -> None:
+    sequencer = made(plan, patience=Patience(for_machine_s=10.0))
+    sequencer.begin()
+    sequencer.command(Start())
+    readings = still(151.5, 1.0) + still(length_mm, 300.0, 1.0)
+    told = sequencer.readings(readings)
+    assert sequencer.state is State.FLAWED
+    completed = next(event for event in told if isinstance(event, events.RunCompleted))
+    assert f"no {what} seen" in completed.problem
+
+
+def test_readings_without_a_number_are_kept_and_not_used(plan: Plan) -> None:
+    sequencer = made(plan)
+    sequencer.begin()
+    run = run_readings(plan.tests["a"].circle)
+    for k in (500, 501, 502, 503):
+        run[k] = replace(run[k], length_mm=None, status="fault", said="signal lost")
+    told = sequencer.command(Start()) + sequencer.readings(run)
+    assert sequencer.state is State.COMPLETE
+    samples = [sample for event in told if isinstance(event, events.SamplesRecorded) for sample in event.samples]
+    assert [sample.status for sample in samples].count("fault") == 4
+    assert all(sample.length_mm is not None for sample in samples)
+
+
+def test_one_misread_line_is_no_movement(plan: Plan) -> None:
+    sequencer = made(plan)
+    sequencer.begin()
+    run = run_readings(plan.tests["a"].circle)
+    run[600] = replace(run[600], length_mm=152.0)
+    sequencer.command(Start())
+    told = sequencer.readings(run[:1200])
+    assert sequencer.state is State.TURNING
+    assert kinds(told) == ["RunStarted", "FeedInSeen"]
+
+
+def test_a_fault_names_the_run_that_it_interrupts(plan: Plan) -> None:
+    sequencer = made(plan)
+    sequencer.begin()
+    sequencer.command(Start())
+    sequencer.readings(run_readings(plan.tests["a"].circle)[:300])
+    told = sequencer.fail(InstrumentError("the line was closed"))
+    fault = next(event for event in told if isinstance(event, events.Fault))
+    assert fault.interrupted is not None
+    assert fault.interrupted.label == "a-ccw-1"
+    assert sequencer.state is State.FAULTED

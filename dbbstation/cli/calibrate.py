@@ -39,10 +39,11 @@ def calibrate(
       dbbstation calibrate monday tuesday --exclude h --json
     """
     from dbbstation.calibration.evaluation import evaluate
-    from dbbstation.calibration.fit import KINEMATIC_SOURCES, MEASUREMENT_SOURCES
+    from dbbstation.calibration.fit import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
     from dbbstation.calibration.fit import calibrate as fit
     from dbbstation.calibration.summary import calibration_summary, identified_model
     from dbbstation.cli.output import print_json, say
+    from dbbstation.errors import ModelError
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.models import write_model
     from dbbstation.recorded import load_sessions
@@ -50,8 +51,13 @@ def calibrate(
 
     if out is not None:
         refuse_existing(out, force=force)
-    chosen = tuple(name.strip() for name in sources.split(",")) if sources else KINEMATIC_SOURCES
+    chosen = KINEMATIC_SOURCES if sources is None else tuple(filter(None, map(str.strip, sources.split(","))))
     fitted = sources_named(dict.fromkeys(chosen + MEASUREMENT_SOURCES))
+    if not machine_sources(fitted):
+        raise ModelError(
+            "none of the error sources named belongs to the machine: there is nothing to calibrate",
+            remedy=f"name one such as {KINEMATIC_SOURCES[0]}, or leave --sources out",
+        )
     recorded = load_sessions(sessions, exclude)
     for warning in recorded.warnings:
         say(f"note: {warning}")

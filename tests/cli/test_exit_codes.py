@@ -1,0 +1,175 @@
+"""Exit codes, refusals to overwrite, tracebacks on request only, interruptions."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from dbbstation.cli import DONE, FAILED, USAGE
+from dbbstation.files.shipped import shipped_folder
+
+PROGRAM = [sys.executable, "-m", "dbbstation"]
+PATIENCE_S = 60
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["calibrat"],
+        ["calibrate"],
+        ["calibrate", "session", "--colour"],
+        ["evaluate", "session"],
+        ["simulate", "--model", "m", "--plan", "p", "--out", "o", "--samples", "3"],
+        ["check"],
+        ["check", "--schema", "dbb-plan/9"],
+        ["compensate", "part.ngc", "--model", "m", "--out", "o", "--start", "1,2,3"],
+    ],
+    ids=" ".join,
+)
+def test_a_command_line_that_is_not_understood(run, arguments):
+    outcome = run(*arguments)
+    assert (outcome.code, outcome.out) == (USAGE, "")
+    assert outcome.err.startswith("Usage: dbbstation")
+    assert "Error: " in outcome.err
+
+
+def test_the_nearest_command_is_named(run):
+    assert "did you mean calibrate?" in run("calibrat").err
+
+
+@pytest.fixture
+def written(tmp_path, model, elsewhere):
+    """Every command that writes a file, with the file or folder."""
+    plan, machine = elsewhere / "plan.yaml", elsewhere / "machine.yaml"
+    (tmp_path / "in.csv").write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n")
+    (tmp_path / "part.ngc").write_text("G21 G90 G94\nG1 X0 Y0 Z-1000 A0 B0 C0 F1000\nX50\nM2\n")
+    out = tmp_path / "out"
+    return {
+        "calibrate": (["calibrate", elsewhere, "--out", out], out),
+        "predict": (["predict", "--model", model, "--poses", tmp_path / "in.csv", "--out", out], out),
+        "program": (["program", "--plan", plan, "--machine", machine, "--test", "d", "--out", out], out / "d-cw.ngc"),
+        "compensate": (["compensate", tmp_path / "part.ngc", "--model", model, "--out", out], out),
+    }
+
+
+@pytest.mark.parametrize("command", ["calibrate", "predict", "program", "compensate"])
+def test_nothing_is_overwritten_without_force(run, written, command):
+    arguments, file = written[command]
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("precious")
+    refused = run(*arguments)
+    assert (refused.code, refused.out) == (FAILED, "")
+    assert refused.err == f"{file}: the file exists already; give --force to replace it\n"
+    assert file.read_text() == "precious"
+    assert [path.name for path in file.parent.iterdir() if ".new" in path.name] == []
+    forced = run(*arguments, "--force")
+    assert forced.code == DONE, forced.err
+    assert file.read_text() != "precious"
+
+
+def test_a_session_is_never_overwritten(run, tmp_path, model, elsewhere):
+    (tmp_path / "out").mkdir()
+    outcome = run("simulate", "--model", model, "--plan", elsewhere / "plan.yaml", "--out", tmp_path / "out")
+    assert outcome.code == FAILED
+    assert "the session folder exists already" in outcome.err
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written(run, tmp_path, model):
+    (tmp_path / "locked").mkdir(mode=0o500)
+    (tmp_path / "in.csv").write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n")
+    out = tmp_path / "locked" / "out.csv"
+    outcome = run("predict", "--model", model, "--poses", tmp_path / "in.csv", "--out", out)
+    assert outcome.code == FAILED
+    assert "permission denied" in outcome.err
+
+
+def started(*arguments, **options):
+    return subprocess.run(
+        [*PROGRAM, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=PATIENCE_S, **options
+    )
+
+
+@pytest.mark.parametrize("arguments", [["--debug", "calibrate", "nowhere"], ["calibrate", "nowhere", "--debug"]])
+def test_debug_shows_the_traceback(tmp_path, arguments):
+    outcome = started(*arguments, cwd=tmp_path)
+    assert outcome.returncode == FAILED
+    assert "Traceback (most recent call last)" in outcome.stderr
+    assert "nowhere: there is no such file" in outcome.stderr
+
+
+def test_without_debug_there_is_none(tmp_path):
+    outcome = started("calibrate", "nowhere", cwd=tmp_path)
+    assert (outcome.returncode, outcome.stdout) == (FAILED, "")
+    assert outcome.stderr == "nowhere: there is no such file; check the path\n"
+
+
+def test_a_fault_of_the_program_says_so(run, monkeypatch, fifteen):
+    def broken(*_):
+        raise ValueError("three is not two")
+
+    monkeypatch.setattr("dbbstation.recorded.load_sessions", broken)
+    outcome = run("calibrate", fifteen)
+    assert outcome.code == FAILED
+    assert outcome.err == (
+        "ValueError: three is not two\nthis is a fault of dbbstation itself; with --debug it shows what to report\n"
+    )
+    with pytest.raises(ValueError, match="three is not two"):
+        run("calibrate", fifteen, "--debug")
+
+
+def test_a_reader_that_has_seen_enough(tmp_path):
+    """As `dbbstation … | head -1` does; standard error stays empty."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w") as output:
+        command = [*PROGRAM, "check", "--schema", "dbb-plan/1"]
+        done = subprocess.run(
+            command, stdout=output, stderr=subprocess.PIPE, text=True, check=False, cwd=tmp_path, timeout=PATIENCE_S
+        )
+    assert (done.returncode, done.stderr) == (FAILED, "")
+
+
+def test_an_interrupt_leaves_no_half_result(run, monkeypatch, tmp_path, fifteen):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dbbstation.calibration.fit.linearise", interrupted)
+    outcome = run("calibrate", fifteen, "--out", tmp_path / "model.yaml")
+    assert (outcome.code, outcome.out) == (FAILED, "")
+    assert outcome.err.strip() == "interrupted; what was written before stays"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a named pipe to know when the program waits")
+def test_ctrl_c(tmp_path, model):
+    poses = tmp_path / "poses.csv"
+    os.mkfifo(poses)
+    command = [*PROGRAM, "predict", "--model", str(model), "--poses", str(poses), "--out", str(tmp_path / "out.csv")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with poses.open("w"):  # opens when the program has begun to read
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, out) == (FAILED, "")
+    assert err.strip() == "interrupted; what was written before stays"
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_as_a_module_and_as_a_script():
+    module = started("--version")
+    assert (module.returncode, module.stderr) == (DONE, "")
+    assert module.stdout.startswith("dbbstation, version ")
+
+
+def test_json_goes_to_standard_output_alone(tmp_path):
+    small = shipped_folder("fixtures") / "sessions" / "small"
+    outcome = started("calibrate", small, "--out", tmp_path / "model.yaml", "--json")
+    assert outcome.returncode == DONE
+    assert outcome.stdout.startswith("{")
+    assert outcome.stdout.endswith("}\n")
+    assert "left out" in outcome.stderr

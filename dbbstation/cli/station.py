@@ -196,7 +196,6 @@ def _stopped_politely(app: StationApp) -> Iterator[threading.Event]:
     Yields:
         Whether that happened.
     """
-
     stopped = threading.Event()
 
     def stop(_number: int, _frame: FrameType | None) -> None:

@@ -12,11 +12,13 @@ pyproject.toml changes. A system Python that refuses global installs is fine: no
 from __future__ import annotations
 
 import hashlib
-import importlib.util
+import io
 import os
+import signal
 import subprocess
 import sys
 import venv
+from contextlib import redirect_stdout
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -46,7 +48,10 @@ def main(arguments: list[str]) -> int:
     if not VERSIONS[0] <= sys.version_info[:2] <= VERSIONS[1]:
         print(f"dbbstation needs Python 3.11, 3.12 or 3.13; this is {sys.version.split()[0]}", file=sys.stderr)
         return 1
-    set_up()
+    # Ctrl-C is for the program that runs: it ends by itself in its own way, and this script waits for it.
+    signal.signal(signal.SIGINT, lambda *_: None)
+    if not set_up():
+        return 1
     if command == "test":
         return test(arguments[1:])
     if command == "shell-line":
@@ -56,28 +61,35 @@ def main(arguments: list[str]) -> int:
     return subprocess.call([PYTHON, "-m", "dbbstation", *rest])
 
 
-def set_up() -> None:
+def set_up() -> bool:
     """Make the virtual environment and install the checkout into it, where that is not done yet."""
     wanted = hashlib.sha256((HERE / "pyproject.toml").read_bytes() + sys.version.encode()).hexdigest()
     if STAMP.exists() and STAMP.read_text(encoding="utf-8") == wanted:
-        return
-    print("setting up .venv, this takes a minute ...", file=sys.stderr)
-    if importlib.util.find_spec("ensurepip"):
-        venv.create(ENVIRONMENT, with_pip=True)
-        installer = [PYTHON, "-m", "pip"]
-    else:
-        # Debian ships Python without ensurepip; its pip, where there is one, can install into another environment.
-        venv.create(ENVIRONMENT, with_pip=False)
-        installer = [sys.executable, "-m", "pip", "--python", PYTHON]
-    install = [*installer, "install", "--quiet", "--disable-pip-version-check", "--editable", f"{HERE}[dev]"]
+        return True
+    print("setting up .venv, this takes a minute or two ...", file=sys.stderr, flush=True)
+    install = [*installer(), "install", "--quiet", "--disable-pip-version-check", "--editable", f"{HERE}[dev]"]
     if subprocess.call(install) != 0:
         print(
             "the installation failed; pip's message above says why\n"
-            "without pip on the system: sudo apt install python3-venv",
+            "pip fetches packages from the network; behind a proxy, set HTTPS_PROXY\n"
+            "where pip itself is missing: sudo apt install python3-venv",
             file=sys.stderr,
         )
-        raise SystemExit(1)
+        return False
     STAMP.write_text(wanted, encoding="utf-8")
+    return True
+
+
+def installer() -> list[str | Path]:
+    """Make the environment and return the command that is its pip."""
+    try:
+        with redirect_stdout(io.StringIO()):  # Debian's own words would tell people to do what is not needed
+            venv.create(ENVIRONMENT, with_pip=True)
+    except (subprocess.CalledProcessError, SystemExit):
+        # Debian leaves out ensurepip; the system's pip, where there is one, can install into another environment.
+        venv.create(ENVIRONMENT, with_pip=False)
+        return [sys.executable, "-m", "pip", "--python", PYTHON]
+    return [PYTHON, "-m", "pip"]
 
 
 def test(rest: list[str]) -> int:

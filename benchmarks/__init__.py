@@ -1,0 +1,1 @@
+"""Performance, each measured against a peer in the same run; scripts to be run by hand."""

@@ -35,9 +35,13 @@ MEASUREMENT_SOURCES = ("mounting", "ball-coordinate", "bar-offset")
 FEWEST_TESTS = 3
 """Fewer circles leave more directions open than they close."""
 
-MOST_STEPS = 20
+MOST_STEPS = 30
+DAMPED = 0.6
 CONVERGED = 1e-6
 """Share of the columns' plausible sizes by which the last step may still move: a fifth of a nanometre on joints."""
+
+CONVERGED_SIGMA = 1e-3
+"""The same as a share of their standard deviations, for what the runs hardly see."""
 FIRST_NOISE_MM = 1e-3
 
 
@@ -112,21 +116,25 @@ def calibrate(
     x = _start_values(layout, start or {})
     noise = Noise(FIRST_NOISE_MM, 1.0)
     nominal, _ = linearise(layout, observations, x)
-    blocks = nominal
+    blocks, before = nominal, np.zeros_like(x)
     for _ in range(MOST_STEPS):
         held = lost_directions(nominal, layout.known, noise.effective)
         solution, noise = _settled(blocks, layout, noise, held)
         update = layout.nominal + solution.x
-        change = float(np.abs((update - x) / layout.known.scale).max(initial=0.0))
-        x = update
+        sigma = np.sqrt(np.diag(solution.covariance))
+        settled_at = np.maximum(CONVERGED * layout.known.scale, CONVERGED_SIGMA * sigma)
+        step = update - x
+        change = float(np.abs(step / settled_at).max(initial=0.0))
+        x = x + _damping(layout, step, before) * step
+        before = step
         blocks, readings = linearise(layout, observations, x)
-        if change < CONVERGED:
+        if change < 1.0:
             break
         left = [o.raw.length_mm - reading.length_mm for o, reading in zip(observations, readings, strict=True)]
         noise = noise_of(left, solution.freedom_used)
     else:
         raise CalibrationError(
-            f"the fit still moves by {change:.2g} of its parameters' usual sizes after {MOST_STEPS} steps",
+            f"the fit still moves, {change:.2g} times more than it should after {MOST_STEPS} steps",
             remedy="check that machine, plan and recordings belong together; leave out doubtful tests with --exclude",
         )
     return Calibration(
@@ -139,6 +147,12 @@ def calibrate(
         residual_mm=residuals(layout.model(x), observations),
         directions_lost=in_words(layout, held),
     )
+
+
+def _damping(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64]) -> float:
+    """Share of a step to go: less where a parameter of shape swings to and fro, as one that is hardly seen does."""
+    shaped = np.array([bool(p.shape) for term in layout.terms for p in term.parameters])
+    return DAMPED if float(np.min(step[shaped] * before[shaped], initial=0.0)) < 0.0 else 1.0
 
 
 def _near(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> Layout:

@@ -69,23 +69,34 @@ def smooth(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highes
 
 
 def misfit(
-    residuals: Sequence[NDArray[np.float64]], phases_rad: Sequence[NDArray[np.float64]], freedom_used: float
+    residuals: Sequence[NDArray[np.float64]],
+    phases_rad: Sequence[NDArray[np.float64]],
+    groups: Sequence[object],
+    freedom_used: float,
 ) -> Misfit:
     """Compare the low harmonics of residuals with the band above them by an F test.
+
+    The first harmonic of each group of runs is left out of it: a common shift there is an effect whose size is only
+    roughly known, such as where a ball came to stand. Differences within a group count.
 
     Args:
         residuals: one whole period per run.
         phases_rad: of the samples [rad].
-        freedom_used: degrees of freedom that the fit took out of the low harmonics.
+        groups: what each run shares its first harmonic with.
+        freedom_used: degrees of freedom that the fit took out of the low harmonics beside those shifts.
     """
-    low = np.empty(len(residuals))
-    high = np.empty(len(residuals))
-    for k, (residual, phase) in enumerate(zip(residuals, phases_rad, strict=True)):
-        power = coefficients(residual, phase, HIGH) ** 2
-        is_low = np.r_[True, np.tile(np.arange(1, HIGH + 1) <= LOW, 2)]
-        low[k], high[k] = power[is_low].sum(), power[~is_low].sum()
+    all_coefficients = np.array(
+        [coefficients(residual, phase, HIGH) for residual, phase in zip(residuals, phases_rad, strict=True)]
+    )
+    first = [1, HIGH + 1]
+    for group in set(groups):
+        of_group = [k for k, g in enumerate(groups) if g == group]
+        all_coefficients[np.ix_(of_group, first)] -= all_coefficients[np.ix_(of_group, first)].mean(axis=0)
+    is_low = np.r_[True, np.tile(np.arange(1, HIGH + 1) <= LOW, 2)]
+    low = (all_coefficients[:, is_low] ** 2).sum(axis=1)
+    high = (all_coefficients[:, ~is_low] ** 2).sum(axis=1)
     high_freedom = 2.0 * (HIGH - LOW) * len(residuals)
-    low_freedom = max((2.0 * LOW + 1.0) * len(residuals) - freedom_used, 1.0)
+    low_freedom = max((2.0 * LOW + 1.0) * len(residuals) - 2.0 * len(set(groups)) - freedom_used, 1.0)
     noise2 = float(high.sum()) / high_freedom
     ratio = float(low.sum()) / low_freedom / noise2 if noise2 > 0.0 else 1.0
     samples = np.mean([len(residual) for residual in residuals])

@@ -35,6 +35,7 @@ class Backlash(ErrorSource):
     name = "backlash"
     belongs_to = Owner.MACHINE
     needs = frozenset({Need.POSE, Need.PATH})
+    varies_with = "strut-speed-sign"
     texts = Texts(
         what="A strut's drive has play, or winds up against friction, each time the strut turns from growing to "
         "shrinking.",

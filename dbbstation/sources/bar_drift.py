@@ -27,6 +27,7 @@ class BarDrift(ErrorSource):
     name = "bar-drift"
     belongs_to = Owner.INSTRUMENT
     needs = frozenset({Need.TIME})
+    varies_with = "time"
     texts = Texts(
         what="The bar itself changes its length while it warms up or cools down after having been handled. The drift "
         "given is counted from the first sample of the session.",

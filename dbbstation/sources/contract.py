@@ -199,6 +199,8 @@ class ErrorSource(ABC):
     name: ClassVar[str]
     belongs_to: ClassVar[Owner]
     needs: ClassVar[frozenset[Need]] = frozenset({Need.POSE})
+    varies_with: ClassVar[str] = ""
+    """Variable that organises its misfit, as printed beside a place; empty where there is no single one."""
     texts: ClassVar[Texts]
 
     @abstractmethod

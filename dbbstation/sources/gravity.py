@@ -32,6 +32,7 @@ class Gravity(LinearSource):
 
     name = "gravity"
     belongs_to = Owner.MACHINE
+    varies_with = "strut-force"
     texts = Texts(
         what="The struts are elastic: the platform's weight pulls some of them longer and pushes others shorter.",
         shows="Circles with the spindle tilted, above all off the centre, are deformed by tens of µm, the same in both "

@@ -1,0 +1,206 @@
+"""The channel of bar readings as the inference sees it: blocks of columns for base, named sources and shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Shape, ranges, shapes, strongest_waves, variables
+from dbbstation.inference.race import Candidate, Variant
+from dbbstation.inference.square_root import Block, Columns, compress
+from dbbstation.trace.average import averaged, means, sector_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.layout import Layout
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import BarReading
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource, Motion
+
+SECTORS = 720
+"""Samples per turn that a diagnosis works on, at the most: every half degree."""
+
+FEWEST_PER_SECTOR = 2
+"""Samples per sector below which sectors are made wider."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """Everything that a diagnosis compares.
+
+    Attributes:
+        observations: runs, averaged over sectors.
+        blocks: compressed runs: columns of the base, then of all candidates; targets about the base fit.
+        layout: terms of the base columns.
+        held: base directions at nominal.
+        columns: number of all columns.
+        named: sources that have a name, as candidates.
+        unnamed: shapes, as candidates; their names are `variable | strut | form`.
+        residual_mm: per run, what the base fit leaves, measurement's effects included [mm].
+    """
+
+    observations: tuple[Observation, ...]
+    blocks: tuple[Block, ...]
+    layout: Layout
+    held: NDArray[np.float64]
+    columns: int
+    named: tuple[Candidate, ...]
+    unnamed: tuple[Candidate, ...]
+    residual_mm: tuple[NDArray[np.float64], ...]
+
+    @property
+    def base(self) -> Columns:
+        """Priors and scales of the base columns."""
+        return self.layout.known
+
+    @property
+    def machine(self) -> Machine:
+        """Nominal machine."""
+        return self.layout.machine
+
+    @property
+    def known(self) -> Columns:
+        """Priors and scales of all columns; amplitudes of candidates are random with their plausible sizes."""
+        prior = np.concatenate([self.base.prior, np.full(self.columns - len(self.base.prior), np.inf)])
+        for candidate in (*self.named, *self.unnamed):
+            for variant in candidate.variants:
+                prior[variant.columns] = variant.prior
+        more = self.columns - len(self.base.prior)
+        scale = np.concatenate([self.base.scale, prior[len(self.base.prior) :]])
+        return Columns(prior, scale, np.concatenate([self.base.random, np.ones(more, dtype=bool)]))
+
+
+def thinned(observation: Observation) -> Observation:
+    """Return the run averaged over sectors, with what was commanded averaged alike."""
+    raw = observation.raw
+    sectors = min(SECTORS, max(len(raw) // FEWEST_PER_SECTOR, 1))
+    commanded = observation.commanded
+    if commanded is not None:
+        before = len(observation.lead_in_deg)
+        commanded = np.vstack([commanded[:before], means(commanded[before:], sector_of(raw, sectors))])
+    return replace(observation, raw=averaged(raw, sectors), commanded=commanded)
+
+
+def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Channel:
+    """Lay out base, sources and shapes over a calibrated set of runs.
+
+    Args:
+        calibration: the base model, fitted; its runs as thinned.
+        sources: named candidates; each must be given what it needs by every run.
+    """
+    layout, machine = calibration.layout, calibration.layout.machine
+    observations = calibration.observations
+    motions = [observation.motion() for observation in observations]
+    extent = ranges(motions, machine)
+    model = calibration.model
+    count = len(layout.known.prior)
+    book = _Book(count)
+    readings = [model.bar(motion) for motion in motions]
+    left = [o.raw.length_mm - reading.length_mm for o, reading in zip(observations, readings, strict=True)]
+    waves = strongest_waves(
+        left,
+        [r.sensitivity.response.per_strut[m.kept] for r, m in zip(readings, motions, strict=True)],
+        [variables(m, machine)["strut-length"][m.kept] for m in motions],
+    )
+    blocks = []
+    for motion, reading, residual in zip(motions, readings, left, strict=True):
+        terms = [term for term in layout.terms if term.acts_on(motion)]
+        pieces = [
+            reading.by_parameters(term.source.derivative(motion, machine, calibration.x[term.columns]))
+            for term in terms
+        ]
+        columns = [np.r_[term.columns] for term in terms]
+        for source in sources:
+            for numbers, piece in _source_columns(source, motion, machine, reading, book):
+                columns.append(numbers)
+                pieces.append(piece)
+        for shape in shapes(motion, machine, extent, waves):
+            columns.append(book.shape(shape))
+            pieces.append(reading.by_parameters(shape.columns))
+        numbers = np.concatenate(columns)
+        jacobian = np.hstack(pieces)
+        base = numbers < count
+        target = residual + jacobian[:, base] @ (calibration.x - layout.nominal)[numbers[base]]
+        blocks.append(compress(numbers, jacobian, target))
+    return Channel(
+        observations=observations,
+        blocks=tuple(blocks),
+        layout=layout,
+        held=calibration.solution.held,
+        columns=book.count,
+        named=book.candidates(named=True),
+        unnamed=book.candidates(named=False),
+        residual_mm=tuple(left),
+    )
+
+
+def _source_columns(
+    source: ErrorSource, motion: Motion, machine: Machine, reading: BarReading, book: _Book
+) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+    """Columns of every variant of a source for one run: amplitudes only, shape parameters at their values."""
+    parameters = source.parameters(machine)
+    amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
+    shaped = [k for k, p in enumerate(parameters) if p.shape]
+    grid = parameters[shaped[0]].shape if shaped else ((),)
+    found = []
+    for value in grid:
+        values = np.zeros(len(parameters))
+        if shaped:
+            values[shaped] = value
+        derivative = reading.by_parameters(source.derivative(motion, machine, values))[:, amplitudes]
+        prior = np.array([parameters[k].plausible for k in amplitudes])
+        shape = tuple(float(values[k]) for k in shaped)
+        found.append((book.source(source, source.shared_by(motion), shape, prior), derivative))
+    return found
+
+
+class _Book:
+    """Gives columns their numbers, the same in every run."""
+
+    def __init__(self, first: int) -> None:
+        self.count = first
+        self._sources: dict[
+            tuple[str, tuple[float, ...]], dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
+        ] = {}
+        self._shapes: dict[tuple[str, int | None, str], NDArray[np.int64]] = {}
+
+    def source(
+        self, source: ErrorSource, shared: str, shape: tuple[float, ...], prior: NDArray[np.float64]
+    ) -> NDArray[np.int64]:
+        """Columns of one variant of a source for one set that shares its values."""
+        sets = self._sources.setdefault((source.name, shape), {})
+        if shared not in sets:
+            sets[shared] = (self._new(len(prior)), prior)
+        return sets[shared][0]
+
+    def shape(self, shape: Shape) -> NDArray[np.int64]:
+        """Columns of a shape."""
+        key = (shape.variable, shape.strut, shape.form)
+        if key not in self._shapes:
+            self._shapes[key] = self._new(shape.count)
+        return self._shapes[key]
+
+    def candidates(self, *, named: bool) -> tuple[Candidate, ...]:
+        """Return the candidates with their variants."""
+        variants: dict[str, list[Variant]] = {}
+        if named:
+            for (name, form), sets in self._sources.items():
+                columns = np.concatenate([columns for columns, _ in sets.values()])
+                prior = np.concatenate([prior for _, prior in sets.values()])
+                variants.setdefault(name, []).append(Variant(columns, prior, form))
+        else:
+            for (variable, strut, _), columns in self._shapes.items():
+                prior = np.full(len(columns), PLAUSIBLE_MM)
+                variants.setdefault(f"{variable} | {strut or ''}", []).append(Variant(columns, prior))
+        return tuple(Candidate(name, tuple(forms)) for name, forms in variants.items())
+
+    def _new(self, size: int) -> NDArray[np.int64]:
+        self.count += size
+        return np.arange(self.count - size, self.count)

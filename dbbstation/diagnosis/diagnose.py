@@ -1,0 +1,265 @@
+"""The diagnosis: do recordings differ from the model beyond noise, which physics was left out, what does it change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.fit import Calibration, calibrate, default_sources
+from dbbstation.diagnosis.channel import Channel, channel_of, thinned
+from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
+from dbbstation.diagnosis.locate import locate, strut_contributions
+from dbbstation.diagnosis.next_test import propose
+from dbbstation.diagnosis.verdicts import judge, testable, unexplained
+from dbbstation.errors import ModelError
+from dbbstation.inference.harmonics import Misfit, misfit
+from dbbstation.inference.held_out import held_out_rms
+from dbbstation.inference.race import Choice, Race, select
+from dbbstation.sources.contract import Owner
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.findings import NextTest, SourceFinding
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource
+
+THRESHOLD = 6.0
+"""Log evidence that a source must bring: odds of 400 to 1 for it."""
+
+MOST_SOURCES = 4
+MOST_ROUNDS = 6
+"""Times that naming and noise may settle against each other."""
+
+STANDS_OUT_SIGMA = 4.0
+"""An amplitude of a named source must stand so far out of its standard deviation in the exact fit."""
+
+SIGNIFICANT = 1e-3
+"""Probability below which a misfit counts as one."""
+
+FOLDS = 5
+"""Groups of tests that are left out in turn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """One round of naming: a joint fit, its noise, and the race that was run with that noise."""
+
+    chosen: tuple[Choice, ...]
+    after: Calibration
+    left: Misfit
+    race: Race
+
+
+def diagnose(
+    machine: Machine,
+    observations: Sequence[Observation],
+    sources: Sequence[ErrorSource],
+    progress: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Find what a kinematic calibration leaves out.
+
+    Args:
+        machine: nominal machine.
+        observations: raw runs.
+        sources: named candidates; those that lack what they need are left out by the caller.
+        progress: told what is being done.
+
+    Raises:
+        CalibrationError: the base model cannot be fitted.
+        ModelError: a source needs what the runs or the machine file do not give.
+    """
+    runs = [thinned(observation) for observation in observations]
+    progress("kinematic calibration")
+    before = calibrate(machine, runs)
+    progress("candidates")
+    channel = channel_of(before, sources)
+    first = misfit_of(before)
+    by_name = {source.name: source for source in sources}
+    settled = _settle(channel, before, first, by_name, progress)
+    chosen, after = settled.chosen, settled.after
+    progress("verdicts")
+    joint = channel_of(after, sources) if chosen else channel
+    findings = judge(channel, settled.race, joint, settled.left.noise, chosen, by_name, after)
+    rest = unexplained(channel, joint, settled.left, chosen, significant=SIGNIFICANT)
+    progress("held-out tests")
+    held_out = _held_out(channel, chosen, settled.left.noise)
+    if rest.overrules:
+        chosen, after = (), before
+        findings = tuple(finding for finding in rest.demoted(findings))
+    progress("next test")
+    return Diagnosis(
+        mismatch=first.probability < SIGNIFICANT or bool(chosen),
+        misfit=first,
+        left=settled.left,
+        before=before,
+        after=after,
+        held_out_um=held_out,
+        locations=_locations(before, after, [by_name[c.candidate.name] for c in chosen], first, rest.finding.variable),
+        sources=findings,
+        unexplained=rest.finding,
+        shifts=_shifts(before, after),
+        next_test=_next_test(channel, settled, findings, by_name),
+    )
+
+
+def usable_sources(
+    machine: Machine, observations: Sequence[Observation], sources: Sequence[ErrorSource]
+) -> tuple[list[ErrorSource], dict[str, str]]:
+    """Sources that have what they need, and why the others have not, by name."""
+    usable, lacking = [], {}
+    motions = [observation.motion() for observation in observations]
+    for source in sources:
+        try:
+            source.parameters(machine)
+            for motion in motions:
+                source.require(motion)
+        except ModelError as error:
+            lacking[source.name] = error.what
+        else:
+            usable.append(source)
+    return usable, lacking
+
+
+def misfit_of(calibration: Calibration) -> Misfit:
+    """Misfit of what a fit leaves; where the balls stand in each mounting does not count."""
+    fitted = int(np.count_nonzero(~calibration.layout.known.random)) - len(calibration.solution.held)
+    # Angles from +X, so that both directions of a mounting have one first harmonic.
+    phases = [np.radians(o.raw.theta_deg) for o in calibration.observations]
+    groups = [o.setup.mounting for o in calibration.observations]
+    return misfit(calibration.residual_mm, phases, groups, fitted)
+
+
+def _settle(
+    channel: Channel,
+    before: Calibration,
+    first: Misfit,
+    sources: dict[str, ErrorSource],
+    progress: Callable[[str], None],
+) -> Round:
+    """Name, fit jointly, drop what the exact fit does not need, read the noise anew, until the names stay.
+
+    The race knows shape parameters at the points of their grids only. Beside a strong source whose time constant
+    falls between two points, a second one may seem to be needed; the exact fit then finds no amplitude for it.
+    """
+    names: set[str] | None = None
+    dropped: set[str] = set()
+    after, left = before, first
+    chosen: list[Choice] = []
+    for _ in range(MOST_ROUNDS):
+        race = Race(channel.blocks, channel.base, channel.held, channel.columns, left.noise)
+        candidates = [candidate for candidate in channel.named if candidate.name not in dropped]
+        chosen = select(race, candidates, THRESHOLD, MOST_SOURCES)
+        found = {choice.candidate.name for choice in chosen}
+        if found == names:
+            break
+        names = found
+        progress("joint fit with " + (", ".join(sorted(found)) or "nothing more"))
+        after = _joint(channel, race, chosen, sources) if chosen else before
+        weak = {name for name in found if not _stands_out(after, name)}
+        if weak:
+            dropped |= weak
+            names = None
+        left = misfit_of(after)
+    race = Race(channel.blocks, channel.base, channel.held, channel.columns, left.noise)
+    return Round(tuple(chosen), after, left, race)
+
+
+def _stands_out(calibration: Calibration, name: str) -> bool:
+    """Whether any amplitude of a source stands out of its standard deviation in an exact fit."""
+    sigma = np.sqrt(np.diag(calibration.solution.covariance))
+    return any(
+        abs(calibration.x[term.columns.start + k]) > STANDS_OUT_SIGMA * sigma[term.columns.start + k]
+        for term in calibration.layout.terms
+        if term.source.name == name
+        for k, parameter in enumerate(term.parameters)
+        if not parameter.shape
+    )
+
+
+def _joint(channel: Channel, race: Race, chosen: Sequence[Choice], sources: dict[str, ErrorSource]) -> Calibration:
+    """Fit base and chosen sources together, exactly, from the amplitudes that the race found."""
+    amplitudes = race.amplitudes([choice.variant for choice in chosen]).values
+    start: dict[str, NDArray[np.float64]] = {}
+    for choice in chosen:
+        source = sources[choice.candidate.name]
+        count = len(choice.variant.columns)
+        start[source.name] = _with_shape(source, channel.machine, amplitudes[:count], choice.variant.shape)
+        amplitudes = amplitudes[count:]
+    more = [sources[choice.candidate.name] for choice in chosen]
+    return calibrate(channel.machine, channel.observations, [*default_sources(), *more], start)
+
+
+def _with_shape(
+    source: ErrorSource, machine: Machine, amplitudes: NDArray[np.float64], shape: tuple[float, ...]
+) -> NDArray[np.float64]:
+    """Parameter values from amplitudes and shape values, of the first set where there are several."""
+    parameters = source.parameters(machine)
+    values = np.empty(len(parameters))
+    shaped = np.array([bool(p.shape) for p in parameters])
+    values[shaped] = shape
+    values[~shaped] = amplitudes[: int((~shaped).sum())]
+    return values
+
+
+def _held_out(channel: Channel, chosen: Sequence[Choice], noise_mm: float) -> tuple[float, float]:
+    """Root mean square of predictions of left-out tests without and with the chosen sources [µm]."""
+    order = {name: k for k, name in enumerate(dict.fromkeys(o.test for o in channel.observations))}
+    folds = min(FOLDS, len(order))
+    groups = [order[o.test] % folds for o in channel.observations]
+    base = np.arange(len(channel.base.prior))
+    joint = np.concatenate([base, *(choice.variant.columns for choice in chosen)])
+    without, having = (
+        held_out_rms(channel.blocks, groups, channel.known, active, noise_mm, channel.held) for active in (base, joint)
+    )
+    return 1e3 * without, 1e3 * having
+
+
+def _locations(
+    before: Calibration, after: Calibration, found: Sequence[ErrorSource], first: Misfit, unnamed: str | None
+) -> tuple[Location, ...]:
+    fitted = [f for f in after.model.sources if f.source in found]
+    variable = next((source.varies_with for source in found if source.varies_with), unnamed or "")
+    struts = strut_contributions(before, fitted) if fitted else [None] * len(before.observations)
+    return locate(before.observations, before.residual_mm, first.noise, struts, variable)
+
+
+def _shifts(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
+    """How far machine parameters had been pulled, largest first; nothing where nothing was found."""
+    if after is before:
+        return ()
+    row_of = {name: k for k, name in enumerate(after.layout.names)}
+    sigma = np.sqrt(np.diag(after.solution.covariance))
+    shifts = []
+    for term in before.layout.terms:
+        if term.source.belongs_to is not Owner.MACHINE:
+            continue
+        for k, parameter in enumerate(term.parameters):
+            row = row_of[term.source.name, term.shared, parameter.name]
+            old, new = before.x[term.columns.start + k], after.x[row]
+            name = f"{term.source.name} {parameter.name.removesuffix('_mm')}"
+            shifts.append(Shift(name, 1e3 * float(old), 1e3 * float(new), 1e3 * float(sigma[row])))
+    return tuple(sorted(shifts, key=lambda shift: -abs(shift.shift_um)))
+
+
+def _next_test(
+    channel: Channel, settled: Round, findings: Sequence[SourceFinding], sources: dict[str, ErrorSource]
+) -> NextTest | None:
+    """Return the test that tells most about the first source that is still open, told apart from its likenesses."""
+    variants = {c.name: settled.race.best_variant(c, [])[0] for c in channel.named}
+    chosen = [choice.variant for choice in settled.chosen]
+    for finding in findings:
+        likes = [variants[name] for name in finding.ambiguous_with if name in variants]
+        open_question = bool(likes) or not testable(settled.race, variants[finding.name], chosen)
+        if open_question and finding.name not in {choice.candidate.name for choice in settled.chosen} - set(
+            finding.ambiguous_with
+        ):
+            variant = variants[finding.name]
+            others = [v for v in [*likes, *chosen] if not np.array_equal(v.columns, variant.columns)]
+            return propose(channel, sources[finding.name], variant, others, settled.left.noise)
+    return None

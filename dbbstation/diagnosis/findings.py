@@ -1,0 +1,172 @@
+"""What a diagnosis answers: verdicts, places, numbers with their uncertainty. No text is made here twice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.inference.harmonics import Misfit
+
+
+class Verdict(StrEnum):
+    """What can be said of a source."""
+
+    IDENTIFIED = "identified"
+    AMBIGUOUS = "ambiguous"
+    RULED_OUT = "ruled-out"
+    NOT_TESTABLE = "not-testable"
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number with its standard uncertainty and unit."""
+
+    value: float
+    uncertainty: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class SourceFinding:
+    """What is said of one source.
+
+    Attributes:
+        name: of the source.
+        verdict: what can be said.
+        ambiguous_with: sources that would explain the recordings about as well in its place.
+        gain: difference in log evidence that it brings.
+        concealed: share of its signature's sum of squares that the fitted machine parameters swallow.
+        whole_um: root mean square of its signature over the runs [µm].
+        rest_um: of what the fitted parameters leave of it [µm].
+        parameters: values, where it was fitted; what would just be seen (five sigma), where it was not.
+        text: one sentence for people.
+    """
+
+    name: str
+    verdict: Verdict
+    ambiguous_with: tuple[str, ...]
+    gain: float
+    concealed: float
+    whole_um: float
+    rest_um: float
+    parameters: dict[str, Value]
+    text: str
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where the misfit is.
+
+    Attributes:
+        test: name.
+        direction: `ccw` or `cw`.
+        theta_deg: from, to: angles from +X towards +Y [deg].
+        strut: 1 to 6 that contributes most there; None where no strut does.
+        variable: what organises the misfit; empty where nothing does.
+        share: of the misfit's sum of squares.
+        peak_um: greatest smoothed deviation there [µm].
+    """
+
+    test: str
+    direction: str
+    theta_deg: tuple[float, float]
+    strut: int | None
+    variable: str
+    share: float
+    peak_um: float
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What is left without a name.
+
+    Attributes:
+        rms_um: beyond noise, in the low harmonics [µm].
+        strut: 1 to 6; None where it is not one strut's.
+        variable: what organises it; None where nothing does clearly.
+        gain: log evidence of that description.
+        text: one sentence for people.
+    """
+
+    rms_um: float
+    strut: int | None
+    variable: str | None
+    gain: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How far a parameter of the earlier calibration had been pulled.
+
+    Attributes:
+        parameter: source and parameter.
+        before_um: without the sources that were found [µm].
+        after_um: with them [µm].
+        uncertainty_um: of the latter [µm].
+    """
+
+    parameter: str
+    before_um: float
+    after_um: float
+    uncertainty_um: float
+
+    @property
+    def shift_um(self) -> float:
+        """How far it had been pulled [µm]."""
+        return self.before_um - self.after_um
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """A test worth measuring next.
+
+    Attributes:
+        text: what to measure, in words.
+        circle: ball and bar: x_mm, y_mm, z_mm, a_deg, b_deg, elevation_deg.
+        source: what it is to reveal or to tell apart.
+        sigma_before: standard deviation of its first amplitude now.
+        sigma_after: with the test.
+        unit: of both.
+    """
+
+    text: str
+    circle: dict[str, float]
+    source: str
+    sigma_before: float
+    sigma_after: float
+    unit: str
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Everything found.
+
+    Attributes:
+        mismatch: the recordings differ from the base model beyond noise.
+        misfit: of the base model.
+        left: misfit of the joint model.
+        before: fit of the base model.
+        after: joint fit; the same as `before` where nothing was found.
+        held_out_um: root mean square of predictions of left-out tests, before and after [µm].
+        locations: largest share first.
+        sources: best first.
+        unexplained: what is left.
+        shifts: largest first.
+        next_test: None where nothing is to be asked.
+    """
+
+    mismatch: bool
+    misfit: Misfit
+    left: Misfit
+    before: Calibration
+    after: Calibration
+    held_out_um: tuple[float, float]
+    locations: tuple[Location, ...]
+    sources: tuple[SourceFinding, ...]
+    unexplained: Unexplained
+    shifts: tuple[Shift, ...]
+    next_test: NextTest | None

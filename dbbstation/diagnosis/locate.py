@@ -1,0 +1,116 @@
+"""Where a misfit is: test, direction, angles, strut."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.findings import Location
+from dbbstation.inference.harmonics import smooth
+from dbbstation.model.machine_model import MachineModel
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import Effect, Fitted
+
+SECTOR_DEG = 10.0
+MOST_LOCATIONS = 12
+COUNTS_SIGMA = 4.0
+"""A smoothed deviation counts as misfit above this many of its standard deviations."""
+
+
+def locate(
+    observations: Sequence[Observation],
+    residual_mm: Sequence[NDArray[np.float64]],
+    noise_mm: float,
+    struts: Sequence[NDArray[np.float64] | None],
+    variable: str,
+) -> tuple[Location, ...]:
+    """Stretches of the circles where the misfit stands out of the noise, largest share first.
+
+    Args:
+        observations: runs.
+        residual_mm: what the base model leaves of each, shape (n,) [mm].
+        noise_mm: of one sample, as smooth things feel it [mm].
+        struts: per run, what each strut contributes to the reading, shape (n, 6) [mm]; None where none does.
+        variable: what organises the misfit.
+    """
+    smoothed = [smooth(r, np.radians(o.raw.phi_deg)) for o, r in zip(observations, residual_mm, strict=True)]
+    total = sum(float(s @ s) for s in smoothed)
+    found: list[Location] = []
+    for observation, curve, strut in zip(observations, smoothed, struts, strict=True):
+        # Low-passing at harmonic 30 leaves 61 of n degrees of freedom in n samples.
+        threshold = COUNTS_SIGMA * noise_mm * np.sqrt(61.0 / len(curve))
+        for start, stop in _stretches(np.abs(curve) > threshold):
+            rows = np.arange(start, stop) % len(curve)
+            theta = observation.raw.theta_deg[rows[[0, -1]]]
+            ends = (float(theta[0]), float(theta[1]))
+            found.append(
+                Location(
+                    test=observation.test,
+                    direction=str(observation.raw.circle.direction),
+                    theta_deg=ends if observation.raw.circle.direction.sign > 0 else ends[::-1],
+                    strut=_strut(strut, rows),
+                    variable=variable,
+                    share=float(curve[rows] @ curve[rows]) / total,
+                    peak_um=1e3 * float(curve[rows][np.argmax(np.abs(curve[rows]))]),
+                )
+            )
+    found.sort(key=lambda location: -location.share)
+    return tuple(found[:MOST_LOCATIONS])
+
+
+def misfit_map(observations: Sequence[Observation], residual_mm: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Mean smoothed residual of every run in sectors of ten degrees by angle, shape (runs, 36) [µm]."""
+    rows = []
+    for observation, residual in zip(observations, residual_mm, strict=True):
+        curve = smooth(residual, np.radians(observation.raw.phi_deg))
+        sector = (observation.raw.theta_deg / SECTOR_DEG).astype(np.int64) % int(360 / SECTOR_DEG)
+        counts = np.bincount(sector, minlength=int(360 / SECTOR_DEG))
+        sums = np.bincount(sector, curve, minlength=int(360 / SECTOR_DEG))
+        rows.append(1e3 * sums / np.maximum(counts, 1))
+    return np.array(rows)
+
+
+def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> list[NDArray[np.float64] | None]:
+    """Per run, what the strut-length errors of sources add to the reading, strut by strut, shape (n, 6) [mm]."""
+    model = calibration.model
+    contributions: list[NDArray[np.float64] | None] = []
+    for observation in calibration.observations:
+        motion = observation.motion()
+        effect = MachineModel(model.machine, tuple(fitted)).effect(motion)
+        if effect.strut_mm is None:
+            contributions.append(None)
+            continue
+        gain = model.bar(motion).sensitivity.response.per_strut
+        contributions.append((gain * _per_sample(effect, len(motion)))[motion.kept])
+    return contributions
+
+
+def _per_sample(effect: Effect, count: int) -> NDArray[np.float64]:
+    return np.broadcast_to(np.asarray(effect.strut_mm), (count, 6))
+
+
+def _strut(contribution: NDArray[np.float64] | None, rows: NDArray[np.int64]) -> int | None:
+    if contribution is None:
+        return None
+    return 1 + int(np.argmax(np.sum(contribution[rows] ** 2, axis=0)))
+
+
+def _stretches(marked: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Start and end of every run of marked samples of a ring; the end may lie beyond the ring's length."""
+    if marked.all():
+        return [(0, len(marked))]
+    if not marked.any():
+        return []
+    shift = int(np.argmin(marked))
+    rolled = np.roll(marked, -shift).astype(np.int8)
+    edges = np.diff(np.concatenate([[0], rolled, [0]]))
+    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return [(int(a) + shift, int(b) + shift) for a, b in zip(starts, stops, strict=True)]

@@ -1,0 +1,186 @@
+"""Which test to measure next: the one that says most of what is still open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.findings import NextTest
+from dbbstation.errors import MachineError
+from dbbstation.inference.square_root import Columns, solve
+from dbbstation.machine.travel import check_travel
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.plan.circle import Circle, Direction
+from dbbstation.sources.contract import Motion, Need, Setup
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.channel import Channel
+    from dbbstation.inference.race import Variant
+    from dbbstation.inference.square_root import Block
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource
+
+SAMPLES = 180
+TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0), (23.0, 0.0), (-23.0, 0.0), (0.0, 23.0))
+ELEVATIONS_DEG = (0.0, 10.0, -10.0)
+WAITS_S = (0.0, 3600.0)
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A circle that could be measured, so long after the session's last run."""
+
+    circle: Circle
+    wait_s: float
+    observation: Observation
+
+    @property
+    def text(self) -> str:
+        """What to do, in words."""
+        x, y, z = self.circle.ball_mm
+        a, b, _ = self.circle.tilt_deg
+        parts = [f"a circle about the ball at X {x:.0f} Y {y:.0f} Z {z:.0f} mm, tilted A {a:g} B {b:g} degrees"]
+        if self.circle.elevation_deg:
+            parts.append(f"the bar raised by {self.circle.elevation_deg:g} degrees")
+        parts.append("both directions")
+        if self.wait_s:
+            parts.append(f"{self.wait_s / 3600:.0f} h after the last run")
+        return ", ".join(parts)
+
+
+def propose(
+    channel: Channel, source: ErrorSource, variant: Variant, others: Sequence[Variant], noise_mm: float
+) -> NextTest | None:
+    """Return the test that lowers the standard deviation of a source's first amplitude most.
+
+    Args:
+        channel: what was measured.
+        source: to reveal, or to tell apart from others.
+        variant: its columns.
+        others: of the sources that it must be told apart from.
+        noise_mm: of one sample [mm].
+    """
+    known = channel.known
+    first = len(channel.base.prior)
+    wanted = np.concatenate([np.arange(first), variant.columns, *(other.columns for other in others)])
+    used = Columns(known.prior[wanted], known.scale[wanted], known.random[wanted])
+    covariance = solve(_thin(channel.blocks, wanted), used, noise_mm, channel.held).covariance
+    best: tuple[float, Proposal] | None = None
+    for proposal in _proposals(channel, timed=Need.TIME in source.needs):
+        rows = np.vstack([_rows(channel, source, variant, motion, len(wanted)) for motion in _motions(proposal)])
+        gain = rows @ covariance
+        answer = gain @ rows.T + noise_mm**2 * np.eye(len(rows))
+        after = covariance[first, first] - gain[:, first] @ np.linalg.solve(answer, gain[:, first])
+        if best is None or after < best[0]:
+            best = (float(after), proposal)
+    if best is None:
+        return None
+    after, proposal = best
+    parameter = next(p for p in source.parameters(channel.machine) if not p.shape)
+    x, y, z = proposal.circle.ball_mm
+    a, b, _ = proposal.circle.tilt_deg
+    circle = {"x_mm": x, "y_mm": y, "z_mm": z, "a_deg": a, "b_deg": b, "wait_s": proposal.wait_s}
+    circle["elevation_deg"] = proposal.circle.elevation_deg
+    before = float(np.sqrt(covariance[first, first]))
+    return NextTest(proposal.text, circle, source.name, before, float(np.sqrt(max(after, 0.0))), parameter.unit)
+
+
+def _proposals(channel: Channel, *, timed: bool) -> list[Proposal]:
+    """Circles about the balls of the plan at other tilts and elevations, now and later, that the machine can run."""
+    seen: dict[str, Observation] = {}
+    for observation in channel.observations:
+        seen.setdefault(observation.setup.ball, observation)
+    waits = WAITS_S if timed else WAITS_S[:1]
+    found = []
+    for observation in seen.values():
+        circle = observation.raw.circle
+        x, y, z = circle.ball_mm
+        for a, b in TILTS_DEG:
+            for elevation in ELEVATIONS_DEG:
+                height = z + circle.bar_mm * float(np.sin(np.radians(elevation)))
+                tried = replace(
+                    circle,
+                    tilt_deg=(a, b, 0.0),
+                    elevation_deg=elevation,
+                    centre_mm=(x, y, height),
+                    direction=Direction.CCW,
+                )
+                if _reachable(channel.machine, tried):
+                    found += [Proposal(tried, wait, observation) for wait in waits]
+    return found
+
+
+def _reachable(machine: Machine, circle: Circle) -> bool:
+    try:
+        check_travel(machine, circle.envelope(step_deg=15.0), where="proposal")
+    except MachineError:
+        return False
+    return True
+
+
+def _motions(proposal: Proposal) -> list[Motion]:
+    """Both directions, mounted anew on the same ball."""
+    setup: Setup = replace(proposal.observation.setup, mounting="proposed")
+    phi = np.linspace(-45.0, 360.0, SAMPLES + SAMPLES // 8, endpoint=False)
+    motions = []
+    for k, direction in enumerate(Direction):
+        circle = replace(proposal.circle, direction=direction)
+        begun = 7200.0 + proposal.wait_s + 200.0 * k
+        motions.append(
+            Motion(
+                poses=circle.poses(circle.theta_deg(phi)),
+                is_path=True,
+                kept=slice(SAMPLES // 8, None),
+                time_s=begun + phi / circle.turning_deg_s,
+                setup=setup,
+            )
+        )
+    return motions
+
+
+def _rows(channel: Channel, source: ErrorSource, variant: Variant, motion: Motion, columns: int) -> NDArray[np.float64]:
+    """What a proposed run would say of all columns, compressed to few rows, shape (r, columns).
+
+    Its mounting is new and tells nothing else, so what a shift of the ball could do is taken out of the rows.
+    """
+    reading = MachineModel(channel.machine).bar(motion)
+    parameters = source.parameters(channel.machine)
+    shaped = [k for k, p in enumerate(parameters) if p.shape]
+    amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
+    values = np.zeros(len(parameters))
+    values[shaped] = variant.shape
+    rows = np.zeros((len(reading.length_mm), columns))
+    first = len(channel.base.prior)
+    derivative = reading.by_parameters(source.derivative(motion, channel.machine, values))
+    rows[:, first : first + len(amplitudes)] = derivative[:, amplitudes]
+    for term in channel.layout.terms:
+        if term.acts_on(motion):
+            zero = channel.layout.nominal[term.columns]
+            rows[:, term.columns] = reading.by_parameters(term.source.derivative(motion, channel.machine, zero))
+    ball, _ = np.linalg.qr(reading.sensitivity.direction[motion.kept])
+    rows -= ball @ (ball.T @ rows)
+    # Few samples stand for the many that a run has.
+    rows *= np.sqrt(np.mean([len(o.raw) for o in channel.observations]) / len(rows))
+    touched = np.flatnonzero(np.any(rows != 0.0, axis=0))
+    triangle = np.linalg.qr(rows[:, touched], mode="r")
+    compressed = np.zeros((len(triangle), columns))
+    compressed[:, touched] = triangle
+    return compressed
+
+
+def _thin(blocks: Sequence[Block], wanted: NDArray[np.int64]) -> list[Block]:
+    """Blocks with the wanted columns only, numbered by their place among them."""
+    place = {int(column): k for k, column in enumerate(wanted)}
+    thin = []
+    for block in blocks:
+        inside = np.array([int(c) in place for c in block.columns], dtype=bool)
+        columns = np.array([place[int(c)] for c in block.columns[inside]], dtype=np.int64)
+        thin.append(replace(block, columns=columns, triangle=block.triangle[:, inside]))
+    return thin

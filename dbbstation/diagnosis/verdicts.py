@@ -1,0 +1,210 @@
+"""Verdicts on sources, and what can be said where none of them is it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
+from dbbstation.inference.concealment import concealment
+from dbbstation.inference.race import Race
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.diagnosis.channel import Channel
+    from dbbstation.inference.harmonics import Misfit
+    from dbbstation.inference.race import Candidate, Choice, Variant
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import ErrorSource
+
+TESTABLE_SIGMA = 5.0
+"""An amplitude of the plausible size must stand so far out of its standard deviation for a source to be testable."""
+
+AS_GOOD = 5.0
+"""Difference in log evidence below which one source explains the recordings about as well as another."""
+
+NAMED_EXPLAINS = 0.9
+"""Share of what the best unnamed shape explains that named sources must explain to be believed: below it they are
+only the nearest names of something else."""
+
+SHAPE_THRESHOLD = 10.0
+"""Log evidence that an unnamed shape must bring."""
+
+
+def testable(race: Race, variant: Variant, others: Sequence[Variant]) -> bool:
+    """Whether a plausible amplitude of a source would be seen beside the base and others."""
+    return bool(np.any(variant.prior / race.sigma(variant, others) >= TESTABLE_SIGMA))
+
+
+def judge(
+    channel: Channel,
+    race: Race,
+    joint: Channel,
+    noise_mm: float,
+    chosen: Sequence[Choice],
+    sources: dict[str, ErrorSource],
+    after: Calibration,
+) -> tuple[SourceFinding, ...]:
+    """One finding per named source, best first.
+
+    Args:
+        channel: about the base fit.
+        race: of that channel, with the noise that is left in the end.
+        joint: the channel about the joint fit; what was not chosen is judged there, beside exact values of what was.
+        noise_mm: of one sample, in the end [mm].
+        chosen: sources that were found.
+        sources: by name.
+        after: joint fit.
+    """
+    machine_columns = np.flatnonzero(~channel.base.random)
+    names = [choice.candidate.name for choice in chosen]
+    likes = _likenesses(race, chosen, channel)
+    rest = Race(joint.blocks, joint.base, joint.held, joint.columns, noise_mm)
+    on_joint = {candidate.name: candidate for candidate in joint.named}
+    findings = []
+    for candidate in channel.named:
+        source = sources[candidate.name]
+        alike = likes.get(candidate.name, ())
+        if candidate.name in names:
+            others = [c.variant for c in chosen if c.candidate.name != candidate.name]
+            variant, together = race.best_variant(candidate, others)
+            gain = together - race.evidence(others)
+            amplitudes = race.amplitudes([variant, *others]).values[: len(variant.columns)]
+            values = _fitted_values(after, candidate.name)
+            verdict = Verdict.AMBIGUOUS if alike else Verdict.IDENTIFIED
+        else:
+            variant, gain = rest.best_variant(on_joint[candidate.name], [])
+            values = _best_values(source, channel.machine, rest, variant)
+            seen = testable(rest, variant, [])
+            verdict = Verdict.RULED_OUT if seen else Verdict.NOT_TESTABLE
+            verdict = Verdict.AMBIGUOUS if alike else verdict
+            variant, _ = race.best_variant(candidate, [])
+            amplitudes = variant.prior
+        hidden = concealment(channel.blocks, machine_columns, variant.columns, amplitudes)
+        findings.append(
+            SourceFinding(
+                name=candidate.name,
+                verdict=verdict,
+                ambiguous_with=alike,
+                gain=gain,
+                concealed=hidden.share,
+                whole_um=1e3 * hidden.whole_rms,
+                rest_um=1e3 * hidden.rest_rms,
+                parameters=values,
+                text=_text(source, verdict, alike),
+            )
+        )
+    order = [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT]
+    return tuple(sorted(findings, key=lambda f: (order.index(f.verdict), -f.gain)))
+
+
+def _likenesses(race: Race, chosen: Sequence[Choice], channel: Channel) -> dict[str, tuple[str, ...]]:
+    """Sources that would do about as well in the place of a chosen one, both ways round."""
+    likes: dict[str, list[str]] = {}
+    names = {choice.candidate.name for choice in chosen}
+    for choice in chosen:
+        others = [c.variant for c in chosen if c is not choice]
+        _, own = race.best_variant(choice.candidate, others)
+        for rival in channel.named:
+            if rival.name in names:
+                continue
+            _, theirs = race.best_variant(rival, others)
+            if own - theirs < AS_GOOD:
+                likes.setdefault(choice.candidate.name, []).append(rival.name)
+                likes.setdefault(rival.name, []).append(choice.candidate.name)
+    return {name: tuple(sorted(alike)) for name, alike in likes.items()}
+
+
+def _fitted_values(after: Calibration, name: str) -> dict[str, Value]:
+    sigma = np.sqrt(np.maximum(np.diag(after.solution.covariance), 0.0))
+    values: dict[str, Value] = {}
+    for term in after.layout.terms:
+        if term.source.name == name:
+            for k, parameter in enumerate(term.parameters):
+                column = term.columns.start + k
+                key = parameter.name if not values.get(parameter.name) else f"{parameter.name} ({term.shared})"
+                values[key] = Value(float(after.x[column]), float(sigma[column]), parameter.unit)
+    return values
+
+
+def _best_values(source: ErrorSource, machine: Machine, race: Race, variant: Variant) -> dict[str, Value]:
+    """Best amplitudes of a source that was not chosen, with the uncertainties that say how much could hide."""
+    found = race.amplitudes([variant])
+    amplitudes = [p for p in source.parameters(machine) if not p.shape]
+    sigma = np.sqrt(np.diag(found.covariance))
+    return {p.name: Value(float(found.values[k]), float(sigma[k]), p.unit) for k, p in enumerate(amplitudes)}
+
+
+def _text(source: ErrorSource, verdict: Verdict, alike: Sequence[str]) -> str:
+    if verdict is Verdict.IDENTIFIED:
+        return f"{source.texts.what} {source.texts.confirm}"
+    if verdict is Verdict.AMBIGUOUS:
+        return f"These tests cannot tell it from {', '.join(alike)}. {source.texts.confirm}"
+    if verdict is Verdict.NOT_TESTABLE:
+        return "These tests would not see it at its usual size: the fitted parameters swallow it."
+    return "It would have been seen at its usual size and was not needed."
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What is left without a name, and whether it overrules the names."""
+
+    finding: Unexplained
+    overrules: bool
+
+    def demoted(self, findings: Sequence[SourceFinding]) -> list[SourceFinding]:
+        """Findings with no source identified: the nearest name is not the right one."""
+        text = "It explains part of the misfit, but clearly less than the unnamed error does."
+        return [
+            replace(f, verdict=Verdict.RULED_OUT, ambiguous_with=(), text=text)
+            if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}
+            else f
+            for f in findings
+        ]
+
+
+def unexplained(
+    channel: Channel, joint: Channel, left: Misfit, chosen: Sequence[Choice], *, significant: float
+) -> Rest:
+    """Look for an unnamed shape in what is left; let it overrule names that explain much less than it does.
+
+    Args:
+        channel: about the base fit.
+        joint: about the joint fit.
+        left: misfit of the joint fit.
+        chosen: sources that were found.
+        significant: probability below which a misfit counts.
+    """
+    if left.probability >= significant:
+        return Rest(Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."), overrules=False)
+    race, candidate, variant, gain = _best_shape(channel, left.noise)
+    named = [choice.variant for choice in chosen]
+    # The first of the chosen explains most. Where even it falls short of one unnamed curve, the others were only
+    # called in to make up for that.
+    enough = NAMED_EXPLAINS * race.explained([variant])
+    overrules = bool(named) and min(race.explained(named[:1]), race.explained(named)) < enough
+    if named and not overrules:
+        # The names stand; what is left beside them is looked at about the joint fit.
+        _, candidate, _, gain = _best_shape(joint, left.noise)
+    rms_um = 1e3 * left.rms
+    if gain < SHAPE_THRESHOLD:
+        text = "Something is left beyond noise, and no variable organises it clearly."
+        return Rest(Unexplained(rms_um, None, None, gain, text), overrules=False)
+    variable, _, strut = candidate.name.partition(" | ")
+    number = int(strut) if strut else None
+    text = (
+        f"An error without a known name, organised by {variable}, {f'strut {number}' if number else 'no single strut'}."
+    )
+    return Rest(Unexplained(rms_um, number, variable, gain, text), overrules=overrules)
+
+
+def _best_shape(channel: Channel, noise_mm: float) -> tuple[Race, Candidate, Variant, float]:
+    """Unnamed shape with the greatest evidence on a channel."""
+    race = Race(channel.blocks, channel.base, channel.held, channel.columns, noise_mm)
+    trials = [(*race.best_variant(candidate, []), candidate) for candidate in channel.unnamed]
+    variant, gain, candidate = max(trials, key=lambda trial: trial[1])
+    return race, candidate, variant, gain

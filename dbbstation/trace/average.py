@@ -1,0 +1,46 @@
+"""Averages of a raw circle over equal sectors, for work that does not need every sample."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.plan.circle import FULL_TURN_DEG
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.trace.circle import RawCircle
+
+
+def sector_of(raw: RawCircle, sectors: int) -> NDArray[np.int64]:
+    """Sector of every sample, counted from 0 without gaps, shape (n,)."""
+    sector = np.minimum((raw.phi_deg * (sectors / FULL_TURN_DEG)).astype(np.int64), sectors - 1)
+    _, counted = np.unique(sector, return_inverse=True)
+    return counted.astype(np.int64)
+
+
+def averaged(raw: RawCircle, sectors: int) -> RawCircle:
+    """Return the circle with one sample per sector, each the mean of the samples in it.
+
+    Still raw: averaging within half a degree removes nothing of the circle's place or shape.
+    """
+    sector = sector_of(raw, sectors)
+    return replace(
+        raw,
+        t_s=means(raw.t_s, sector),
+        phi_deg=means(raw.phi_deg, sector),
+        length_mm=means(raw.length_mm, sector),
+        temperature_degc={name: means(values, sector) for name, values in raw.temperature_degc.items()},
+        motor_current_a=None if raw.motor_current_a is None else means(raw.motor_current_a, sector),
+    )
+
+
+def means(values: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Mean of the rows of each group, shape (groups, ...); groups count from 0 without gaps."""
+    count = np.bincount(group)
+    if values.ndim == 1:
+        return np.bincount(group, values) / count
+    return np.column_stack([np.bincount(group, column) / count for column in values.T])

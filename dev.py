@@ -14,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -82,9 +83,12 @@ def set_up() -> bool:
 
 def installer() -> list[str | Path]:
     """Make the environment and return the command that is its pip."""
+    described = ENVIRONMENT / "pyvenv.cfg"
+    this_python = f"version = {platform.python_version()}\n"
+    other = described.exists() and this_python not in described.read_text(encoding="utf-8")
     try:
         with redirect_stdout(io.StringIO()):  # Debian's own words would tell people to do what is not needed
-            venv.create(ENVIRONMENT, with_pip=True)
+            venv.create(ENVIRONMENT, with_pip=True, clear=other)  # libraries of another Python are of no use
     except (subprocess.CalledProcessError, SystemExit):
         # Debian leaves out ensurepip; the system's pip, where there is one, can install into another environment.
         venv.create(ENVIRONMENT, with_pip=False)

@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.errors import MachineError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from dbbstation.plan.circle import Direction
     from dbbstation.virtual.machine import VirtualMachine, VirtualRun
     from dbbstation.virtual.path import CommandedPath
+    from dbbstation.virtual.wire_clock import ScaledClock
+
+STAND_S = 0.2
+"""Real time that the bar stands outside before each run: on a fast clock the path's own dwell may pass while the program
+at the other end of the line is not looking [s]."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class VirtualCell:
         clock: virtual time [s].
     """
 
-    def __init__(self, machine: VirtualMachine, clock: Callable[[], float]) -> None:
+    def __init__(self, machine: VirtualMachine, clock: ScaledClock) -> None:
         self.machine = machine
         self._clock = clock
         self._lock = threading.Lock()
@@ -70,10 +73,10 @@ class VirtualCell:
         self._refuse_while_running("start another run")
         if self._origin_s is None:
             self._origin_s = self._clock()
-        # Computing takes some real time, which on a fast clock is a while; time-dependent errors do not mind.
+        # Computing and standing take some real time, which on a fast clock is a while; slow errors do not mind.
         run = self.machine.run(test, direction, path=path, begin_s=self._clock() - self._origin_s)
         with self._lock:
-            self._running = _Running(run, self._clock())
+            self._running = _Running(run, self._clock() + STAND_S * self._clock.scale)
         return run
 
     def stop(self) -> None:
@@ -100,7 +103,7 @@ class VirtualCell:
             "mounting": self.machine.mountings or None,
         }
         if running is not None:
-            elapsed_s = min(self._clock() - running.begin_s, running.run.path.duration_s)
+            elapsed_s = min(max(self._clock() - running.begin_s, 0.0), running.run.path.duration_s)
             told |= {
                 "test": running.run.test,
                 "direction": running.run.direction.value,

@@ -36,7 +36,8 @@ FEWEST_TESTS = 3
 """Fewer circles leave more directions open than they close."""
 
 MOST_STEPS = 30
-DAMPED = 0.6
+SMALLEST_SHARE = 0.1
+"""Of a step, however much a fit swings."""
 CONVERGED = 1e-6
 """Share of the columns' plausible sizes by which the last step may still move: a fifth of a nanometre on joints."""
 
@@ -116,7 +117,7 @@ def calibrate(
     x = _start_values(layout, start or {})
     noise = Noise(FIRST_NOISE_MM, 1.0)
     nominal, _ = linearise(layout, observations, x)
-    blocks, before = nominal, np.zeros_like(x)
+    blocks, before, share = nominal, np.zeros_like(x), 1.0
     for _ in range(MOST_STEPS):
         held = lost_directions(nominal, layout.known, noise.effective)
         solution, noise = _settled(blocks, layout, noise, held)
@@ -125,7 +126,8 @@ def calibrate(
         settled_at = np.maximum(CONVERGED * layout.known.scale, CONVERGED_SIGMA * sigma)
         step = update - x
         change = float(np.abs(step / settled_at).max(initial=0.0))
-        x = x + _damping(layout, step, before) * step
+        share = _share(layout, step, before, share)
+        x = x + share * step
         before = step
         blocks, readings = linearise(layout, observations, x)
         if change < 1.0:
@@ -149,10 +151,20 @@ def calibrate(
     )
 
 
-def _damping(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64]) -> float:
-    """Share of a step to go: less where a parameter of shape swings to and fro, as one that is hardly seen does."""
+def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64], share: float) -> float:
+    """Share of a step to take.
+
+    Gauss-Newton leaves out the curvature that a parameter of shape has while its amplitude is small, so that full
+    steps swing to and fro about the answer. Two steps that differ by the ratio q after a share s was taken say that
+    s / (1 - q) would have hit it (Aitken's rule); the most cautious of these is taken.
+    """
     shaped = np.array([bool(p.shape) for term in layout.terms for p in term.parameters])
-    return DAMPED if float(np.min(step[shaped] * before[shaped], initial=0.0)) < 0.0 else 1.0
+    now, last = step[shaped], before[shaped]
+    swinging = now * last < 0.0
+    if not swinging.any():
+        return min(1.0, 1.5 * share)
+    ratio = float(np.min(now[swinging] / last[swinging]))
+    return float(np.clip(share / (1.0 - ratio), SMALLEST_SHARE, 1.0))
 
 
 def _near(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> Layout:

@@ -25,6 +25,7 @@ COMMANDS = {
     "calibrate": "Fit the machine's errors to recorded sessions.",
     "check": "Validate files of any format, and whole sessions.",
     "compensate": "Compensate any NC program with a calibrated model.",
+    "diagnose": "Find the physics that a calibration leaves out.",
     "demo": "The whole job on a simulated machine, start to end.",
     "emulate": "A virtual machine with a ball bar, on a line of its own.",
     "evaluate": "Circle by circle: what a model leaves of recordings.",

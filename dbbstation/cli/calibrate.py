@@ -64,7 +64,7 @@ def calibrate(
     calibration = fit(recorded.machine, recorded.observations, fitted)
     summary = calibration_summary(calibration, evaluate(calibration.model, recorded.observations))
     if out is not None:
-        kept = {key: value for key, value in summary.items() if key not in _ELSEWHERE_IN_MODEL}
+        kept = {key: value for key, value in summary.items() if key not in ELSEWHERE_IN_MODEL}
         write_model(out, identified_model(calibration, kept, recorded.sessions), force=force)
     if as_json:
         print_json(summary)
@@ -74,7 +74,7 @@ def calibrate(
             say(f"model written to {out}")
 
 
-_ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost"})
+ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost"})
 """Parts of the summary that the model file holds in places of their own."""
 
 

@@ -93,14 +93,16 @@ def diagnose(
         chosen, after = (), before
         findings = tuple(finding for finding in rest.demoted(findings))
     progress("next test")
+    mismatch = first.probability < SIGNIFICANT or bool(chosen)
+    found = [by_name[choice.candidate.name] for choice in chosen]
     return Diagnosis(
-        mismatch=first.probability < SIGNIFICANT or bool(chosen),
+        mismatch=mismatch,
         misfit=first,
         left=settled.left,
         before=before,
         after=after,
         held_out_um=held_out,
-        locations=_locations(before, after, [by_name[c.candidate.name] for c in chosen], first, rest.finding.variable),
+        locations=_locations(before, after, found, first, rest.finding.variable) if mismatch else (),
         sources=findings,
         unexplained=rest.finding,
         shifts=_shifts(before, after),

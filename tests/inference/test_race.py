@@ -1,0 +1,172 @@
+"""Evidence and selection on a plain problem without a machine: sines on a line, answers in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from dbbstation.inference.concealment import concealment
+from dbbstation.inference.harmonics import coefficients, misfit, smooth
+from dbbstation.inference.held_out import held_out_rms
+from dbbstation.inference.race import Candidate, Race, Variant, select
+from dbbstation.inference.square_root import Columns, compress, solve
+
+NOISE = 0.5
+T = np.linspace(0, 1, 60, endpoint=False)
+RUNS = 4
+NONE_HELD = np.zeros((0, 2))
+
+
+def terms(run):
+    """Base: constant and slope; candidates: a sine, a cosine of another pitch, a square; the slope grows by run."""
+    return np.column_stack(
+        [
+            np.ones(60),
+            T + run,
+            np.sin(2 * np.pi * T),
+            np.cos(6 * np.pi * T),
+            np.sign(np.sin(2 * np.pi * T)),
+            (T + run) ** 2,
+        ]
+    )
+
+
+BASE = Columns(np.full(2, np.inf), np.ones(2), np.zeros(2, dtype=bool))
+CANDIDATES = tuple(
+    Candidate(name, (Variant(np.array([k]), np.array([2.0])),))
+    for k, name in enumerate(("sine", "cosine", "square", "parabola"), start=2)
+)
+
+
+def race_on(rng, amplitudes, noise=NOISE):
+    x = np.concatenate([[3.0, -1.0], amplitudes])
+    targets = [terms(run) @ x + rng.normal(0, noise, 60) for run in range(RUNS)]
+    blocks = [compress(np.arange(6), terms(run), target) for run, target in enumerate(targets)]
+    return Race(blocks, BASE, NONE_HELD, 6, noise), blocks, targets
+
+
+def test_evidence_is_the_ratio_of_marginal_likelihoods(rng):
+    """Against the dense Gaussian integral, with a base prior wide enough to be flat."""
+    race, _, targets = race_on(rng, [0.4, 0.0, 0.0, 0.0])
+    whole, target = np.vstack([terms(run) for run in range(RUNS)]), np.concatenate(targets)
+    flat = 1e4 * whole[:, :2] @ whole[:, :2].T + NOISE**2 * np.eye(len(target))
+
+    def log_marginal(columns):
+        return multivariate_normal.logpdf(target, cov=flat + 4.0 * whole[:, columns] @ whole[:, columns].T)
+
+    none = multivariate_normal.logpdf(target, cov=flat)
+    for columns in ([2], [3], [2, 4], [2, 3, 5]):
+        variants = [CANDIDATES[c - 2].variants[0] for c in columns]
+        assert race.evidence(variants) == pytest.approx(log_marginal(columns) - none, abs=1e-3)
+
+
+def test_amplitudes_are_those_of_the_full_fit(rng):
+    race, blocks, _ = race_on(rng, [0.4, 0.0, 0.0, 0.1])
+    variants = [CANDIDATES[0].variants[0], CANDIDATES[3].variants[0]]
+    known = Columns(np.array([np.inf, np.inf, 2.0, 2.0]), np.ones(4), np.array([False, False, True, True]))
+    thin = [compress(np.arange(4), terms(run)[:, [0, 1, 2, 5]], _target(blocks[run], run)) for run in range(RUNS)]
+    solution = solve(thin, known, NOISE)
+    found = race.amplitudes(variants)
+    assert found.values == pytest.approx(solution.x[2:], abs=1e-9)
+    assert found.covariance == pytest.approx(solution.covariance[2:, 2:], abs=1e-12)
+
+
+def _target(block, run):
+    """A target that the block holds: its triangle and right-hand side say the same as the samples did."""
+    fitted, *_ = np.linalg.lstsq(block.triangle, block.target, rcond=None)
+    return terms(run) @ fitted
+
+
+def test_the_right_terms_are_selected_and_nothing_when_there_is_nothing(rng):
+    wrong = 0
+    for _ in range(40):
+        race, _, _ = race_on(rng, [0.0, 0.0, 0.0, 0.0])
+        wrong += bool(select(race, CANDIDATES, 6.0, 3))
+        race, _, _ = race_on(rng, [0.6, 0.0, 0.0, 0.5])
+        assert {c.candidate.name for c in select(race, CANDIDATES, 6.0, 3)} == {"sine", "parabola"}
+    assert wrong == 0
+
+
+def test_a_square_is_not_taken_for_a_sine(rng):
+    race, _, _ = race_on(rng, [0.0, 0.0, 0.6, 0.0])
+    assert [c.candidate.name for c in select(race, CANDIDATES, 6.0, 3)] == ["square"]
+
+
+def test_the_best_variant_is_found_and_its_choice_is_paid_for(rng):
+    """Two forms of one candidate: evidence together is at most that of the best, less at the most log 2."""
+    race, _, _ = race_on(rng, [0.6, 0.0, 0.0, 0.0])
+    both = Candidate("either", (CANDIDATES[0].variants[0], CANDIDATES[1].variants[0]))
+    variant, together = race.best_variant(both, [])
+    alone = race.evidence([CANDIDATES[0].variants[0]])
+    assert variant is CANDIDATES[0].variants[0]
+    assert alone - np.log(2) - 1e-9 <= together <= alone
+
+
+def test_sigma_is_infinite_for_what_the_base_swallows(rng):
+    columns = np.column_stack([np.ones(60), T, T * 2.0])
+    block = compress(np.arange(3), columns, rng.normal(size=60))
+    race = Race([block], BASE, NONE_HELD, 3, NOISE)
+    assert race.sigma(Variant(np.array([2]), np.array([1.0])))[0] > 1e6
+
+
+def test_concealed_share_by_hand():
+    """A slope conceals of a parabola on [-1, 1] nothing, a constant 5/9, constant and slope together 5/9."""
+    t = np.linspace(-1, 1, 20001)
+    block = compress(np.arange(3), np.column_stack([np.ones_like(t), t, t**2]), np.zeros_like(t))
+
+    def share(fitted):
+        return concealment([block], np.array(fitted), np.array([2]), np.array([1.0])).share
+
+    assert share([1]) == pytest.approx(0.0, abs=1e-6)
+    assert share([0]) == pytest.approx(5 / 9, abs=1e-3)
+    assert share([0, 1]) == pytest.approx(5 / 9, abs=1e-3)
+
+
+def test_left_out_runs_are_predicted_as_by_hand(rng):
+    _, blocks, targets = race_on(rng, [0.6, 0.0, 0.0, 0.0])
+    known = Columns(
+        np.concatenate([np.full(2, np.inf), np.full(4, 2.0)]),
+        np.ones(6),
+        np.array([False, False, True, True, True, True]),
+    )
+    squares = 0.0
+    for out in range(RUNS):
+        kept = [run for run in range(RUNS) if run != out]
+        whole = np.vstack([terms(run)[:, :2] for run in kept])
+        fitted, *_ = np.linalg.lstsq(whole, np.concatenate([targets[run] for run in kept]), rcond=None)
+        squares += np.sum((targets[out] - terms(out)[:, :2] @ fitted) ** 2)
+    found = held_out_rms(blocks, list(range(RUNS)), known, np.array([0, 1]), NOISE, NONE_HELD)
+    assert found == pytest.approx(np.sqrt(squares / 240), rel=1e-9)
+
+
+def test_coefficients_of_white_noise_and_of_a_sine(rng):
+    phase = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    sine = coefficients(0.3 * np.cos(5 * phase), phase, 60)
+    assert np.flatnonzero(np.abs(sine) > 1e-9).tolist() == [5]
+    assert sine[5] ** 2 / 720 == pytest.approx(0.3**2 / 2)
+    white = np.array([coefficients(rng.normal(0, 2.0, 720), phase, 60) for _ in range(200)])
+    assert white.std() == pytest.approx(2.0, rel=0.02)
+
+
+def test_misfit_probability_is_uniform_on_noise_and_small_on_a_misfit(rng):
+    phase = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    groups = [k // 2 for k in range(10)]
+    shifts = rng.normal(0, 5.0, (5, 2))  # where a ball came to stand, common to the runs of a group
+
+    def runs(extra):
+        return [rng.normal(0, 1.0, 720) + extra + shifts[k // 2] @ [np.cos(phase), np.sin(phase)] for k in range(10)]
+
+    found = [misfit(runs(0.0), [phase] * 10, groups, 0.0) for _ in range(300)]
+    probabilities = np.array([m.probability for m in found])
+    assert 0.03 < np.mean(probabilities < 0.1) < 0.18
+    assert np.mean([m.noise for m in found]) == pytest.approx(1.0, rel=0.01)
+    seen = misfit(runs(0.5 * np.sin(3 * phase)), [phase] * 10, groups, 0.0)
+    assert seen.probability < 1e-6
+    assert seen.rms == pytest.approx(0.5 / np.sqrt(2), rel=0.1)
+
+
+def test_smoothing_keeps_low_and_drops_high_harmonics():
+    phase = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    low, high = np.cos(7 * phase), np.cos(44 * phase)
+    assert smooth(low + high, phase) == pytest.approx(low, abs=1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
@@ -28,7 +29,7 @@ from dbbstation.tui.title_line import TitleLine
 from dbbstation.tui.trace_view import TraceView
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from textual.app import ComposeResult
     from textual.binding import BindingType
@@ -99,6 +100,7 @@ class StationApp(App[None]):
     Args:
         shown: plan and plate.
         runner: runs the sequence; started when the screen stands.
+        clock: real time, for telling an old reading [s].
     """
 
     TITLE = "dbbstation"
@@ -126,8 +128,9 @@ class StationApp(App[None]):
         Binding("ctrl+c,ctrl+q", "leave", show=False, priority=True),
     ]
 
-    def __init__(self, shown: Shown, runner: Sequence) -> None:
+    def __init__(self, shown: Shown, runner: Sequence, *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
+        self._clock = clock
         self.board = Board()
         self._show = shown
         self._runner = runner
@@ -141,7 +144,7 @@ class StationApp(App[None]):
         with Horizontal(id="middle"):
             yield TraceView(cell_aspect=self._show.cell_aspect, id="trace")
             with Vertical(id="side"):
-                yield ReadingPanel(id="reading")
+                yield ReadingPanel(clock=self._clock, id="reading")
                 with Horizontal(id="table"):
                     yield SetUpPanel(id="set-up")
                     yield JigMap(self._show.bores, id="map")
@@ -152,8 +155,8 @@ class StationApp(App[None]):
         yield MessageLines(id="messages")
         yield Footer()
 
-    def on_mount(self) -> None:
-        """Begin to measure, and to look."""
+    def on_ready(self) -> None:
+        """Begin to measure, and to look, once every part stands."""
         self._runner.start()
         self.set_interval(LOOK_S, self.look)
 
@@ -174,7 +177,8 @@ class StationApp(App[None]):
         base = self.screen_stack[0]
         for panel in base.query(Panel):
             panel.show(self.board)
-        base.query_one(TraceView).show(self.board.circle, self.board.traces, self.board.running)
+        for view in base.query(TraceView):
+            view.show(self.board.circle, self.board.traces, self.board.running)
         keys = (self.board.allowed, self.board.state, self.board.fault is None)
         if keys != self._keys:
             self._keys = keys

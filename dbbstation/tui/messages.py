@@ -37,7 +37,7 @@ def message_of(event: object) -> Message | None:  # noqa: PLR0911 - a line per e
         case events.RunRejected():
             return Message(Weight.NOTE, f"{event.run.label} does not count, its recording is kept: {event.reason}")
         case events.RunCompleted(problem=problem) if problem:
-            return Message(Weight.WARNING, f"{event.run.label}: {problem}")
+            return Message(Weight.WARNING, f"{event.run.label}: {problem_alone(event)}")
         case events.RunLate():
             return Message(Weight.WARNING, f"{event.run.label}: {event.problem}")
         case events.CommandRefused():
@@ -47,3 +47,8 @@ def message_of(event: object) -> Message | None:  # noqa: PLR0911 - a line per e
         case events.Fault():
             return Message(Weight.FAULT, str(event.error))
     return None
+
+
+def problem_alone(completed: events.RunCompleted) -> str:
+    """Return a run's problem without the run's name, which some begin with and every text here says already."""
+    return completed.problem.removeprefix(f"{completed.run.label}: ")

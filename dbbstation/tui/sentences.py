@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.station.states import State
+from dbbstation.tui.messages import problem_alone
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,9 +57,9 @@ def _verdict(board: Board) -> str:
 
 
 def _flawed(board: Board) -> str:
-    problem = board.completed.problem if board.completed else ""
+    problem = problem_alone(board.completed) if board.completed else ""
     name = board.completed.run.label if board.completed else "the run"
-    return f"No usable circle in {name}: {problem}. R measures it again, X leaves it out."
+    return f"No usable circle in {name}: {_ended(problem)} R measures it again, X leaves it out."
 
 
 _SENTENCES: dict[State, Callable[[Board], str]] = {
@@ -89,5 +90,10 @@ def _fault(board: Board) -> str:
     error, interrupted = board.fault.error, board.fault.interrupted
     where = f" at {error.where}" if error.where else ""
     kept = f" {interrupted.label} is kept as far as it came." if interrupted else ""
-    remedy = f" What helps: {error.remedy}." if error.remedy else ""
-    return f"FAULT{where}: {error.what}.{remedy}{kept} Then C connects again, Q leaves."
+    remedy = f" What helps: {_ended(error.remedy)}" if error.remedy else ""
+    return f"FAULT{where}: {_ended(error.what)}{remedy}{kept} Then C connects again, Q leaves."
+
+
+def _ended(text: str) -> str:
+    """Return a sentence with its full stop, where it does not end with a mark of its own."""
+    return text if text.endswith((".", "?", "!")) else f"{text}."

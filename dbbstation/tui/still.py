@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import TYPE_CHECKING
 
 from dbbstation.tui.app import DARK, StationApp
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
     from dbbstation.station.events import Event
     from dbbstation.tui.app import Shown
     from dbbstation.tui.board import SequenceOpened
+
+
+_ROUNDS = 4
 
 
 class Happened:
@@ -61,12 +65,14 @@ async def still_svg(
         size: columns and rows.
         theme: dark or light.
     """
-    app = StationApp(shown, Happened(events))
-    async with app.run_test(size=size) as pilot:
+    app = StationApp(shown, Happened(events), clock=lambda: 0.0)
+    async with app.run_test(size=size):
         app.theme = theme
         app.look()
-        await pilot.pause()
-        # Heights that follow their text are known now.
-        app.draw()
-        await pilot.pause()
+        # Once for the parts, once for heights that follow their text, once for what was drawn for other heights.
+        for _ in range(_ROUNDS):
+            laid_out = asyncio.Event()
+            app.call_after_refresh(laid_out.set)
+            await laid_out.wait()
+            app.draw()
         return app.export_screenshot(title="dbbstation station")

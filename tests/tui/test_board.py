@@ -105,10 +105,13 @@ def test_figures_of_a_finished_run_and_the_error_of_one_without_a_circle() -> No
     assert late == []
     board = happening.board()
     run = board.traces[Direction.CCW].run
-    board.take(events.RunCompleted(run, 90, 0, None, "no feed-out found"))
+    board.take(events.RunCompleted(run, 90, 0, None, "t0-ccw-1: no feed-out found; is it closed?"))
     board.take(events.StateChanged(State.FLAWED, frozenset({Repeat, Reject, Quit})))
     assert board.marks[0] is Mark.FLAWED
-    assert now(board) == "No usable circle in t0-ccw-1: no feed-out found. R measures it again, X leaves it out."
+    assert (
+        now(board)
+        == "No usable circle in t0-ccw-1: no feed-out found; is it closed? R measures it again, X leaves it out."
+    )
     assert board.messages[-1].weight is Weight.WARNING
 
 

@@ -1,0 +1,95 @@
+"""The wheel works without the checkout: its protocols and machines come along, recordings from elsewhere do not."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).parents[2]
+LARGEST_MB = 2.0
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(importlib.util.find_spec("pip") is None, reason="this environment has no pip to build with"),
+]
+
+
+def pip(*arguments):
+    command = [sys.executable, "-m", "pip", *map(str, arguments), "--quiet", "--disable-pip-version-check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    pip("wheel", "--no-deps", "--wheel-dir", folder, CHECKOUT)
+    (built,) = folder.glob("dbbstation-*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory, wheel):
+    """Scripts of a new environment that has the wheel, and everything else from this environment."""
+    folder = tmp_path_factory.mktemp("environment")
+    venv.create(folder, with_pip=False)
+    paths = sysconfig.get_paths(vars={"base": str(folder), "platbase": str(folder)})
+    scripts, libraries = Path(paths["scripts"]), Path(paths["purelib"])
+    python = scripts / Path(sys.executable).name
+    pip("--python", python if python.exists() else scripts / "python", "install", "--no-deps", "--no-index", wheel)
+    # A folder that is named in a .pth is not itself searched for .pth files: the editable install here stays out.
+    (libraries / "libraries.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    return scripts
+
+
+def run(installed, folder, *arguments):
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    command = [str(installed / arguments[0]), *map(str, arguments[1:])]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd=folder, env=environment, timeout=120
+    )
+
+
+def shipped(installed, folder, name):
+    script = f"from dbbstation.files.shipped import shipped_folder; print(shipped_folder({name!r}))"
+    return Path(run(installed, folder, "python", "-c", script).stdout.strip())
+
+
+def test_what_is_in_it(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    assert "dbbstation/protocols/plans/table2.yaml" in names
+    assert "dbbstation/fixtures/machines/reference.yaml" in names
+    assert any(name.endswith("licenses/LICENSE") for name in names)
+    assert [name for name in names if name.startswith(("tests/", "docs/", "protocols/", "fixtures/"))] == []
+    assert [name for name in names if name.endswith((".nbi", ".nbc", ".pyc"))] == []
+    assert wheel.stat().st_size < LARGEST_MB * 1e6
+
+
+def test_it_checks_a_plan_that_it_ships(installed, tmp_path):
+    protocols = shipped(installed, tmp_path, "protocols")
+    assert protocols.is_relative_to(installed.parent)
+    done = run(installed, tmp_path, "dbbstation", "check", protocols / "plans" / "table2.yaml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "15 tests" in done.stdout
+
+
+def test_it_knows_its_instruments(installed, tmp_path):
+    done = run(installed, tmp_path, "dbbstation", "instruments")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "heidenhain-nd281b" in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_it_calibrates(installed, tmp_path):
+    small = shipped(installed, tmp_path, "fixtures") / "sessions" / "small"
+    done = run(installed, tmp_path, "dbbstation", "calibrate", small, "--out", "model.yaml")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "model.yaml").exists()

@@ -173,7 +173,9 @@ class StationApp(App[None]):
             self.exit()
 
     def draw(self) -> None:
-        """Draw the board."""
+        """Draw the board, as long as there is a screen: the last look may come while it closes."""
+        if not self.screen_stack:
+            return
         base = self.screen_stack[0]
         for panel in base.query(Panel):
             panel.show(self.board)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import pkgutil
 import re
 from typing import TYPE_CHECKING
@@ -73,7 +74,9 @@ def _command(name: str, command: click.Command, context: click.Context) -> str:
     rows = [row for parameter in command.get_params(context) if (row := parameter.get_help_record(context))]
     options = [f"| `{_cell(option)}` | {_cell(text)} |" for option, text in rows]
     table = ["| option | |", "| --- | --- |", *options]
-    return "\n".join([f"# {name}", "", "```text", usage, "```", "", *_prose(command.help or ""), *table, ""])
+    return "\n".join(
+        [f"# {name}", "", "```text", usage, "```", "", *_prose(inspect.cleandoc(command.help or "")), *table, ""]
+    )
 
 
 def _prose(text: str) -> Iterator[str]:
@@ -147,5 +150,6 @@ def _sources() -> str:
 
 
 def _plain(text: str) -> str:
-    """Escape what Markdown would take for markup in an equation or a reference."""
-    return re.sub(r"([\\`*_\[\]<>|])", r"\\\1", text)
+    """Escape what Markdown would take for markup in an equation or a reference, outside names in backticks."""
+    parts = re.split(r"(`[^`]*`)", text)
+    return "".join(p if p.startswith("`") else re.sub(r"([\\*_\[\]<>|])", r"\\\1", p) for p in parts)

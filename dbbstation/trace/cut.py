@@ -30,6 +30,10 @@ FEED_SIGMAS = 6.0
 """A disagreement counts only where the overlap shows it this clearly above its noise."""
 
 
+TELLING = 20.0
+"""How much larger the variance of the overlap's shape must be than what both passes differ by. A compensated circle
+has hardly any shape left, and what is left of it would say any feed."""
+
 OUTSIDE_FEEDINGS = 6.0
 INSIDE_FEEDINGS = 3.0
 """How far from an edge, in durations of the feed-in, its two levels are read."""
@@ -142,7 +146,7 @@ def overlap_feed(recording: Recording, circle: Circle, middle: float) -> tuple[f
     smooth = _smoothed(length, max(3, int(np.count_nonzero(first)) // 40))
     misfit = np.array([np.var(np.interp(t[first] + turn, t, smooth) - smooth[first]) for turn in turns])
     best = int(np.argmin(misfit))
-    if best in {0, len(turns) - 1}:
+    if best in {0, len(turns) - 1} or np.var(smooth[first]) < TELLING * misfit[best]:
         return None
     a, b, c = misfit[best - 1 : best + 2]
     step = turns[1] - turns[0]

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.session import RunEntry, RunState, SessionFolder, read_session
+from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.model.observation import Observation
 from dbbstation.nc.commanded import commanded_poses
 from dbbstation.trace.cut import cut
@@ -64,6 +65,8 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
             try:
                 raw = cut(replace(read.recording, name=str(run.path)), session.circle(run))
                 observations.append(_observation(session, run, raw))
+            except InputError as error:
+                problems += error.problems
             except StationError as error:
                 problems.append(Problem(str(run.path), 0, 0, error.what, error.remedy))
     if problems:
@@ -79,8 +82,12 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
     observation = Observation(run.test, run.repeat, raw, session.setup(run), session.started_s(run))
     if run.program is None:
         return observation
-    text = run.program.path.read_text(encoding="utf-8")
-    return replace(observation, commanded=commanded_poses(text, str(run.program.path), observation))
+    path, faults = run.program.path, list[Problem]()
+    data = read_bytes(path, faults)
+    text = None if data is None else decode(data, str(path), faults)
+    if text is None:
+        raise InputError(faults)
+    return replace(observation, commanded=commanded_poses(text, str(path), observation))
 
 
 def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 
@@ -143,6 +144,25 @@ def test_missing_file(spoilt, refused, file):
 def test_changed_run(spoilt, refused):
     spoilt.lines(RUN, with_line(41, "7.2000,150.1\n"), reseal=False)
     assert refused().startswith(f"{RUN}: the file was changed after it was recorded: its SHA-256 is not the one in")
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        (b"G21 G90\nG1 X0 Y0 Z-1000 A0 B0 C0 F1000\nG1 Q\n", r":3:\d+: "),
+        (b"G21 G90\nG1 X0 Y0 Z-1000 A0 B0 C0 F1000\nG1 X10\nM2\n", ": its longest move at feed takes "),
+        (b"(\xe4)\nM2\n", r":1:2: byte 0xe4 is not UTF-8 text"),
+    ],
+    ids=["no NC text", "another program", "not UTF-8"],
+)
+def test_a_program_that_was_not_this_run(spoilt, refused, content, what):
+    spoilt.path("programs").mkdir()
+    spoilt.path("programs/a-ccw.ngc").write_bytes(content)
+    digest = hashlib.sha256(content).hexdigest()
+    run_hash = hashlib.sha256(spoilt.path(RUN).read_bytes()).hexdigest()
+    entry = f"{run_hash}, program: {{file: programs/a-ccw.ngc, sha256: {digest}}}"
+    spoilt.replace("session.yaml", run_hash, entry)
+    assert re.match(rf"programs/a-ccw\.ngc{what}", refused())
 
 
 def test_one_test(refused):

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@click.option("--sources", metavar="A,B,...", help="Machine error sources to fit, in place of the kinematic ones.")
+@click.option(
+    "--sources", metavar="A,B,...", help="Error sources to fit, in place of strut-reference-length,base-joints."
+)
 @click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
 @click.option("--force", is_flag=True, help="Overwrite the model file.")

@@ -16,8 +16,19 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.option("--from", "source", metavar="D", help="Language of PROGRAM [what its extension says].")
 @click.option("--out", type=_FILE, required=True, help="File to write.")
 @click.option("--start", metavar="X,Y,Z,A,B,C", help="Pose before the program, in mm and degrees.")
-@click.option("--chord-um", type=click.FloatRange(0.001, 1000.0), default=0.1, show_default=True, help="Chord error.")
-@click.option("--time-s", type=float, metavar="S", help="When the program starts, for sources that need time.")
+@click.option(
+    "--chord-um",
+    type=click.FloatRange(0.001, 1000.0),
+    default=0.1,
+    show_default=True,
+    help="Farthest a straight move may lie from the path [µm].",
+)
+@click.option(
+    "--time-s",
+    type=float,
+    metavar="S",
+    help="When the program starts, after the session began [s]; for models that need time.",
+)
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def compensate(

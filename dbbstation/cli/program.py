@@ -16,10 +16,23 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
 @click.option("--model", "model_file", type=_FILE, help="Compensate with this calibrated model.")
 @click.option("--test", "tests", multiple=True, metavar="NAME", help="This test only; may be given more than once.")
-@click.option("--step-deg", type=click.FloatRange(0.01, 5.0), default=0.1, show_default=True, help="Point spacing.")
-@click.option("--clearance-mm", type=click.FloatRange(0.0), default=20.0, show_default=True, help="Height of rapids.")
+@click.option(
+    "--step-deg", type=click.FloatRange(0.01, 5.0), default=0.1, show_default=True, help="Angle between points [deg]."
+)
+@click.option(
+    "--clearance-mm",
+    type=click.FloatRange(0.0),
+    default=20.0,
+    show_default=True,
+    help="Height of rapids over the first point [mm].",
+)
 @click.option("--bar-stays-on", is_flag=True, help="Start and end with the bar on its balls: no rapids, no stops.")
-@click.option("--time-s", type=float, metavar="S", help="When programs start, for models whose sources need time.")
+@click.option(
+    "--time-s",
+    type=float,
+    metavar="S",
+    help="When programs start, after the session began [s]; for models that need time.",
+)
 @click.option("--force", is_flag=True, help="Overwrite programs.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def program(

@@ -8,6 +8,7 @@ import numpy as np
 
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.trace.average import means
 from dbbstation.trace.circle import RawCircle
 
 if TYPE_CHECKING:
@@ -22,17 +23,26 @@ LARGEST_GAP_DEG = 10.0
 FEED_SEARCH = 0.2
 """The feed that a trace shows is looked for within this share of the programmed one."""
 
-FEED_TOLERANCE = 5e-3
-"""Share of the feed that a recording may be off; one per thousand costs 0.3 µm at 100 µm of error per radian,
-and real overlaps, which friction and warming keep from agreeing exactly, scatter by up to four."""
+FEED_TOLERANCE = 2e-3
+"""Share of the feed that a recording may be off; one per thousand costs 0.3 µm at 100 µm of error per radian, and
+real overlaps, which friction and warming keep from agreeing exactly, scatter by as much."""
 
 FEED_SIGMAS = 6.0
 """A disagreement counts only where the overlap shows it this clearly above its noise."""
 
 
-TELLING = 20.0
-"""How much larger the variance of the overlap's shape must be than what both passes differ by. A compensated circle
-has hardly any shape left, and what is left of it would say any feed."""
+TELLING = 1e-3
+"""Share of the feed that an overlap must determine it to, one standard deviation, to be asked at all: a compensated
+circle has hardly any shape left, and what is left of it would say any feed."""
+
+PIECES = 24
+"""Stretches of the overlap that are compared; what differs within one counts as one."""
+
+ROUNDS = 8
+"""Rounds of the comparison: each leaves a small share of what the one before was off by."""
+
+SHAPE_ORDER = 7
+"""Degree of the polynomial that gives the slope of the overlap's shape."""
 
 OUTSIDE_FEEDINGS = 6.0
 INSIDE_FEEDINGS = 3.0
@@ -129,43 +139,39 @@ def _check_feed(recording: Recording, circle: Circle, middle: float) -> None:
 def overlap_feed(recording: Recording, circle: Circle, middle: float) -> tuple[float, float] | None:
     """Feed and its standard deviation [mm/min] that make both passes of the overlap agree.
 
+    Where the second pass comes a time T after the first, their difference is offset + slope (T - turn): a regression
+    on the slope of the common shape gives what T is off by, and its uncertainty; a few rounds settle it.
+
     Returns:
         None where the overlap cannot tell: too few samples, or a trace too round to show a shift.
     """
-    overlap = circle.overshoot_deg
     turn_s = FULL_TURN_DEG / circle.turning_deg_s
-    half_s = overlap / circle.turning_deg_s
+    half_s = circle.overshoot_deg / circle.turning_deg_s
     t, length = recording.t_s - middle, recording.length_mm
     # The first pass lies about half a turn before the middle; a wrong feed moves it, so its inner part is used.
-    first = np.abs(t + turn_s / 2.0) < half_s * (1.0 - FEED_SEARCH)
-    if np.count_nonzero(first) < 10:  # noqa: PLR2004 - fewer samples show no shape
+    rows = np.abs(t + turn_s / 2.0) < half_s * (1.0 - FEED_SEARCH)
+    when, first = t[rows], length[rows]
+    if len(when) < PIECES:
         return None
-    turns = turn_s * np.linspace(
-        1.0 - FEED_SEARCH * overlap / FULL_TURN_DEG, 1.0 + FEED_SEARCH * overlap / FULL_TURN_DEG, 401
-    )
-    smooth = _smoothed(length, max(3, int(np.count_nonzero(first)) // 40))
-    misfit = np.array([np.var(np.interp(t[first] + turn, t, smooth) - smooth[first]) for turn in turns])
-    best = int(np.argmin(misfit))
-    if best in {0, len(turns) - 1} or np.var(smooth[first]) < TELLING * misfit[best]:
+    piece = np.arange(len(when)) * PIECES // len(when)
+    turn = turn_s
+    for _ in range(ROUNDS):
+        second = np.interp(when + turn, t, length)
+        shape = np.polynomial.Polynomial.fit(when, (first + second) / 2.0, SHAPE_ORDER)
+        slope = means(shape.deriv()(when), piece)
+        columns = np.column_stack([np.ones(PIECES), slope])
+        difference = means(second - first, piece)
+        (_, late), *_ = np.linalg.lstsq(columns, difference, rcond=None)
+        turn -= float(late)
+        if abs(turn - turn_s) > FEED_SEARCH * half_s:
+            return None
+    left = difference - columns @ np.linalg.lstsq(columns, difference, rcond=None)[0]
+    spread = np.sum((slope - slope.mean()) ** 2)
+    sigma_s = float(np.sqrt(left @ left / (PIECES - 2) / spread)) if spread > 0.0 else np.inf
+    if sigma_s > TELLING * turn_s:
         return None
-    a, b, c = misfit[best - 1 : best + 2]
-    step = turns[1] - turns[0]
-    curvature = (a - 2.0 * b + c) / step**2
-    if curvature <= 0.0:
-        return None
-    turn = turns[best] + step * 0.5 * (a - c) / (a - 2.0 * b + c)
-    # The misfit is a mean square: its curvature is twice the mean square slope, its value twice the noise.
-    noise = np.var(np.diff(length[first])) / 2.0 + misfit[best] / 2.0
-    uncertainty_s = np.sqrt(2.0 * noise / (curvature / 2.0) / np.count_nonzero(first))
     feed = circle.feed_mm_min * turn_s / turn
-    return float(feed), float(feed * uncertainty_s / turn)
-
-
-def _smoothed(length: NDArray[np.float64], width: int) -> NDArray[np.float64]:
-    """Running mean over an odd number of samples."""
-    width |= 1
-    padded = np.pad(length, width // 2, mode="edge")
-    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+    return feed, feed * sigma_s / turn
 
 
 def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64], rows: NDArray[np.bool_]) -> RawCircle:

@@ -37,6 +37,7 @@ COMMANDS = {
     "program": "NC programs of a plan's circles, nominal or compensated.",
     "replay": "Send a byte log through an instrument's driver.",
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",
+    "study": "Reproducible experiments.",
     "station": "Measure a plan on a terminal screen.",
 }
 """Name and one line of help of every command; each is a module of this folder with a command of its name."""

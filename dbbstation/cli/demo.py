@@ -1,0 +1,111 @@
+"""`dbbstation demo`: the whole job on a simulated machine, start to end."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from dbbstation.studies.demo import DemoResult
+
+
+@click.command()
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="New folder for everything.")
+@click.option("--seed", default=3, show_default=True, type=click.IntRange(min=0), help="Of the machine's errors.")
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
+def demo(*, out: Path | None, seed: int, as_json: bool) -> None:
+    r"""Measure, calibrate, diagnose, compensate and measure again, on a virtual machine over a real serial line.
+
+    Takes one to two minutes and needs no hardware. Every step is a command that can be typed by hand; they are shown
+    as they run, and the files they read and write stay in the folder.
+
+    \b
+    Examples:
+      dbbstation demo
+      dbbstation demo --out try-it --seed 7
+    """
+    from dbbstation.cli.output import print_json, say
+    from dbbstation.errors import OutputError
+    from dbbstation.studies.demo import run_demo
+
+    folder = out or _unused(Path("dbbstation-demo"))
+    if folder.exists():
+        raise OutputError("the folder exists already", where=str(folder), remedy="name another with --out")
+    on_terminal = sys.stderr.isatty()
+
+    def progress(text: str) -> None:
+        if on_terminal:
+            click.echo(f"\r  {text:<40}", nl=False, err=True)
+
+    def tell(text: str) -> None:
+        say(("\r" + " " * 44 + "\r" if on_terminal else "") + f"$ {text}")
+
+    result = run_demo(folder, seed, tell, progress)
+    if as_json:
+        print_json({"folder": str(folder), "runs": result.runs, "diagnosis": result.diagnosis})
+    else:
+        _print(result)
+
+
+def _unused(folder: Path) -> Path:
+    """Return the folder, or the first of its names with a number that does not exist."""
+    names = [folder, *(folder.with_name(f"{folder.name}-{k}") for k in range(2, 1000))]
+    return next(name for name in names if not name.exists())
+
+
+FIGURES = ("centre_deviation_um", "mean_radial_error_um", "circularity_um")
+
+
+def _print(result: DemoResult) -> None:
+    from dbbstation.cli.output import print_table
+
+    click.echo()
+    click.echo("      centre deviation  mean radial error        circularity   [µm, measured]")
+    rows: list[list[object]] = [
+        [run["test"], *(run[when][figure] for figure in FIGURES for when in ("before", "after"))] for run in result.runs
+    ]
+    means: list[object] = ["mean", *_means(result.runs)]
+    print_table(["test", "before", "after", " before", " after", "  before", "  after"], [*rows, means])
+    click.echo("before: nominal programs; after: programs compensated with the joint model")
+    click.echo()
+    left = result.calibration
+    click.echo(
+        f"A kinematic calibration alone leaves {left['residual_within_mounting_rms_um']:.1f} µm rms within mountings; "
+        f"the bar's noise is 0.3 µm."
+    )
+    for source in result.diagnosis["sources"]:
+        if source["verdict"] == "identified":
+            hidden = 100 * source["concealed"]
+            for name, number in source["parameters"].items():
+                click.echo(
+                    f"The diagnosis names {source['name']}: {name} {number['value']:.3g} ± {number['uncertainty']:.1g} "
+                    f"{number['unit']}; the kinematic parameters had swallowed {hidden:.0f} % of it."
+                )
+    held_out = result.diagnosis["held_out_rms_um"]
+    click.echo(
+        f"Tests left out of the fit: predicted to {held_out['before']:.1f} µm before, {held_out['after']:.1f} after."
+    )
+    click.echo()
+    click.echo(f"everything is in {result.folder}:")
+    for name, what in _CONTENTS:
+        click.echo(f"  {name:<16} {what}")
+
+
+_CONTENTS = (
+    ("truth.yaml", "what is really wrong with the virtual machine"),
+    ("measured/", "session on the nominal machine"),
+    ("kinematic.yaml", "model of the kinematic calibration"),
+    ("joint.yaml", "model with what the diagnosis found"),
+    ("programs/", "compensated NC programs of the fifteen circles"),
+    ("verified/", "session with the compensated programs"),
+)
+
+
+def _means(runs: list[dict[str, Any]]) -> list[float]:
+    """Mean size of each column."""
+    return [
+        sum(abs(run[when][figure]) for run in runs) / len(runs) for figure in FIGURES for when in ("before", "after")
+    ]

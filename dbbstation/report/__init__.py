@@ -1,0 +1,1 @@
+"""Figures and reports: pictures where people would rather look than read."""

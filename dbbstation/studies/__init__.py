@@ -1,0 +1,1 @@
+"""Reproducible experiments: whole jobs and questions, each from a seed to its numbers and figures."""

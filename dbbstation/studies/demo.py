@@ -1,0 +1,173 @@
+"""The whole job on a virtual machine, over a real serial line, with the commands that anyone would type.
+
+A virtual hexapod has random errors of its joints and struts, and struts that gravity stretches. It is measured on the
+jig plate, calibrated, diagnosed; compensated programs are written, run on it and measured again.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.errors import StationError
+from dbbstation.files.machine_file import read_machine
+from dbbstation.files.models import write_model
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model.identified import IdentifiedModel
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.contract import Fitted
+from dbbstation.sources.registry import known_sources
+from dbbstation.virtual.truth import random_kinematics
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+INSTRUMENT = "streaming-encoder"
+RATE_HZ = "50"
+TIME_SCALE = "100"
+"""Times faster than a real machine: 30 circles in half a minute instead of three quarters of an hour."""
+
+COMPLIANCE_UM_KN = 9.68
+"""Strut compliance with which the reference machine's circles bend as [GRAV Table 4] reports."""
+
+START_PATIENCE_S = 60.0
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """Files and figures of a demonstration.
+
+    Attributes:
+        folder: where everything is.
+        runs: per test, figures of the first circle in its first direction, before and after, in µm.
+        diagnosis: what `diagnose --json` said.
+        calibration: what `calibrate --json` said.
+    """
+
+    folder: Path
+    runs: list[dict[str, Any]]
+    diagnosis: dict[str, Any]
+    calibration: dict[str, Any]
+
+
+def run_demo(folder: Path, seed: int, tell: Callable[[str], None], progress: Callable[[str], None]) -> DemoResult:
+    """Do the whole job into a folder.
+
+    Args:
+        folder: made anew.
+        seed: of the virtual machine's errors.
+        tell: told each command before it runs.
+        progress: told how far a measurement is; each text replaces the one before.
+
+    Raises:
+        StationError: a step failed; what the steps before it wrote stays.
+    """
+    folder.mkdir(parents=True)
+    machine_file = shipped_folder("fixtures") / "machines" / "reference.yaml"
+    plan_file = shipped_folder("protocols") / "plans" / "table2.yaml"
+    _write_truth(folder / "truth.yaml", machine_file, seed)
+    job = _Job(folder, ["--plan", str(plan_file), "--machine", str(machine_file)], seed, tell, progress)
+    job.measure("measured", [])
+    calibration = job.answer(["calibrate", "measured", "--out", "kinematic.yaml"])
+    diagnosis = job.answer(["diagnose", "measured", "--out", "joint.yaml"])
+    job.answer(["program", *job.what, "--dialect", "linuxcnc", "--model", "joint.yaml", "--out", "programs"])
+    job.measure("verified", ["--programs", "programs"])
+    before = job.answer(["evaluate", "measured", "--model", "joint.yaml"])
+    after = job.answer(["evaluate", "verified", "--model", "joint.yaml"])
+    return DemoResult(folder, _side_by_side(before, after), diagnosis, calibration)
+
+
+def _write_truth(path: Path, machine_file: Path, seed: int) -> None:
+    machine = read_machine(machine_file)
+    gravity = Fitted(known_sources()["gravity"], np.array([COMPLIANCE_UM_KN]))
+    fitted = (*random_kinematics(machine, seed), gravity)
+    rows = tuple((f.source.name, "", p.name) for f in fitted for p in f.source.parameters(machine))
+    exact = np.zeros((len(rows), len(rows)))
+    write_model(path, IdentifiedModel(MachineModel(machine, fitted), rows, exact))
+
+
+@dataclass(frozen=True)
+class _Job:
+    """Runs the program's own commands in the demonstration's folder."""
+
+    folder: Path
+    what: list[str]
+    seed: int
+    tell: Callable[[str], None]
+    progress: Callable[[str], None]
+
+    def answer(self, arguments: list[str]) -> dict[str, Any]:
+        """Run a command and return what it printed as JSON."""
+        self.tell("dbbstation " + " ".join(_short(argument) for argument in arguments))
+        done = subprocess.run(
+            [*_PROGRAM, *arguments, "--json"], cwd=self.folder, capture_output=True, text=True, check=False
+        )
+        if done.returncode != 0:
+            raise StationError(done.stderr.strip(), where=f"dbbstation {arguments[0]}")
+        found: dict[str, Any] = json.loads(done.stdout)
+        return found
+
+    def measure(self, session: str, programs: list[str]) -> None:
+        """Measure the virtual machine over a line of its own."""
+        speed = ["--time-scale", TIME_SCALE, "--rate-hz", RATE_HZ]
+        truth = ["--truth", "truth.yaml", "--seed", str(self.seed)]
+        with self._emulated([*truth, *speed, *programs]) as place:
+            arguments = ["measure", *self.what, "--instrument", INSTRUMENT, "--out", session, *programs]
+            line = ["--port", place["port"], "--auto", place["control"], *speed]
+            bar = ["--bar-length-mm", "150", "--bar-uncertainty-um", "0.5"]
+            self.tell("dbbstation " + " ".join(_short(argument) for argument in [*arguments, *line]))
+            with subprocess.Popen(
+                [*_PROGRAM, *arguments, *line, *bar],
+                cwd=self.folder,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+            ) as process:
+                said = []
+                for text in process.stderr or ():
+                    said.append(text.rstrip())
+                    if " of " in text and ": test " in text:
+                        self.progress(text.strip())
+            if process.returncode != 0:
+                raise StationError("\n".join(said[-5:]), where="dbbstation measure")
+
+    @contextmanager
+    def _emulated(self, arguments: list[str]) -> Iterator[dict[str, str]]:
+        """The virtual machine as a process of its own: port and control address."""
+        command = [*_PROGRAM, "emulate", "--instrument", INSTRUMENT, *self.what, *arguments, "--json"]
+        process = subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        try:
+            first = process.stdout.readline() if process.stdout else ""
+            if not first:
+                _, said = process.communicate(timeout=START_PATIENCE_S)
+                raise StationError(said.strip() or "it ended at once", where="dbbstation emulate")
+            place: dict[str, str] = json.loads(first)
+            yield place
+        finally:
+            process.terminate()
+            process.communicate(timeout=START_PATIENCE_S)
+
+
+_PROGRAM = [sys.executable, "-m", "dbbstation"]
+
+
+def _short(argument: str) -> str:
+    """Last part of a path that the package ships, so that commands can be read."""
+    return argument.rpartition("/")[2] if argument.endswith(".yaml") else argument
+
+
+def _side_by_side(before: dict[str, Any], after: dict[str, Any]) -> list[dict[str, Any]]:
+    """Measured figures of the same runs in two sessions, [CAL Table III]."""
+    later = {(run["test"], run["direction"]): run["measured"] for run in after["runs"]}
+    return [
+        {"test": run["test"], "before": run["measured"], "after": later[run["test"], run["direction"]]}
+        for run in before["runs"]
+        if run["direction"] == "ccw"
+    ]

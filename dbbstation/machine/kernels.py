@@ -1,7 +1,19 @@
 """Compiled loops over poses: strut lengths, forward kinematics, bar sensitivities.
 
-Only arrays go in and out; `kinematics.py` is what the rest of the program calls. Joints have the shape
-(m, 6, 3) with m = 1 (the same for every pose) or m = n (one set per pose).
+Only arrays go in and out; `kinematics.py` is what the rest of the program calls. Every kernel works on the poses
+`start` to `stop`. Joints have the shape (m, 6, 3), balls (m, 3), with m = 1 (the same for every pose) or m = n (one
+set per pose).
+
+Many poses are worked on side by side, so that one machine instruction serves several of them: in groups of `LANES`, the
+pose within the group being the last axis of every work array and the innermost loop of all arithmetic. No lane decides
+anything for itself: there is no pivot search and no branch, lanes that are done stand still. So a lane's result does
+not depend on its neighbours, nor on where the group begins. A last group that is not full repeats the last pose.
+
+Names of work arrays: t and r are positions (3, LANES) and rotations (3, 3, LANES) of the platform, q and p the joints
+on base and platform (6, 3, LANES); a Jacobian (6, 6, LANES) has the row [u, (R P) x u] for each strut; a system
+(6, 7, LANES) is a matrix with the right-hand side as its last column.
+
+All of it stands in this one file because the compiler's cache on disk looks at a kernel's own file only.
 """
 
 from __future__ import annotations
@@ -10,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.compiled import compiled
+from dbbstation.machine.compiled import compiled, inlined
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,63 +31,217 @@ CONVERGED = 0
 SINGULAR = 1
 TOO_MANY_STEPS = 2
 
+LANES = 64
+"""Poses in a group: the fewest whose loops the compiler does not unroll away; work arrays stay in the inner caches."""
+
+LOOSE = 1e-20
+"""Square of how far a column of a matrix has to lean out of those before it. Rounding alone comes to 1e-26 where the
+struts hold nothing; a pose just above the limit is useless as well, but it has a solution [1 or mm², by column]."""
+
+
+@inlined
+def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
+    """Cross product a x b."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@inlined
+def _gather(first: int, stop: int, rows: NDArray[np.float64], lanes: NDArray[np.float64]) -> None:
+    """Bring the rows `first` and on, shape (n, k), to lanes, shape (k, LANES); a single row goes to all lanes."""
+    for lane in range(LANES):
+        n = min(first + lane, stop - 1, rows.shape[0] - 1)
+        for k in range(rows.shape[1]):
+            lanes[k, lane] = rows[n, k]
+
+
+@inlined
+def _gather_matrices(first: int, stop: int, rows: NDArray[np.float64], lanes: NDArray[np.float64]) -> None:
+    """Do the same for rows of shape (n, i, k) to lanes of shape (i, k, LANES)."""
+    for lane in range(LANES):
+        n = min(first + lane, stop - 1, rows.shape[0] - 1)
+        for i in range(rows.shape[1]):
+            for k in range(rows.shape[2]):
+                lanes[i, k, lane] = rows[n, i, k]
+
+
+@inlined
+def _gather_machine(
+    start: int,
+    first: int,
+    stop: int,
+    position: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    base: NDArray[np.float64],
+    platform: NDArray[np.float64],
+    t: NDArray[np.float64],
+    r: NDArray[np.float64],
+    q: NDArray[np.float64],
+    p: NDArray[np.float64],
+) -> None:
+    """Bring poses and joints of a group to lanes; joints that stay the same only once, for the group at `start`."""
+    _gather(first, stop, position, t)
+    _gather_matrices(first, stop, rotation, r)
+    if first == start or base.shape[0] > 1:
+        _gather_matrices(first, stop, base, q)
+    if first == start or platform.shape[0] > 1:
+        _gather_matrices(first, stop, platform, p)
+
+
+@inlined
+def _struts(
+    t: NDArray[np.float64],
+    r: NDArray[np.float64],
+    q: NDArray[np.float64],
+    p: NDArray[np.float64],
+    length: NDArray[np.float64],
+    arm: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
+) -> None:
+    """Lengths (6, LANES), arms R P (6, 3, LANES) and Jacobian of the struts [CAL eq 1].
+
+    Only the first six columns of `jacobian` are written, so that it may be part of a system.
+    """
+    for i in range(6):
+        for lane in range(LANES):
+            px, py, pz = p[i, 0, lane], p[i, 1, lane], p[i, 2, lane]
+            ax = r[0, 0, lane] * px + r[0, 1, lane] * py + r[0, 2, lane] * pz
+            ay = r[1, 0, lane] * px + r[1, 1, lane] * py + r[1, 2, lane] * pz
+            az = r[2, 0, lane] * px + r[2, 1, lane] * py + r[2, 2, lane] * pz
+            sx = ax + t[0, lane] - q[i, 0, lane]
+            sy = ay + t[1, lane] - q[i, 1, lane]
+            sz = az + t[2, lane] - q[i, 2, lane]
+            distance = np.sqrt(sx * sx + sy * sy + sz * sz)
+            inverse = 1.0 / distance
+            ux, uy, uz = sx * inverse, sy * inverse, sz * inverse
+            length[i, lane] = distance
+            arm[i, 0, lane], arm[i, 1, lane], arm[i, 2, lane] = ax, ay, az
+            jacobian[i, 0, lane], jacobian[i, 1, lane], jacobian[i, 2, lane] = ux, uy, uz
+            jacobian[i, 3, lane], jacobian[i, 4, lane], jacobian[i, 5, lane] = _cross(ax, ay, az, ux, uy, uz)
+
+
+@inlined
+def _solve(
+    system: NDArray[np.float64],
+    triangle: NDArray[np.float64],
+    solution: NDArray[np.float64],
+    sound: NDArray[np.float64],
+) -> None:
+    """Solve a system, shape (6, 7, LANES), by modified Gram-Schmidt; it is overwritten.
+
+    Column by column what lies along it is taken out of the columns behind it, the right-hand side among them; what
+    was taken out is a unit triangle. This is as stable as elimination with row exchanges, yet exchanges nothing: with
+    the right-hand side treated as a column it is Householder's method in disguise. [Björck, BIT 7 (1967) 1-21; Björck
+    and Paige, SIAM J. Matrix Anal. Appl. 13 (1992) 176-190]
+
+    Args:
+        system: matrix and right-hand side.
+        triangle: work, shape (6, 7, LANES).
+        solution: shape (6, LANES).
+        sound: 1.0 where the matrix has full rank, 0.0 where it has not or is not a number, shape (LANES,).
+    """
+    _orthogonalise(system, triangle)
+    for lane in range(LANES):
+        sound[lane] = 1.0
+    for k in range(5, -1, -1):
+        for lane in range(LANES):
+            solution[k, lane] = triangle[k, 6, lane]
+            sound[lane] = sound[lane] if triangle[k, k, lane] < 1.0 / LOOSE else 0.0
+        for j in range(k + 1, 6):
+            for lane in range(LANES):
+                solution[k, lane] -= triangle[k, j, lane] * solution[j, lane]
+
+
+@inlined
+def _orthogonalise(system: NDArray[np.float64], triangle: NDArray[np.float64]) -> None:
+    """Make the columns of a system orthogonal; the triangle gets what was along them and, on its diagonal, 1/|c|²."""
+    for k in range(6):
+        for lane in range(LANES):
+            square = 0.0
+            for i in range(6):
+                square += system[i, k, lane] * system[i, k, lane]
+            triangle[k, k, lane] = 1.0 / square
+        for j in range(k + 1, 7):
+            for lane in range(LANES):
+                along = 0.0
+                for i in range(6):
+                    along += system[i, k, lane] * system[i, j, lane]
+                along *= triangle[k, k, lane]
+                triangle[k, j, lane] = along
+                for i in range(6):
+                    system[i, j, lane] -= along * system[i, k, lane]
+
+
+@inlined
+def _compare(
+    wanted: NDArray[np.float64],
+    length: NDArray[np.float64],
+    tolerance: float,
+    system: NDArray[np.float64],
+    square: NDArray[np.float64],
+    state: NDArray[np.int64],
+) -> int:
+    """Set a system's right-hand side to wanted less present lengths; return how many lanes are still searching."""
+    for lane in range(LANES):
+        square[lane] = 0.0
+    for i in range(6):
+        for lane in range(LANES):
+            residual = wanted[i, lane] - length[i, lane]
+            system[i, 6, lane] = residual
+            square[lane] += residual * residual
+    searching = 0
+    for lane in range(LANES):
+        if state[lane] == TOO_MANY_STEPS and square[lane] <= tolerance * tolerance:
+            state[lane] = CONVERGED
+        searching += 1 if state[lane] == TOO_MANY_STEPS else 0
+    return searching
+
+
+@inlined
+def _move(t: NDArray[np.float64], r: NDArray[np.float64], step: NDArray[np.float64], state: NDArray[np.int64]) -> None:
+    """Move the platforms that are still searching by (dt, w), shape (6, LANES) [mm, rad].
+
+    The platform turns about w in machine axes by Cayley's matrix 1 + (w^ + w^w^/2) / (1 + |w|²/4), w^ the matrix of
+    w x. It is an exact rotation for any w and needs neither sine nor cosine; its angle is |w| less |w|³/12, which
+    Newton's method does not mind.
+    """
+    for lane in range(LANES):
+        goes = state[lane] == TOO_MANY_STEPS
+        for k in range(3):
+            t[k, lane] += step[k, lane] if goes else 0.0
+        wx = step[3, lane] if goes else 0.0
+        wy = step[4, lane] if goes else 0.0
+        wz = step[5, lane] if goes else 0.0
+        c = 1.0 / (1.0 + 0.25 * (wx * wx + wy * wy + wz * wz))
+        h = 0.5 * c
+        m00, m01, m02 = 1.0 - h * (wy * wy + wz * wz), h * wx * wy - c * wz, h * wx * wz + c * wy
+        m10, m11, m12 = h * wx * wy + c * wz, 1.0 - h * (wx * wx + wz * wz), h * wy * wz - c * wx
+        m20, m21, m22 = h * wx * wz - c * wy, h * wy * wz + c * wx, 1.0 - h * (wx * wx + wy * wy)
+        for k in range(3):
+            x, y, z = r[0, k, lane], r[1, k, lane], r[2, k, lane]
+            r[0, k, lane] = m00 * x + m01 * y + m02 * z
+            r[1, k, lane] = m10 * x + m11 * y + m12 * z
+            r[2, k, lane] = m20 * x + m21 * y + m22 * z
+
 
 @compiled
-def _factorise(a: NDArray[np.float64], order: NDArray[np.int64]) -> bool:
-    """LU factors with row exchanges of the 6x6 matrix `a`, in place; False where it is singular."""
-    for column in range(6):
-        pivot = column
-        for row in range(column + 1, 6):
-            if abs(a[row, column]) > abs(a[pivot, column]):
-                pivot = row
-        order[column] = pivot
-        if not abs(a[pivot, column]) > 1e-12:  # NaN counts as singular too  # noqa: PLR2004
-            return False
-        if pivot != column:
-            for k in range(6):
-                a[column, k], a[pivot, k] = a[pivot, k], a[column, k]
-        inverse = 1.0 / a[column, column]
-        for row in range(column + 1, 6):
-            a[row, column] *= inverse
-            for k in range(column + 1, 6):
-                a[row, k] -= a[row, column] * a[column, k]
-    return True
-
-
-@compiled
-def _substitute(a: NDArray[np.float64], order: NDArray[np.int64], b: NDArray[np.float64]) -> None:
-    """Solve with the factors of `_factorise`, in place of the right-hand side `b`."""
-    for row in range(6):
-        pivot = order[row]
-        b[row], b[pivot] = b[pivot], b[row]
-    for row in range(6):
-        for k in range(row):
-            b[row] -= a[row, k] * b[k]
-    for row in range(5, -1, -1):
-        for k in range(row + 1, 6):
-            b[row] -= a[row, k] * b[k]
-        b[row] /= a[row, row]
-
-
-@compiled
-def _turn(rotation: NDArray[np.float64], wx: float, wy: float, wz: float) -> None:
-    """Turn a rotation matrix by the rotation vector w [rad, machine frame], exactly, in place (Rodrigues)."""
-    square = wx * wx + wy * wy + wz * wz
-    angle = np.sqrt(square)
-    if angle < 1e-4:  # series, exact to machine precision here  # noqa: PLR2004
-        s = 1.0 - square / 6.0
-        c = 0.5 - square / 24.0
-    else:
-        s = np.sin(angle) / angle
-        c = (1.0 - np.cos(angle)) / square
-    m00, m01, m02 = 1.0 - c * (wy * wy + wz * wz), c * wx * wy - s * wz, c * wx * wz + s * wy
-    m10, m11, m12 = c * wx * wy + s * wz, 1.0 - c * (wx * wx + wz * wz), c * wy * wz - s * wx
-    m20, m21, m22 = c * wx * wz - s * wy, c * wy * wz + s * wx, 1.0 - c * (wx * wx + wy * wy)
-    for k in range(3):
-        x, y, z = rotation[0, k], rotation[1, k], rotation[2, k]
-        rotation[0, k] = m00 * x + m01 * y + m02 * z
-        rotation[1, k] = m10 * x + m11 * y + m12 * z
-        rotation[2, k] = m20 * x + m21 * y + m22 * z
+def strut_lengths(
+    start: int,
+    stop: int,
+    position: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    base: NDArray[np.float64],
+    platform: NDArray[np.float64],
+    lengths: NDArray[np.float64],
+) -> None:
+    """Strut lengths, shape (n, 6) [mm], at positions (n, 3) and rotations (n, 3, 3) [CAL eq 1]."""
+    t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
+    length, arm, jacobian = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, 6, LANES))
+    for first in range(start, stop, LANES):
+        _gather_machine(start, first, stop, position, rotation, base, platform, t, r, q, p)
+        _struts(t, r, q, p, length, arm, jacobian)
+        for n in range(first, min(first + LANES, stop)):
+            for i in range(6):
+                lengths[n, i] = length[i, n - first]
 
 
 @compiled
@@ -90,24 +256,18 @@ def strut_vectors(
     units: NDArray[np.float64],
     arms: NDArray[np.float64],
 ) -> None:
-    """Strut lengths, unit vectors from base to platform and arms R P for the poses `start` to `stop`.
-
-    Shapes: position (n, 3), rotation (n, 3, 3), base and platform (m, 6, 3), lengths (n, 6), units and
-    arms (n, 6, 3) [mm]. [CAL eq 1]
-    """
-    for n in range(start, stop):
-        q = base[n if base.shape[0] > 1 else 0]
-        p = platform[n if platform.shape[0] > 1 else 0]
-        r = rotation[n]
-        for i in range(6):
-            square = 0.0
-            for k in range(3):
-                arms[n, i, k] = r[k, 0] * p[i, 0] + r[k, 1] * p[i, 1] + r[k, 2] * p[i, 2]
-                units[n, i, k] = arms[n, i, k] + position[n, k] - q[i, k]
-                square += units[n, i, k] ** 2
-            lengths[n, i] = np.sqrt(square)
-            for k in range(3):
-                units[n, i, k] /= lengths[n, i]
+    """Strut lengths (n, 6), unit vectors from base to platform and arms R P, both (n, 6, 3) [mm] [CAL eq 1]."""
+    t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
+    length, arm, jacobian = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, 6, LANES))
+    for first in range(start, stop, LANES):
+        _gather_machine(start, first, stop, position, rotation, base, platform, t, r, q, p)
+        _struts(t, r, q, p, length, arm, jacobian)
+        for n in range(first, min(first + LANES, stop)):
+            for i in range(6):
+                lengths[n, i] = length[i, n - first]
+                for k in range(3):
+                    units[n, i, k] = jacobian[i, k, n - first]
+                    arms[n, i, k] = arm[i, k, n - first]
 
 
 @compiled
@@ -119,49 +279,42 @@ def forward(
     platform: NDArray[np.float64],
     tolerance: float,
     most_steps: int,
+    near_position: NDArray[np.float64],
+    near_rotation: NDArray[np.float64],
     position: NDArray[np.float64],
     rotation: NDArray[np.float64],
     outcome: NDArray[np.int64],
 ) -> None:
-    """Newton-Raphson on the strut lengths [CAL eq 2], from the poses in `position` and `rotation`, in place.
+    """Newton-Raphson on the strut lengths [CAL eq 2], from near poses to those with the lengths `target` (n, 6).
 
-    Each step solves J (dt, dw) = target - L with the exact Jacobian J = [u, (R P) x u] and turns the
-    platform by the rotation vector dw exactly, so convergence is quadratic. `outcome` (n,) says how each
-    pose ended.
+    Each step solves J (dt, w) = target - L with the exact Jacobian and turns the platform by an exact rotation, so
+    convergence is quadratic. `outcome` (n,) says how each pose ended: converged where the root of the sum of the six
+    squared residuals is within `tolerance` [mm], which no NaN can be.
     """
-    jacobian = np.empty((6, 6))
-    step = np.empty(6)
-    order = np.empty(6, dtype=np.int64)
-    for n in range(start, stop):
-        q = base[n if base.shape[0] > 1 else 0]
-        p = platform[n if platform.shape[0] > 1 else 0]
-        r = rotation[n]
-        t = position[n]
-        outcome[n] = TOO_MANY_STEPS
+    t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
+    length, arm, wanted = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, LANES))
+    system, triangle, step = np.empty((6, 7, LANES)), np.empty((6, 7, LANES)), np.empty((6, LANES))
+    square, sound, state = np.empty(LANES), np.empty(LANES), np.empty(LANES, dtype=np.int64)
+    for first in range(start, stop, LANES):
+        _gather_machine(start, first, stop, near_position, near_rotation, base, platform, t, r, q, p)
+        _gather(first, stop, target, wanted)
+        for lane in range(LANES):
+            state[lane] = TOO_MANY_STEPS  # until it turns out otherwise
         for _ in range(most_steps):
-            worst = 0.0
-            for i in range(6):
-                ax = r[0, 0] * p[i, 0] + r[0, 1] * p[i, 1] + r[0, 2] * p[i, 2]
-                ay = r[1, 0] * p[i, 0] + r[1, 1] * p[i, 1] + r[1, 2] * p[i, 2]
-                az = r[2, 0] * p[i, 0] + r[2, 1] * p[i, 1] + r[2, 2] * p[i, 2]
-                sx, sy, sz = ax + t[0] - q[i, 0], ay + t[1] - q[i, 1], az + t[2] - q[i, 2]
-                length = np.sqrt(sx * sx + sy * sy + sz * sz)
-                inverse = 1.0 / length
-                sx, sy, sz = sx * inverse, sy * inverse, sz * inverse
-                jacobian[i, 0], jacobian[i, 1], jacobian[i, 2] = sx, sy, sz
-                jacobian[i, 3], jacobian[i, 4], jacobian[i, 5] = ay * sz - az * sy, az * sx - ax * sz, ax * sy - ay * sx
-                step[i] = target[n, i] - length
-                worst = max(worst, abs(step[i]))
-            if worst <= tolerance:
-                outcome[n] = CONVERGED
+            _struts(t, r, q, p, length, arm, system)
+            if _compare(wanted, length, tolerance, system, square, state) == 0:
                 break
-            if not _factorise(jacobian, order):
-                outcome[n] = SINGULAR
-                break
-            _substitute(jacobian, order, step)
+            _solve(system, triangle, step, sound)
+            for lane in range(LANES):
+                if state[lane] == TOO_MANY_STEPS and sound[lane] == 0.0:
+                    state[lane] = SINGULAR
+            _move(t, r, step, state)
+        for n in range(first, min(first + LANES, stop)):
+            outcome[n] = state[n - first]
             for k in range(3):
-                t[k] += step[k]
-            _turn(r, step[3], step[4], step[5])
+                position[n, k] = t[k, n - first]
+                for m in range(3):
+                    rotation[n, k, m] = r[k, m, n - first]
 
 
 @compiled
@@ -179,23 +332,107 @@ def adjoint(
 
     Shapes: units and arms (n, 6, 3), direction and moment (n, 3).
     """
-    transposed = np.empty((6, 6))
-    order = np.empty(6, dtype=np.int64)
-    for n in range(start, stop):
+    unit, arm, force, turning = (
+        np.empty((6, 3, LANES)),
+        np.empty((6, 3, LANES)),
+        np.empty((3, LANES)),
+        np.empty((3, LANES)),
+    )
+    system, triangle, g = np.empty((6, 7, LANES)), np.empty((6, 7, LANES)), np.empty((6, LANES))
+    sound = np.empty(LANES)
+    for first in range(start, stop, LANES):
+        _gather_matrices(first, stop, units, unit)
+        _gather_matrices(first, stop, arms, arm)
+        _gather(first, stop, direction, force)
+        _gather(first, stop, moment, turning)
         for i in range(6):
-            sx, sy, sz = units[n, i, 0], units[n, i, 1], units[n, i, 2]
-            ax, ay, az = arms[n, i, 0], arms[n, i, 1], arms[n, i, 2]
-            transposed[0, i], transposed[1, i], transposed[2, i] = sx, sy, sz
-            transposed[3, i], transposed[4, i], transposed[5, i] = (
-                ay * sz - az * sy,
-                az * sx - ax * sz,
-                ax * sy - ay * sx,
-            )
+            for lane in range(LANES):
+                ux, uy, uz = unit[i, 0, lane], unit[i, 1, lane], unit[i, 2, lane]
+                system[0, i, lane], system[1, i, lane], system[2, i, lane] = ux, uy, uz
+                system[3, i, lane], system[4, i, lane], system[5, i, lane] = _cross(
+                    arm[i, 0, lane], arm[i, 1, lane], arm[i, 2, lane], ux, uy, uz
+                )
         for k in range(3):
-            gain[n, k] = direction[n, k]
-            gain[n, 3 + k] = moment[n, k]
-        if not _factorise(transposed, order):
-            outcome[n] = SINGULAR
-            continue
-        _substitute(transposed, order, gain[n])
-        outcome[n] = CONVERGED
+            for lane in range(LANES):
+                system[k, 6, lane], system[3 + k, 6, lane] = force[k, lane], turning[k, lane]
+        _solve(system, triangle, g, sound)
+        for n in range(first, min(first + LANES, stop)):
+            outcome[n] = CONVERGED if sound[n - first] == 1.0 else SINGULAR
+            for i in range(6):
+                gain[n, i] = g[i, n - first]
+
+
+@inlined
+def _bar_system(
+    t: NDArray[np.float64],
+    r: NDArray[np.float64],
+    ball: NDArray[np.float64],
+    tool: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
+    span: NDArray[np.float64],
+    system: NDArray[np.float64],
+) -> None:
+    """Length of the bar, shape (LANES,), and the system J^T g = [n, (R o) x n] with n its direction, o the tool ball."""
+    for i in range(6):
+        for k in range(6):
+            for lane in range(LANES):
+                system[k, i, lane] = jacobian[i, k, lane]
+    for lane in range(LANES):
+        ox, oy, oz = tool[0, lane], tool[1, lane], tool[2, lane]
+        lx = r[0, 0, lane] * ox + r[0, 1, lane] * oy + r[0, 2, lane] * oz
+        ly = r[1, 0, lane] * ox + r[1, 1, lane] * oy + r[1, 2, lane] * oz
+        lz = r[2, 0, lane] * ox + r[2, 1, lane] * oy + r[2, 2, lane] * oz
+        sx = lx + t[0, lane] - ball[0, lane]
+        sy = ly + t[1, lane] - ball[1, lane]
+        sz = lz + t[2, lane] - ball[2, lane]
+        span[lane] = np.sqrt(sx * sx + sy * sy + sz * sz)
+        inverse = 1.0 / span[lane]
+        nx, ny, nz = sx * inverse, sy * inverse, sz * inverse
+        system[0, 6, lane], system[1, 6, lane], system[2, 6, lane] = nx, ny, nz
+        system[3, 6, lane], system[4, 6, lane], system[5, 6, lane] = _cross(lx, ly, lz, nx, ny, nz)
+
+
+@compiled
+def bar(
+    start: int,
+    stop: int,
+    position: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    base: NDArray[np.float64],
+    platform: NDArray[np.float64],
+    fixed_ball: NDArray[np.float64],
+    tool_ball: NDArray[np.float64],
+    lengths: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    gain: NDArray[np.float64],
+    outcome: NDArray[np.int64],
+) -> None:
+    """Length of a bar and how it answers to struts and base joints, by the adjoint: one solution per pose.
+
+    With n the bar's direction from fixed to tool ball and o the tool ball in the platform frame, the six numbers g of
+    J^T g = [n, (R o) x n] are the answer to the strut lengths, and g_i u_i that to base joint i.
+
+    Shapes: fixed_ball in the machine frame, tool_ball in the platform frame, lengths (n,), directions (n, 3), gain
+    (n, 24): six strut lengths, then the base joints' coordinates x, y, z one joint after the other.
+    """
+    t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
+    length, arm, jacobian = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, 6, LANES))
+    system, triangle, g = np.empty((6, 7, LANES)), np.empty((6, 7, LANES)), np.empty((6, LANES))
+    ball, tool, span, sound = np.empty((3, LANES)), np.empty((3, LANES)), np.empty(LANES), np.empty(LANES)
+    for first in range(start, stop, LANES):
+        _gather_machine(start, first, stop, position, rotation, base, platform, t, r, q, p)
+        _gather(first, stop, fixed_ball, ball)
+        _gather(first, stop, tool_ball, tool)
+        _struts(t, r, q, p, length, arm, jacobian)
+        _bar_system(t, r, ball, tool, jacobian, span, system)
+        for n in range(first, min(first + LANES, stop)):
+            lengths[n] = span[n - first]
+            for k in range(3):
+                directions[n, k] = system[k, 6, n - first]
+        _solve(system, triangle, g, sound)
+        for n in range(first, min(first + LANES, stop)):
+            outcome[n] = CONVERGED if sound[n - first] == 1.0 else SINGULAR
+            for i in range(6):
+                gain[n, i] = g[i, n - first]
+                for k in range(3):
+                    gain[n, 6 + 3 * i + k] = g[i, n - first] * jacobian[i, k, n - first]

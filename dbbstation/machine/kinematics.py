@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 TOLERANCE_MM = 1e-11
 """Strut length residual at which the forward kinematics is content: it puts the pose itself within 1e-9 mm."""
 
+PARAMETERS = 4 * STRUTS
+"""Strut lengths and base-joint coordinates: the 24 of [CAL II-C]."""
+
 MOST_STEPS = 25
 """Newton steps: three do from a commanded pose; more than ten mean that there is no pose nearby."""
 
@@ -61,6 +64,19 @@ def inverse(hexapod: Hexapod, frames: Frames) -> Struts:
     return struts
 
 
+def strut_lengths(hexapod: Hexapod, frames: Frames) -> NDArray[np.float64]:
+    """Strut lengths alone at the poses `frames`, shape (n, 6) [mm] [CAL eq 1]."""
+    count = len(frames)
+    lengths = np.empty((count, STRUTS))
+    base, platform = _joints(hexapod, count)
+
+    def block(start: int, stop: int) -> None:
+        kernels.strut_lengths(start, stop, frames.position_mm, frames.rotation, base, platform, lengths)
+
+    in_blocks(block, count)
+    return lengths
+
+
 def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> Frames:
     """Poses at which the struts have these lengths [CAL eq 2].
 
@@ -76,7 +92,7 @@ def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> F
         KinematicsError: no pose found; names the first such pose.
     """
     count = len(near)
-    position, rotation = near.position_mm.copy(), near.rotation.copy()
+    found = Frames(np.empty((count, 3)), np.empty((count, 3, 3)))
     target = np.ascontiguousarray(length_mm)
     outcome = np.empty(count, dtype=np.int64)
     base, platform = _joints(hexapod, count)
@@ -90,16 +106,21 @@ def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> F
             platform,
             TOLERANCE_MM,
             MOST_STEPS,
-            position,
-            rotation,
+            near.position_mm,
+            near.rotation,
+            found.position_mm,
+            found.rotation,
             outcome,
         )
 
     in_blocks(block, count)
-    failed = (outcome != kernels.CONVERGED) | ~np.isfinite(position).all(axis=1) | ~np.isfinite(target).all(axis=1)
+    failed = outcome != kernels.CONVERGED
     if failed.any():
-        _refuse(int(np.argmax(failed)), near, hexapod, target, singular=bool(outcome[failed][0] == kernels.SINGULAR))
-    return Frames(position, rotation)
+        first = int(np.argmax(failed))
+        # A length that is no number makes a pose that is none, and that one counts as singular.
+        singular = bool(outcome[first] == kernels.SINGULAR and np.isfinite(target[first]).all())
+        _refuse(first, near, hexapod, target, singular=singular)
+    return found
 
 
 def strut_jacobian(struts: Struts) -> NDArray[np.float64]:
@@ -112,16 +133,36 @@ class Response:
     """How one measured or predicted quantity answers to the machine's errors, at given poses.
 
     Attributes:
-        per_strut: per strut length, shape (n, 6) [unit/mm].
-        per_base_joint: per base joint, machine axes, shape (n, 6, 3) [unit/mm].
-        per_platform_joint: per platform joint, platform axes, shape (n, 6, 3) [unit/mm].
-        per_tool_ball: per shift of tool tip and ball against the platform, platform axes, shape (n, 3) [unit/mm].
+        per_parameter: per strut length, then per coordinate x, y, z of each base joint in machine axes, shape
+            (n, 24) [unit/mm].
+        direction: how the quantity answers to a shift of the tool ball, machine axes, shape (n, 3) [unit/mm].
+        rotation: of the platform, shape (n, 3, 3).
     """
 
-    per_strut: NDArray[np.float64]
-    per_base_joint: NDArray[np.float64]
-    per_platform_joint: NDArray[np.float64]
-    per_tool_ball: NDArray[np.float64]
+    per_parameter: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+
+    @property
+    def per_strut(self) -> NDArray[np.float64]:
+        """Per strut length, shape (n, 6) [unit/mm]."""
+        return self.per_parameter[:, :STRUTS]
+
+    @property
+    def per_base_joint(self) -> NDArray[np.float64]:
+        """Per base joint, machine axes, shape (n, 6, 3) [unit/mm]."""
+        return self.per_parameter[:, STRUTS:].reshape(-1, STRUTS, 3)
+
+    @property
+    def per_platform_joint(self) -> NDArray[np.float64]:
+        """Per platform joint, platform axes, shape (n, 6, 3) [unit/mm]: a shift dP acts as -R dP on the base."""
+        return -self.per_base_joint @ self.rotation
+
+    @property
+    def per_tool_ball(self) -> NDArray[np.float64]:
+        """Per shift of tool tip and ball against the platform, platform axes, shape (n, 3) [unit/mm]."""
+        turned: NDArray[np.float64] = np.einsum("nji,nj->ni", self.rotation, self.direction)
+        return turned
 
 
 @dataclass(frozen=True)
@@ -164,54 +205,48 @@ def bar_sensitivity(
     """
     count = len(frames)
     tool = np.zeros(3) if tool_ball_mm is None else tool_ball_mm
-    lever = np.einsum("nij,...j->ni", frames.rotation, tool) if tool.ndim == 1 else _turned(frames.rotation, tool)
-    span = frames.position_mm + lever - fixed_ball_mm
-    length = np.linalg.norm(span, axis=1)
-    direction = span / length[:, None]
-    moment = np.cross(lever, direction)
-    struts = inverse(hexapod, frames)
-    gain = np.empty((count, STRUTS))
+    length, direction = np.empty(count), np.empty((count, 3))
+    gain = np.empty((count, PARAMETERS))
     outcome = np.empty(count, dtype=np.int64)
+    base, platform = _joints(hexapod, count)
+    fixed_ball, tool_ball = _balls(fixed_ball_mm, count), _balls(tool, count)
 
     def block(start: int, stop: int) -> None:
-        kernels.adjoint(start, stop, struts.unit, struts.arm_mm, direction, moment, gain, outcome)
+        kernels.bar(
+            start,
+            stop,
+            frames.position_mm,
+            frames.rotation,
+            base,
+            platform,
+            fixed_ball,
+            tool_ball,
+            length,
+            direction,
+            gain,
+            outcome,
+        )
 
     in_blocks(block, count)
-    if (outcome != kernels.CONVERGED).any():
-        where = int(np.argmax(outcome != kernels.CONVERGED))
-        _refuse(where, frames, hexapod, struts.length_mm, singular=True)
-    return BarSensitivity(length, direction, _response(gain, struts, frames, direction))
+    failed = outcome != kernels.CONVERGED
+    if failed.any():
+        _refuse(int(np.argmax(failed)), frames, hexapod, strut_lengths(hexapod, frames), singular=True)
+    return BarSensitivity(length, direction, Response(gain, direction, frames.rotation))
 
 
 def position_responses(hexapod: Hexapod, frames: Frames) -> tuple[Response, Response, Response]:
     """How X, Y and Z of the tool tip answer to the machine's errors, at the poses `frames`."""
     struts = inverse(hexapod, frames)
     pose_per_strut = np.asarray(np.linalg.inv(strut_jacobian(struts)), dtype=np.float64)
-    x, y, z = (
-        _response(pose_per_strut[:, k, :], struts, frames, np.broadcast_to(np.eye(3)[k], (len(frames), 3)))
-        for k in range(3)
-    )
-    return x, y, z
+    count = len(frames)
 
+    def response(axis: int) -> Response:
+        gain = pose_per_strut[:, axis, :]
+        per_base = (gain[:, :, None] * struts.unit).reshape(count, -1)
+        along = np.broadcast_to(np.eye(3)[axis], (count, 3))
+        return Response(np.hstack([gain, per_base]), along, frames.rotation)
 
-def _response(gain: NDArray[np.float64], struts: Struts, frames: Frames, direction: NDArray[np.float64]) -> Response:
-    """Response of a quantity that strut errors change by `gain`, shape (n, 6), and the tool ball along `direction`.
-
-    A shift dQ of a base joint acts as a strut error u dQ, one of a platform joint as -u R dP.
-    """
-    per_base = gain[:, :, None] * struts.unit
-    return Response(
-        per_strut=gain,
-        per_base_joint=per_base,
-        per_platform_joint=-per_base @ frames.rotation,
-        per_tool_ball=_turned(np.swapaxes(frames.rotation, 1, 2), direction),
-    )
-
-
-def _turned(rotation: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Each vector, shape (n, 3), turned by its own matrix, shape (n, 3, 3)."""
-    turned: NDArray[np.float64] = np.einsum("nij,nj->ni", rotation, vector)
-    return turned
+    return response(0), response(1), response(2)
 
 
 def _joints(hexapod: Hexapod, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -224,6 +259,14 @@ def _joints(hexapod: Hexapod, count: int) -> tuple[NDArray[np.float64], NDArray[
         if joints.shape not in {(1, STRUTS, 3), (count, STRUTS, 3)}:
             raise ValueError(f"joints of shape {joints.shape} do not fit {count} poses")
     return base, platform
+
+
+def _balls(centre_mm: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Ball centres as the kernels take them: shape (1, 3) or (n, 3), contiguous."""
+    balls = np.ascontiguousarray(np.atleast_2d(centre_mm), dtype=np.float64)
+    if balls.shape not in {(1, 3), (count, 3)}:
+        raise ValueError(f"ball centres of shape {balls.shape} do not fit {count} poses")
+    return balls
 
 
 def _refuse(

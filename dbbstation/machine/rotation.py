@@ -47,15 +47,23 @@ class Frames:
 
 def rotation_matrices(tilt_deg: NDArray[np.float64], convention: Rotation) -> NDArray[np.float64]:
     """Rotation matrices, shape (n, 3, 3), of the angles A, B, C, shape (n, 3) [deg]."""
-    a, b, c = np.radians(tilt_deg.T)
-    zero, one = np.zeros_like(a), np.ones_like(a)
-    about_x = np.array([[one, zero, zero], [zero, np.cos(a), -np.sin(a)], [zero, np.sin(a), np.cos(a)]])
-    about_y = np.array([[np.cos(b), zero, np.sin(b)], [zero, one, zero], [-np.sin(b), zero, np.cos(b)]])
-    about_z = np.array([[np.cos(c), -np.sin(c), zero], [np.sin(c), np.cos(c), zero], [zero, zero, one]])
-    factors = [np.moveaxis(factor, -1, 0) for factor in (about_x, about_y, about_z)]
-    if convention is Rotation.ZYX:
-        factors.reverse()
-    return np.ascontiguousarray(factors[0] @ factors[1] @ factors[2])
+    # Rz(C) Ry(B) Rx(A) is the transpose of Rx(-A) Ry(-B) Rz(-C), so one product serves both conventions.
+    sign = 1.0 if convention is Rotation.XYZ else -1.0
+    tilt = np.radians(tilt_deg)
+    cos_a, cos_b, cos_c = np.cos(tilt).T
+    sin_a, sin_b, sin_c = sign * np.sin(tilt).T
+    matrix = np.empty((len(tilt), 3, 3))
+    product = matrix if convention is Rotation.XYZ else np.swapaxes(matrix, 1, 2)
+    product[:, 0, 0] = cos_b * cos_c
+    product[:, 0, 1] = -cos_b * sin_c
+    product[:, 0, 2] = sin_b
+    product[:, 1, 0] = cos_a * sin_c + sin_a * sin_b * cos_c
+    product[:, 1, 1] = cos_a * cos_c - sin_a * sin_b * sin_c
+    product[:, 1, 2] = -sin_a * cos_b
+    product[:, 2, 0] = sin_a * sin_c - cos_a * sin_b * cos_c
+    product[:, 2, 1] = sin_a * cos_c + cos_a * sin_b * sin_c
+    product[:, 2, 2] = cos_a * cos_b
+    return matrix
 
 
 def tilt_angles(rotation: NDArray[np.float64], convention: Rotation) -> NDArray[np.float64]:

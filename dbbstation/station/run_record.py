@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import TraceError
-from dbbstation.station.detector import CORNER_DWELL_S, DWELL_BEHIND_S, live_phi_deg
+from dbbstation.station.detector import DWELL_BEHIND_S, live_phi_deg
 from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
 from dbbstation.trace.cut import cut
@@ -79,7 +79,7 @@ class RunRecord:
     def left(self, t_s: float) -> bool:
         """Whether at a time since the first sample enough lies behind the feed-out."""
         rest_s = self.circle.feed_in_mm / 2.0 / (self.circle.feed_mm_min / 60.0)
-        return self.fed_out_s is not None and t_s >= self.fed_out_s + rest_s + DWELL_BEHIND_S + CORNER_DWELL_S
+        return self.fed_out_s is not None and t_s >= self.fed_out_s + rest_s + DWELL_BEHIND_S
 
     def circle_figures(self) -> tuple[CircleFigures | None, str]:
         """Return the figures of the circle, or None and why there is none."""

@@ -1,0 +1,138 @@
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dbbstation.errors import InstrumentError, OutputError
+from dbbstation.files.machine_file import read_machine
+from dbbstation.files.plan_file import read_inline_plan, read_plan
+from dbbstation.files.run_csv import read_run
+from dbbstation.files.session import read_session
+from dbbstation.plan.circle import Direction
+from dbbstation.station import events
+from dbbstation.station.assembly import Job, assemble
+from dbbstation.station.commands import Accept, Quit, Repeat, Skip, Start
+from dbbstation.station.engine import Station
+from dbbstation.station.schedule import Schedule
+from dbbstation.station.sequencer import Sequencer
+from dbbstation.station.states import State
+from tests.station.bench import MACHINE_FILE
+from tests.station.readings import run_readings
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from dbbstation.errors import StationError
+    from dbbstation.instrument.reading import Reading
+
+
+class Script:
+    """An instrument that brings a list of readings, then nothing, or an error."""
+
+    def __init__(self, readings: Sequence[Reading] = (), error: StationError | None = None) -> None:
+        self.readings = list(readings)
+        self.error = error
+        self.armed = False
+
+    def drain(self) -> Sequence[Reading]:
+        if not self.armed:
+            return []
+        if not self.readings and self.error is not None:
+            raise self.error
+        now, self.readings = self.readings[:5], self.readings[5:]
+        return now
+
+    def __call__(self, event: events.Event) -> None:
+        if isinstance(event, events.StateChanged):
+            self.armed = event.state not in {State.BETWEEN, State.ANNOUNCED}
+
+
+def made(plan_file: Path, source: Script) -> Station:
+    plan = read_plan(plan_file)
+    return Station(Sequencer(plan, Schedule(plan, lambda *_: 1)), source)
+
+
+def test_commands_from_another_thread_wake_it(plan_file: Path) -> None:
+    station = made(plan_file, Script())
+    told: list[events.Event] = []
+    station.subscribe(told.append)
+    timers = [threading.Timer(0.05 * k, station.send, [command]) for k, command in enumerate([Skip(), Skip(), Quit()])]
+    for timer in timers:
+        timer.start()
+    assert station.run() is State.STOPPED
+    assert sum(isinstance(event, events.RunAnnounced) for event in told) == 3
+
+
+def test_an_instrument_that_fails_is_told_of_and_raised(plan_file: Path) -> None:
+    source = Script(error=InstrumentError("the line was closed", where="/dev/x"))
+    station = made(plan_file, source)
+    told: list[events.Event] = []
+    station.subscribe(source)
+    station.subscribe(told.append)
+    station.send(Start())
+    with pytest.raises(InstrumentError, match="line was closed"):
+        station.run()
+    assert any(isinstance(event, events.Fault) and event.error is source.error for event in told)
+    assert station.state is State.FAULTED
+
+
+def test_storage_that_fails_ends_the_sequence_and_the_screen_hears_of_it(plan_file: Path) -> None:
+    source = Script(run_readings(read_plan(plan_file).tests["a"].circle))
+    station = made(plan_file, source)
+    told: list[events.Event] = []
+
+    def full(event: events.Event) -> None:
+        if isinstance(event, events.RunStarted):
+            raise OutputError("no space left", where="/disk")
+        if isinstance(event, events.Fault):
+            raise OutputError("still no space")
+
+    for observer in (full, source, told.append):
+        station.subscribe(observer)
+    station.send(Start())
+    with pytest.raises(OutputError, match="no space left") as caught:
+        station.run()
+    assert caught.value.__notes__ == ["still no space"]
+    assert isinstance(told[-2], events.Fault)
+    assert told[-1] == events.StateChanged(State.FAULTED, frozenset())
+
+
+def test_what_is_stored_is_what_was_read(plan_file: Path, tmp_path: Path) -> None:
+    plan = read_inline_plan(plan_file)
+    circle = plan.to_domain().tests["a"].circle
+    source = Script(run_readings(circle, 1000.0) + run_readings(circle, 1100.0))
+    job = Job(read_machine(MACHINE_FILE), plan, tmp_path / "session")
+    workplace = assemble(job, source)
+    station = workplace.station
+    told: list[events.Event] = []
+    for observer in (source, told.append):
+        station.subscribe(observer)
+
+    def judge(event: events.Event) -> None:
+        if isinstance(event, events.StateChanged) and event.state is State.COMPLETE:
+            repeats = sum(isinstance(each, events.RunCompleted) for each in told)
+            station.send(Repeat("a bump") if repeats == 1 else Accept())
+        elif isinstance(event, events.RunAnnounced):
+            station.send(Quit() if event.run.direction is Direction.CW else Start())
+
+    station.subscribe(judge)
+    assert station.run() is State.STOPPED
+    workplace.close()
+    session = read_session(tmp_path / "session")
+    assert [(run.label, run.state.value, run.reason, run.mounting) for run in session.runs] == [
+        ("a ccw 1", "rejected", "a bump", 1),
+        ("a ccw 2", "accepted", "", 1),
+    ]
+    for run in session.runs:
+        stored = read_run(run.path).recording
+        seen = [
+            sample
+            for event in told
+            if isinstance(event, events.SamplesRecorded) and event.run.repeat == run.repeat
+            for sample in event.samples
+        ]
+        assert stored.t_s.tolist() == pytest.approx([sample.t_s for sample in seen], abs=1e-6)
+        assert stored.length_mm.tolist() == pytest.approx([sample.length_mm for sample in seen], abs=1e-6)

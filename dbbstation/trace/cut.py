@@ -20,8 +20,11 @@ if TYPE_CHECKING:
 LARGEST_GAP_DEG = 10.0
 """A wider stretch without a sample is not a full circle any more."""
 
+SHORTEST_TURN = 0.3
+"""A trace that is shorter than a turn by more than this share holds no turn at any feed that was meant."""
+
 FEED_SEARCH = 0.2
-"""The feed that a trace shows is looked for within this share of the programmed one."""
+"""Share of the overshoot arc by which the two passes of the overlap may be shifted against each other."""
 
 FEED_TOLERANCE = 2e-3
 """Share of the feed that a recording may be off; one per thousand costs 0.3 µm at 100 µm of error per radian, and
@@ -62,18 +65,21 @@ def cut(recording: Recording, circle: Circle) -> RawCircle:
     """
     if recording.theta_deg is not None:
         return _selected(recording, circle, circle.phi_deg(recording.theta_deg), np.ones(len(recording), dtype=bool))
-    middle = _middle(recording, circle)
-    phi = FULL_TURN_DEG / 2.0 + (recording.t_s - middle) * circle.turning_deg_s
-    _check_feed(recording, circle, middle)
+    edges = edges_of(recording, circle)
+    phi = FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
+    _check_feed(recording, circle, edges)
     return _selected(recording, circle, phi, (phi >= 0.0) & (phi < FULL_TURN_DEG))
 
 
-def _middle(recording: Recording, circle: Circle) -> float:
-    """Time midway between the edges of feed-in and feed-out [s].
+def edges_of(recording: Recording, circle: Circle) -> tuple[float, float]:
+    """Times of feed-in and feed-out [s].
 
     The edges lie at different angles, so the machine's own error there, a tenth of a millimetre or more, would move
     them by different amounts against one common threshold: by 0.02 degrees, which costs more than the noise of a
     whole run. Each edge is therefore taken halfway between the lengths on its two sides.
+
+    Raises:
+        TraceError: one of them is missing, or less than a turn lies between them.
     """
     threshold = circle.bar_mm + circle.feed_in_mm / 2.0
     inside = np.flatnonzero(recording.length_mm < threshold)
@@ -90,14 +96,14 @@ def _middle(recording: Recording, circle: Circle) -> float:
     backwards = recording.t_s[::-1], recording.length_mm[::-1]
     edge_out = _edge(*backwards, circle, len(recording) - 1 - int(inside[-1]))
     travelled = (edge_out - edge_in) * circle.turning_deg_s
-    if travelled < circle.swept_deg * (1.0 - FEED_SEARCH):
+    if travelled < FULL_TURN_DEG * (1.0 - SHORTEST_TURN):
         raise TraceError(
             f"only {travelled:.0f} of {circle.swept_deg:.0f} degrees lie between feed-in and feed-out at the programmed "
             f"feed of {circle.feed_mm_min:g} mm/min",
             where=recording.name,
             remedy="record the whole path, or correct feed and overshoot in the plan",
         )
-    return (edge_in + edge_out) / 2.0
+    return edge_in, edge_out
 
 
 def _edge(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle, first: int) -> float:
@@ -121,57 +127,81 @@ def _edge(t: NDArray[np.float64], length: NDArray[np.float64], circle: Circle, f
     return float(t[below - 1] + (t[below] - t[below - 1]) * share)
 
 
-def _check_feed(recording: Recording, circle: Circle, middle: float) -> None:
-    """Compare the feed with the one that the overlap shows: the same places are passed twice, a turn apart."""
-    found = overlap_feed(recording, circle, middle)
-    if found is None:
+def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> None:
+    """Compare the feed with the ones that duration and overlap show.
+
+    Dwelling at corners makes a trace longer, nothing makes it shorter; and the overlap passes the same places twice.
+    """
+    duration = edges[1] - edges[0]
+    at_least = circle.feed_mm_min * circle.swept_deg / circle.turning_deg_s / duration
+    found = overlap_feed(recording, circle, edges)
+    if found is None and at_least > (1.0 + FEED_TOLERANCE) * circle.feed_mm_min:
+        shown = f"its {duration:.2f} s between feed-in and feed-out need a feed of {at_least:.1f} mm/min or more"
+    elif found is not None and abs(found[0] - circle.feed_mm_min) > max(
+        FEED_TOLERANCE * circle.feed_mm_min, FEED_SIGMAS * found[1]
+    ):
+        shown = f"the overlap shows a feed of {found[0]:.1f} ± {found[1]:.1f} mm/min"
+    else:
         return
-    feed, uncertainty = found
-    off = abs(feed - circle.feed_mm_min)
-    if off > max(FEED_TOLERANCE * circle.feed_mm_min, FEED_SIGMAS * uncertainty):
-        raise TraceError(
-            f"the overlap shows a feed of {feed:.1f} ± {uncertainty:.1f} mm/min, the plan says {circle.feed_mm_min:g}",
-            where=recording.name,
-            remedy="set the feed of this test in the plan to the one that was run",
-        )
+    raise TraceError(
+        f"{shown}, the plan says {circle.feed_mm_min:g}",
+        where=recording.name,
+        remedy="set the feed of this test in the plan to the one that was run",
+    )
 
 
-def overlap_feed(recording: Recording, circle: Circle, middle: float) -> tuple[float, float] | None:
+def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float] | None:
     """Feed and its standard deviation [mm/min] that make both passes of the overlap agree.
 
-    Where the second pass comes a time T after the first, their difference is offset + slope (T - turn): a regression
-    on the slope of the common shape gives what T is off by, and its uncertainty; a few rounds settle it.
+    Looked for about the programmed feed and about the one that the trace's duration suggests; the better match counts.
 
     Returns:
         None where the overlap cannot tell: too few samples, or a trace too round to show a shift.
     """
     turn_s = FULL_TURN_DEG / circle.turning_deg_s
-    half_s = circle.overshoot_deg / circle.turning_deg_s
+    by_duration_s = (edges[1] - edges[0]) * FULL_TURN_DEG / circle.swept_deg
+    middle = (edges[0] + edges[1]) / 2.0
+    matches = [
+        match for start in (turn_s, by_duration_s) if (match := _match(recording, circle, middle, start)) is not None
+    ]
+    if not matches:
+        return None
+    turn, sigma_s, _ = min(matches, key=lambda match: match[2])
+    if sigma_s > TELLING * turn:
+        return None
+    feed = circle.feed_mm_min * turn_s / turn
+    return feed, feed * sigma_s / turn
+
+
+def _match(recording: Recording, circle: Circle, middle: float, start_s: float) -> tuple[float, float, float] | None:
+    """Duration of a turn near `start_s` at which both passes agree, its standard deviation [s] and what is left [mm].
+
+    Where the second pass comes a time T after the first, their difference is offset + slope (T - turn): a regression
+    on the slope of the common shape gives what T is off by, and its uncertainty; a few rounds settle it.
+    """
+    half_s = circle.overshoot_deg / FULL_TURN_DEG * start_s
     t, length = recording.t_s - middle, recording.length_mm
     # The first pass lies about half a turn before the middle; a wrong feed moves it, so its inner part is used.
-    rows = np.abs(t + turn_s / 2.0) < half_s * (1.0 - FEED_SEARCH)
+    rows = np.abs(t + start_s / 2.0) < half_s * (1.0 - FEED_SEARCH)
     when, first = t[rows], length[rows]
     if len(when) < PIECES:
         return None
     piece = np.arange(len(when)) * PIECES // len(when)
-    turn = turn_s
+    turn = start_s
     for _ in range(ROUNDS):
         second = np.interp(when + turn, t, length)
         shape = np.polynomial.Polynomial.fit(when, (first + second) / 2.0, SHAPE_ORDER)
         slope = means(shape.deriv()(when), piece)
         columns = np.column_stack([np.ones(PIECES), slope])
         difference = means(second - first, piece)
-        (_, late), *_ = np.linalg.lstsq(columns, difference, rcond=None)
+        (offset, late), *_ = np.linalg.lstsq(columns, difference, rcond=None)
         turn -= float(late)
-        if abs(turn - turn_s) > FEED_SEARCH * half_s:
+        if abs(turn - start_s) > FEED_SEARCH * half_s:
             return None
-    left = difference - columns @ np.linalg.lstsq(columns, difference, rcond=None)[0]
-    spread = np.sum((slope - slope.mean()) ** 2)
-    sigma_s = float(np.sqrt(left @ left / (PIECES - 2) / spread)) if spread > 0.0 else np.inf
-    if sigma_s > TELLING * turn_s:
-        return None
-    feed = circle.feed_mm_min * turn_s / turn
-    return feed, feed * sigma_s / turn
+    left = difference - columns @ np.array([offset, late])
+    spread = float(np.sum((slope - slope.mean()) ** 2))
+    remaining = float(np.sqrt(left @ left / (PIECES - 2)))
+    return turn, (remaining / np.sqrt(spread) if spread > 0.0 else np.inf), remaining
 
 
 def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64], rows: NDArray[np.bool_]) -> RawCircle:

@@ -33,7 +33,7 @@ def study(name: str, *, seed: int, figure: Path | None, force: bool, as_json: bo
     from dbbstation.files.machine_file import read_machine
     from dbbstation.files.plan_file import read_plan
     from dbbstation.files.shipped import shipped_folder
-    from dbbstation.report.concealed import concealed_figure
+    from dbbstation.studies.concealed_figure import concealed_figure
     from dbbstation.studies.concealed_gravity import concealed_gravity
 
     del name  # there is one; click has checked it

@@ -6,7 +6,7 @@ import pytest
 
 from dbbstation.files.plan_file import read_plan
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.report.concealed import concealed_figure
+from dbbstation.studies.concealed_figure import concealed_figure
 from dbbstation.studies.concealed_gravity import concealed_gravity
 
 

@@ -1,1 +1,0 @@
-"""Figures and reports: pictures where people would rather look than read."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.kinematics import forward, inverse
+from dbbstation.machine.kinematics import forward, strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel, actual_hexapod
 
@@ -51,7 +51,7 @@ def compensated(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
         if effect.tool_tip_mm is not None:
             tip = np.broadcast_to(effect.tool_tip_mm, (len(target), 3))
             platform = replace(target, position_mm=target.position_mm - np.einsum("nij,nj->ni", target.rotation, tip))
-        needed = inverse(actual_hexapod(nominal, effect), platform).length_mm
+        needed = strut_lengths(actual_hexapod(nominal, effect), platform)
         strut = 0.0 if effect.strut_mm is None else effect.strut_mm
         driven = needed - strut + model.machine.reference_length_error_mm
         change = float(np.abs(driven - last).max())

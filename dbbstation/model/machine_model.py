@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import BarSensitivity, Response, bar_sensitivity, forward, inverse
+from dbbstation.machine.kinematics import BarSensitivity, Response, bar_sensitivity, forward, strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, Fitted, Motion, Owner
 
@@ -50,7 +50,7 @@ class MachineModel:
 
     def driven_mm(self, frames: Frames) -> NDArray[np.float64]:
         """Strut lengths that the controller drives to for commanded poses, shape (n, 6) [mm]."""
-        return inverse(self.machine.hexapod, frames).length_mm - self.machine.reference_length_error_mm
+        return strut_lengths(self.machine.hexapod, frames) - self.machine.reference_length_error_mm
 
     def actual(self, motion: Motion) -> Actual:
         """Where the platform really goes: F^-1(driven + strut errors; actual joints) [CAL eq 2].
@@ -128,16 +128,15 @@ class BarReading:
 
 def by_parameters(derivative: Effect, response: Response, kept: slice) -> NDArray[np.float64] | float:
     """Derivative of any quantity by p parameters through struts, joints and tool, shape (n, p); 0.0 where none."""
-    channels = (
-        (derivative.strut_mm, response.per_strut, 1),
-        (derivative.base_joint_mm, response.per_base_joint, 2),
-        (derivative.platform_joint_mm, response.per_platform_joint, 2),
-        (derivative.tool_tip_mm, response.per_tool_ball, 1),
-    )
     total: NDArray[np.float64] | float = 0.0
-    for array, gain, axes in channels:
-        if array is not None:
-            total = total + _contract(gain[kept], _rows(array, axes, kept), axes)
+    if derivative.strut_mm is not None:
+        total = total + _contract(response.per_strut[kept], _rows(derivative.strut_mm, 1, kept), 1)
+    if derivative.base_joint_mm is not None:
+        total = total + _contract(response.per_base_joint[kept], _rows(derivative.base_joint_mm, 2, kept), 2)
+    if derivative.platform_joint_mm is not None:
+        total = total + _contract(response.per_platform_joint[kept], _rows(derivative.platform_joint_mm, 2, kept), 2)
+    if derivative.tool_tip_mm is not None:
+        total = total + _contract(response.per_tool_ball[kept], _rows(derivative.tool_tip_mm, 1, kept), 1)
     return total
 
 
@@ -151,7 +150,10 @@ def _contract(gain: NDArray[np.float64], array: NDArray[np.float64], axes: int) 
     count, parameters = len(gain), array.shape[-1]
     flat = gain.reshape(count, -1)
     if array.ndim == axes + 1:
-        return flat @ array.reshape(-1, parameters)
+        matrix = array.reshape(-1, parameters)
+        if np.array_equal(matrix, np.eye(parameters)):  # joints and struts: each coordinate its own parameter
+            return flat
+        return flat @ matrix
     per_sample: NDArray[np.float64] = np.einsum("ni,nip->np", flat, array.reshape(count, -1, parameters))
     return per_sample
 

@@ -120,3 +120,21 @@ def test_noise_of_a_first_order_process(rng, phi):
     noise = noise_of(runs, 0.0)
     assert noise.sigma == pytest.approx(1 / np.sqrt(1 - phi**2), rel=0.05)
     assert noise.correlation_samples == pytest.approx((1 + phi) / (1 - phi), rel=0.15)
+
+
+def test_long_runs_are_compressed_slab_by_slab_to_the_same_triangle(rng):
+    jacobian, target = rng.normal(size=(5000, 7)), rng.normal(size=5000)
+    jacobian[:, 6] = jacobian[:, 5] + 1e-9 * rng.normal(size=5000)  # a condition that squaring would lose
+    block = compress(np.arange(7), jacobian, target)
+    whole = np.linalg.qr(np.column_stack([jacobian, target]), mode="r")
+    assert np.allclose(np.abs(block.triangle), np.abs(whole[:, :-1]), atol=1e-12)
+    assert abs(block.triangle[6, 6]) == pytest.approx(1e-9 * np.sqrt(5000), rel=0.1)
+    assert np.allclose(np.abs(block.target), np.abs(whole[:, -1]), atol=1e-5)  # that is how well 1e-9 is a number
+
+
+@pytest.mark.parametrize("count", [3, 20, 4000])
+def test_what_is_no_number_is_refused(rng, count):
+    jacobian, target = rng.normal(size=(count, 2)), np.zeros(count)
+    jacobian[count // 2, 0] = np.nan
+    with pytest.raises(ValueError, match="must be numbers"):
+        compress(np.arange(2), jacobian, target)

@@ -38,6 +38,9 @@ TELLING = 1e-3
 """Share of the feed that an overlap must determine it to, one standard deviation, to be asked at all: a compensated
 circle has hardly any shape left, and what is left of it would say any feed."""
 
+SMALLEST_SHAPE_MM = 1e-4
+"""Shape of the overlap below which there is none: finer than any bar resolves [mm]."""
+
 PIECES = 24
 """Stretches of the overlap that are compared; what differs within one counts as one."""
 
@@ -187,6 +190,8 @@ def _match(recording: Recording, circle: Circle, middle: float, start_s: float) 
     if len(when) < PIECES:
         return None
     piece = np.arange(len(when)) * PIECES // len(when)
+    if np.std(means(first, piece)) < SMALLEST_SHAPE_MM:
+        return None
     turn = start_s
     for _ in range(ROUNDS):
         second = np.interp(when + turn, t, length)

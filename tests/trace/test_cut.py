@@ -74,6 +74,13 @@ def test_a_perfect_circle_cannot_tell_its_feed_and_is_not_refused():
     assert len(cut(flat, CIRCLE)) > 5000
 
 
+def test_a_circle_without_any_error_has_any_feed():
+    recording = trace()
+    inside = recording.length_mm < 150.7
+    exact = replace(recording, length_mm=np.where(inside, 150 + 1e-7 * np.sin(recording.t_s), recording.length_mm))
+    assert len(cut(exact, CIRCLE)) > 5000
+
+
 def test_a_compensated_circle_with_little_shape_is_not_refused():
     """Half a micrometre that comes and goes with friction: both passes differ by as much as they show."""
     recording = trace()

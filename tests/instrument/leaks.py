@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _FDS = Path("/proc/self/fd")
-_FOR_GOOD = "kernel"
+_FOR_GOOD = ("kernel", "dbbstation-kernel")
 """Threads of the numerical kernels: started once in a process, when one is first needed."""
 
 

@@ -44,21 +44,24 @@ class CovarianceSchema(Schema):
 
 
 class ModelFile(Schema):
-    """The nominal machine, what is different on the real one, and how well that is known."""
+    """The nominal machine, what is different on the real one, and how well that is known.
+
+    Every key is required, empty where there is nothing to say, so that a file that was cut short is noticed.
+    """
 
     format: Literal["dbb-model/1"]
     """Name and version of this format."""
     machine: MachineParts
     """The nominal machine, as in a `dbb-machine/1` file."""
-    sources: tuple[SourceSchema, ...] = ()
+    sources: tuple[SourceSchema, ...]
     """What belongs to the machine: predicted, simulated and compensated."""
-    measurement_effects: tuple[EffectSchema, ...] = ()
+    measurement_effects: tuple[EffectSchema, ...]
     """What belongs to session, mounting or instrument: reported, never compensated."""
     covariance: CovarianceSchema
     """Uncertainty of the parameters."""
-    directions_lost: tuple[str, ...] = ()
+    directions_lost: tuple[str, ...]
     """What the recordings could not see, in words; held at nominal."""
-    report: dict[str, Any] = Field(default_factory=dict)
+    report: dict[str, Any]
     """What the fit reported, by name."""
-    sessions: dict[str, Sha256Hex] = Field(default_factory=dict)
+    sessions: dict[str, Sha256Hex]
     """SHA-256 of each session file that the model comes from, by folder name."""

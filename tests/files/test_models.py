@@ -140,6 +140,18 @@ def test_tampering_is_refused(tmp_path: Path, reference, old: str, new: str, sai
     assert all(problem.line for problem in caught.value.problems)
 
 
+def test_a_file_that_was_cut_short_is_refused(tmp_path: Path, reference) -> None:
+    """After whatever line it ends: what the fit could not see must not be lost without a word."""
+    path = tmp_path / "model.yaml"
+    write_model(path, drawn(reference, 3))
+    lines = path.read_text().splitlines(keepends=True)
+    tail = next(i for i, line in enumerate(lines) if line.startswith("covariance"))
+    for end in range(tail, len(lines)):
+        path.write_text("".join(lines[:end]))
+        with pytest.raises(InputError):
+            read_model(path, KNOWN)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

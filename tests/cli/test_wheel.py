@@ -1,4 +1,4 @@
-"""The wheel works without the checkout: its protocols and machines come along, recordings from elsewhere do not."""
+"""The wheel works without the checkout: its protocols and machines come along, recordings do not."""
 
 from __future__ import annotations
 
@@ -70,6 +70,7 @@ def test_what_is_in_it(wheel):
     assert any(name.endswith("licenses/LICENSE") for name in names)
     assert [name for name in names if name.startswith(("tests/", "docs/", "protocols/", "fixtures/"))] == []
     assert [name for name in names if name.endswith((".nbi", ".nbc", ".pyc"))] == []
+    assert [name for name in names if "/sessions/" in name] == []
     assert wheel.stat().st_size < LARGEST_MB * 1e6
 
 
@@ -89,7 +90,7 @@ def test_it_knows_its_instruments(installed, tmp_path):
 
 
 def test_it_calibrates(installed, tmp_path):
-    small = shipped(installed, tmp_path, "fixtures") / "sessions" / "small"
+    small = CHECKOUT / "fixtures" / "sessions" / "small"
     done = run(installed, tmp_path, "dbbstation", "calibrate", small, "--out", "model.yaml")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "model.yaml").exists()

@@ -34,6 +34,7 @@ def test_from_a_wheel(tmp_path: Path) -> None:
         size = sum(entry.file_size for entry in archive.infolist() if "/fixtures/" in entry.filename)
     assert {name.split("/")[0] for name in names} == {"dbbstation", wheel.name.rsplit("-", 3)[0] + ".dist-info"}
     assert not [name for name in names if name.endswith((".nbi", ".nbc"))]
+    assert not [name for name in names if "/sessions/" in name]
     assert size < 500_000
     program = (
         "from dbbstation.files.shipped import shipped_folder\nfrom dbbstation.files.plan_file import read_plan\n"

@@ -52,10 +52,18 @@ def read_poses(path: Path) -> PoseTable:
     missing = [name for name in POSE_COLUMNS if name not in names]
     if missing:
         remedy = f"the first line must name {', '.join(POSE_COLUMNS)}"
+        if any(";" in name or "\t" in name for name in names):
+            remedy += "; commas stand between columns, the decimal sign is a dot"
         raise InputError([Problem(str(path), 1, 1, f"no column {', '.join(missing)}", remedy)])
     rows: list[list[float]] = []
     others: dict[str, list[str]] = {name: [] for name in names if name not in POSE_COLUMNS}
     for row in reader:
+        cells_given = [row[name] for name in names if row[name] is not None] + row.get(None, [])
+        if len(cells_given) != len(names):
+            what = f"{len(cells_given)} values in {len(names)} columns"
+            remedy = "compare the line with the header; the decimal sign is a dot, a comma ends a value"
+            faults.append(Problem(str(path), reader.line_num, 0, what, remedy))
+            continue
         rows.append([_number(row[name], name, path, reader.line_num, faults) for name in POSE_COLUMNS])
         for name, cells in others.items():
             cells.append(row[name] or "")
@@ -72,7 +80,9 @@ def _number(cell: str | None, name: str, path: Path, line: int, faults: list[Pro
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        faults.append(Problem(str(path), line, 0, f"{name} is {cell!r}, not a number", "correct or remove the line"))
+        comma = "," in (cell or "")
+        remedy = "the decimal sign is a dot" if comma else "correct or remove the line"
+        faults.append(Problem(str(path), line, 0, f"{name} is {cell!r}, not a number", remedy))
     return value
 
 

@@ -142,7 +142,10 @@ def fault_of_line(row: bytes, names: tuple[str, ...]) -> tuple[str, str] | None:
         if int(stated, 16) != zlib.crc32(body):
             return "the checksum does not match the line", "the line was damaged, restore the file"
     if len(fields) != len(names):
-        return f"{len(fields)} values in {len(names)} columns", "compare the line with the header"
+        return (
+            f"{len(fields)} values in {len(names)} columns",
+            "compare the line with the header; the decimal sign is a dot",
+        )
     return _fault_of_fields(fields, names)
 
 

@@ -47,11 +47,12 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
         exclude: names of tests to leave out.
 
     Raises:
-        InputError: every fault of every file and trace; sessions of different machines; no accepted run; an
-            excluded test that no session has.
+        InputError: every fault of every file and trace; a session that is given twice; sessions of different
+            machines; no accepted run; an excluded test that no session has.
     """
     sessions = _unique_names([read_session(path) for path in paths])
     _check_one_machine(sessions)
+    _check_no_copies(sessions)
     _check_excluded(sessions, exclude)
     observations: list[Observation] = []
     warnings: list[str] = []
@@ -99,6 +100,16 @@ def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:
         else session
         for k, session in enumerate(sessions)
     ]
+
+
+def _check_no_copies(sessions: Sequence[SessionFolder]) -> None:
+    """Refuse a session and its copy: they would count as two measurements, and uncertainties come out too small."""
+    first: dict[str, SessionFolder] = {}
+    for session in sessions:
+        other = first.setdefault(session.sha256, session)
+        if other is not session:
+            what = f"this is the same session as {other.folder}"
+            raise InputError([Problem(str(session.folder), 0, 0, what, "give every session once")])
 
 
 def _check_one_machine(sessions: Sequence[SessionFolder]) -> None:

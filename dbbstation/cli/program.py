@@ -64,7 +64,7 @@ def program(
     """
     from dbbstation.cli.output import say
     from dbbstation.cli.programs import hashed, loaded_inverse, print_programs
-    from dbbstation.files.atomic import refuse_existing, write_folder
+    from dbbstation.files.atomic import write_folder
     from dbbstation.files.machine_file import read_machine
     from dbbstation.files.plan_file import read_plan
     from dbbstation.nc.circle_program import Approach
@@ -84,8 +84,6 @@ def program(
         step_deg=step_deg,
         approach=None if bar_stays_on else Approach(clearance_mm),
     )
-    for each in programs:
-        refuse_existing(out / each.name, force=force)
     write_folder(out, {each.name: each.text for each in programs}, force=force)
     print_programs([(out / each.name, each) for each in programs], written_in.name, model_file, as_json=as_json)
     if not as_json:

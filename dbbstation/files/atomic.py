@@ -74,17 +74,24 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool 
         return
     for name in files:
         if not name.endswith("/"):
-            refuse_existing(folder / name, force=force)
+            _refuse_overwriting(folder / name, force=force)
     with _told(folder):
         _replace_all(folder, files)
 
 
 def refuse_existing(path: Path, *, force: bool) -> None:
-    """Refuse to overwrite.
+    """Refuse to overwrite, and to work for a folder that is not there: asked before long work, not after it.
 
     Raises:
-        OutputError: the path exists and `force` is not given, or is a folder.
+        OutputError: the path exists and `force` is not given, or is a folder, or has no folder to go into.
     """
+    _refuse_overwriting(path, force=force)
+    if not path.parent.is_dir():
+        what = f"cannot be written: there is no folder {path.parent}"
+        raise OutputError(what, where=str(path), remedy="make the folder, or name another")
+
+
+def _refuse_overwriting(path: Path, *, force: bool) -> None:
     if path.is_dir():
         raise OutputError("this is a folder, a file cannot be written there", where=str(path), remedy="name a file")
     if path.exists() and not force:

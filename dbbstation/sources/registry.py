@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import pkgutil
 from functools import cache
@@ -40,6 +41,8 @@ def sources_named(names: Iterable[str]) -> tuple[ErrorSource, ...]:
     chosen = []
     for name in names:
         if name not in known:
-            raise ModelError(f"no error source is called {name!r}", remedy=f"known are {', '.join(known)}")
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+            remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+            raise ModelError(f"no error source is called {name!r}", remedy=remedy)
         chosen.append(known[name])
     return tuple(chosen)

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.errors import OutputError
 from dbbstation.files import atomic
-from dbbstation.files.atomic import write_bytes, write_folder, write_text
+from dbbstation.files.atomic import refuse_existing, write_bytes, write_folder, write_text
 
 
 def listing(folder: Path) -> list[str]:
@@ -40,7 +40,9 @@ def test_nothing_is_overwritten_unasked(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_missing_is_told(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="no such file or directory"):
+    with pytest.raises(OutputError, match=r"none/a: cannot be written: there is no folder"):
+        refuse_existing(tmp_path / "none" / "a", force=True)  # at once, before the work that would be lost
+    with pytest.raises(OutputError, match=r"none/a: cannot be written: there is no folder .*none; make the folder"):
         write_bytes(tmp_path / "none" / "a", b"")
 
 

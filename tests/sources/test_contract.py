@@ -97,5 +97,7 @@ def test_parameters_and_texts_are_complete(source, machine):
 
 
 def test_an_unknown_source_is_refused_with_those_that_exist():
-    with pytest.raises(ModelError, match=r"no error source is called 'gravitation'; known are .*gravity"):
+    with pytest.raises(ModelError, match=r"no error source is called 'wear'; known are .*gravity"):
+        sources_named(["wear"])
+    with pytest.raises(ModelError, match=r"no error source is called 'gravitation'; did you mean gravity\?"):
         sources_named(["gravitation"])

@@ -47,8 +47,8 @@ def read_poses(path: Path) -> PoseTable:
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)
-    reader = csv.DictReader(io.StringIO(text, newline=""), skipinitialspace=True)
-    names = list(reader.fieldnames or [])
+    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
+    names = next(reader, [])
     missing = [name for name in POSE_COLUMNS if name not in names]
     if missing:
         remedy = f"the first line must name {', '.join(POSE_COLUMNS)}"
@@ -57,16 +57,18 @@ def read_poses(path: Path) -> PoseTable:
         raise InputError([Problem(str(path), 1, 1, f"no column {', '.join(missing)}", remedy)])
     rows: list[list[float]] = []
     others: dict[str, list[str]] = {name: [] for name in names if name not in POSE_COLUMNS}
-    for row in reader:
-        cells_given = [row[name] for name in names if row[name] is not None] + row.get(None, [])
-        if len(cells_given) != len(names):
-            what = f"{len(cells_given)} values in {len(names)} columns"
+    for cells in reader:
+        if not cells:
+            continue
+        if len(cells) != len(names):
+            what = f"{len(cells)} values in {len(names)} columns"
             remedy = "compare the line with the header; the decimal sign is a dot, a comma ends a value"
             faults.append(Problem(str(path), reader.line_num, 0, what, remedy))
             continue
+        row = dict(zip(names, cells, strict=True))
         rows.append([_number(row[name], name, path, reader.line_num, faults) for name in POSE_COLUMNS])
-        for name, cells in others.items():
-            cells.append(row[name] or "")
+        for name, kept in others.items():
+            kept.append(row[name])
     if faults:
         raise InputError(faults[:MOST_FAULTS])
     if not rows:
@@ -74,14 +76,13 @@ def read_poses(path: Path) -> PoseTable:
     return PoseTable(np.array(rows), others)
 
 
-def _number(cell: str | None, name: str, path: Path, line: int, faults: list[Problem]) -> float:
+def _number(cell: str, name: str, path: Path, line: int, faults: list[Problem]) -> float:
     try:
-        value = float(cell or "")
+        value = float(cell)
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        comma = "," in (cell or "")
-        remedy = "the decimal sign is a dot" if comma else "correct or remove the line"
+        remedy = "the decimal sign is a dot" if "," in cell else "correct or remove the line"
         faults.append(Problem(str(path), line, 0, f"{name} is {cell!r}, not a number", remedy))
     return value
 

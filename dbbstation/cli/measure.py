@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.session_options import session_details, session_options
 
 if TYPE_CHECKING:
@@ -20,13 +21,6 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Direction
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.engine import Station
-
-_MEMORY_S = 2.0
-"""How long the driver remembers the quickest arrival of samples; longer, the instrument's clock would drift [s]."""
-
-_SCALED_MEMORY_S, _SCALED_TIMEOUT_S = 60.0, 5.0
-"""On scaled time a moment in which the computer attends to something else is long: the driver then remembers the quickest
-arrival of samples for this long, and waits this long for a line that is silent [s of real time]."""
 
 _AUTO_PATIENCE_S = 60.0
 """A virtual machine comes as soon as it has computed the run, or not at all [s of real time]."""
@@ -98,10 +92,7 @@ def measure(
     job.check(str(plan_file))
     hands = None if auto is None else VirtualHands(auto)
     protocol = at_rate(load_instrument(instrument), rate_hz)
-    scaled = time_scale != 1.0
-    memory_s = _SCALED_MEMORY_S * time_scale if scaled else _MEMORY_S
-    timeout_s = _SCALED_TIMEOUT_S if scaled else None
-    with Instrument(protocol, port, baud=baud, clock=clock, memory_s=memory_s, timeout_s=timeout_s) as source:
+    with Instrument(protocol, port, baud=baud, clock=clock, **driver_patience(time_scale)) as source:
         workplace = assemble(job, source)
         if workplace.writer.runs and job.details != SessionDetails():
             click.echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.session_options import session_details, session_options
 
 if TYPE_CHECKING:
@@ -103,7 +104,7 @@ def station(
                 virtual_place(machine, plan.to_domain(), protocol, time_scale=time_scale, seed=_DEMO_SEED)
             )
             job, port, helper = replace(job, clock=place.clock), place.port, place.helper
-        return _run(job, opener(job, protocol, str(port), baud=baud, helper=helper))
+        return _run(job, opener(job, protocol, str(port), baud=baud, helper=helper, time_scale=time_scale))
 
 
 def _check_options(
@@ -135,7 +136,13 @@ def _check_terminal() -> None:
 
 
 def opener(
-    job: Job, protocol: Protocol, port: str, *, baud: int | None = None, helper: Observer | None = None
+    job: Job,
+    protocol: Protocol,
+    port: str,
+    *,
+    baud: int | None = None,
+    helper: Observer | None = None,
+    time_scale: float = 1.0,
 ) -> Opener:
     """Return what opens instrument and session, each time anew.
 
@@ -145,6 +152,7 @@ def opener(
         port: where it is.
         baud: where it is not set to the usual rate.
         helper: told of everything after storage, before the screen.
+        time_scale: of the job's clock.
     """
     from dbbstation.instrument.driver import Instrument
     from dbbstation.station.assembly import assemble
@@ -152,7 +160,7 @@ def opener(
 
     @contextmanager
     def opened() -> Iterator[OpenStation]:
-        with Instrument(protocol, port, baud=baud, clock=job.clock) as source:
+        with Instrument(protocol, port, baud=baud, clock=job.clock, **driver_patience(time_scale)) as source:
             workplace = assemble(job, source)
             if helper is not None:
                 workplace.station.subscribe(helper)

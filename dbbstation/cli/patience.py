@@ -1,0 +1,26 @@
+"""How patient a driver is with the computer it runs on, in real and in scaled time."""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+_MEMORY_S = 2.0
+"""How long the driver remembers the quickest arrival of samples; longer, the instrument's clock would drift [s]."""
+
+_SCALED_MEMORY_S, _SCALED_TIMEOUT_S = 60.0, 5.0
+"""On scaled time a moment in which the computer attends to something else is long: the driver then remembers the quickest
+arrival of samples for this long, and waits this long for a line that is silent [s of real time]."""
+
+
+class DriverPatience(TypedDict):
+    """Arguments of `Instrument`."""
+
+    memory_s: float
+    timeout_s: float | None
+
+
+def driver_patience(time_scale: float) -> DriverPatience:
+    """Return what `Instrument` takes on a clock that runs `time_scale` times faster than real."""
+    if time_scale == 1.0:
+        return {"memory_s": _MEMORY_S, "timeout_s": None}
+    return {"memory_s": _SCALED_MEMORY_S * time_scale, "timeout_s": _SCALED_TIMEOUT_S}

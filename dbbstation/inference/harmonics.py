@@ -1,8 +1,10 @@
 """Residuals of whole periods in harmonics: how strong the noise is, and whether more than noise is left.
 
 Physics that a model lacks is smooth or stepped along a period and lives in the low harmonics; the noise of a channel
-reaches far beyond them. The level just above the low ones is therefore taken as the noise that smooth things feel,
-whatever its correlation, and never sees a smooth misfit.
+reaches far beyond them. A spectrum fitted to the harmonics above the low ones, continued downwards, is therefore the
+noise that smooth things feel, and never sees a smooth misfit. It is a floor and a first-order process,
+S(k) = a + b / (1 + (k / c)²) [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12], since neighbouring
+samples resemble each other and the low harmonics then hold more noise than the high ones.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import nnls
 from scipy.stats import f as f_distribution
 
 if TYPE_CHECKING:
@@ -21,8 +24,18 @@ if TYPE_CHECKING:
 LOW = 30
 """Highest harmonic that counts as smooth."""
 
-HIGH = 60
-"""Highest harmonic of the band that the noise is read from."""
+HIGH = 240
+"""Highest harmonic that noise is read from."""
+
+SAMPLES_PER_HARMONIC = 3
+"""Samples per period of the highest harmonic that is looked at, at the least."""
+
+CORNERS = np.geomspace(10.0, 240.0, 17)
+"""Corners c of the noise's spectrum that are tried: neighbours resemble each other over 6 degrees of the period at
+the most. What is correlated over more is structure that a model should name."""
+
+WORTH = 5.0
+"""Log likelihood that correlation must bring over white noise to be believed."""
 
 
 @dataclass(frozen=True)
@@ -31,15 +44,28 @@ class Misfit:
 
     Attributes:
         probability: of such a misfit or a larger one if only noise were left.
-        noise: standard deviation of one sample, as smooth things feel it.
+        noise: standard deviation of white noise that smooth things would feel as they feel this one, per sample.
         rms: of what is left beyond noise in the low harmonics; zero where less than noise is left.
-        ratio: low over high power, 1 for noise.
+        ratio: power in the low harmonics over what noise alone puts there, 1 for noise.
     """
 
     probability: float
     noise: float
     rms: float
     ratio: float
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Power of noise by harmonic, and how well it is known.
+
+    Attributes:
+        power: at harmonics 0, 1, ... LOW, that of one orthonormal coefficient, shape (LOW + 1,).
+        freedom: degrees of freedom that the mean of these would have as a mean of squares.
+    """
+
+    power: NDArray[np.float64]
+    freedom: float
 
 
 def coefficients(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.float64]:
@@ -50,7 +76,7 @@ def coefficients(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], 
     Args:
         residual: shape (n,), about equally spaced over the period.
         phase_rad: shape (n,), from 0 to 2 pi [rad].
-        highest: below a quarter of the samples.
+        highest: below half of the samples.
     """
     return (basis(phase_rad, highest).T @ residual) / np.sqrt(len(residual))
 
@@ -68,13 +94,19 @@ def smooth(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highes
     return np.asarray(columns @ fitted, dtype=np.float64)
 
 
+def bands(samples: int) -> tuple[int, int]:
+    """Highest smooth harmonic, and highest that noise is read from, for so many samples per period."""
+    high = min(HIGH, max(samples // SAMPLES_PER_HARMONIC, 2))
+    return min(LOW, max(high // 4, 1)), high
+
+
 def misfit(
     residuals: Sequence[NDArray[np.float64]],
     phases_rad: Sequence[NDArray[np.float64]],
     groups: Sequence[object],
     freedom_used: float,
 ) -> Misfit:
-    """Compare the low harmonics of residuals with the band above them by an F test.
+    """Compare the low harmonics of residuals with what noise puts there by an F test.
 
     The first harmonic of each group of runs is left out of it: a common shift there is an effect whose size is only
     roughly known, such as where a ball came to stand. Differences within a group count.
@@ -85,21 +117,86 @@ def misfit(
         groups: what each run shares its first harmonic with.
         freedom_used: degrees of freedom that the fit took out of the low harmonics beside those shifts.
     """
+    low, high = bands(min(len(residual) for residual in residuals))
     all_coefficients = np.array(
-        [coefficients(residual, phase, HIGH) for residual, phase in zip(residuals, phases_rad, strict=True)]
+        [coefficients(residual, phase, high) for residual, phase in zip(residuals, phases_rad, strict=True)]
     )
-    first = [1, HIGH + 1]
+    first = [1, high + 1]
     for group in set(groups):
         of_group = [k for k, g in enumerate(groups) if g == group]
         all_coefficients[np.ix_(of_group, first)] -= all_coefficients[np.ix_(of_group, first)].mean(axis=0)
-    is_low = np.r_[True, np.tile(np.arange(1, HIGH + 1) <= LOW, 2)]
-    low = (all_coefficients[:, is_low] ** 2).sum(axis=1)
-    high = (all_coefficients[:, ~is_low] ** 2).sum(axis=1)
-    high_freedom = 2.0 * (HIGH - LOW) * len(residuals)
-    low_freedom = max((2.0 * LOW + 1.0) * len(residuals) - 2.0 * len(set(groups)) - freedom_used, 1.0)
-    noise2 = float(high.sum()) / high_freedom
-    ratio = float(low.sum()) / low_freedom / noise2 if noise2 > 0.0 else 1.0
+    squares = (all_coefficients**2).sum(axis=0)
+    by_harmonic = squares[1 : high + 1] + squares[high + 1 :]
+    noise = noise_spectrum(by_harmonic[low:], low, 2.0 * len(residuals))
+    counts = np.r_[1.0, np.full(low, 2.0)] * len(residuals)
+    counts[1] -= 2.0 * len(set(groups))
+    freedom = max(float(counts.sum()) - freedom_used, 1.0)
+    measured = np.r_[squares[0], by_harmonic[:low]]
+    if not np.all(noise.power > 0.0):
+        return Misfit(1.0, 0.0, 0.0, 1.0)
+    ratio = float(np.sum(measured / noise.power)) / freedom
+    expected = float(counts @ noise.power) * freedom / max(float(counts.sum()), 1.0)
     samples = np.mean([len(residual) for residual in residuals])
-    excess = max(float(low.sum()) - low_freedom * noise2, 0.0) / len(residuals) / samples
-    probability = float(f_distribution.sf(ratio, low_freedom, high_freedom))
-    return Misfit(probability, float(np.sqrt(noise2)), float(np.sqrt(excess)), ratio)
+    excess = max(float(measured.sum()) - expected, 0.0) / len(residuals) / samples
+    probability = float(f_distribution.sf(ratio, freedom, noise.freedom))
+    return Misfit(probability, float(np.sqrt(noise.power[0])), float(np.sqrt(excess)), ratio)
+
+
+def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Spectrum:
+    """Spectrum of noise in the harmonics up to `low`, from those above.
+
+    Args:
+        squares: sums of squares of the coefficients at harmonics low + 1, low + 2, ..., shape (h,).
+        low: highest harmonic that is not among them.
+        freedom: degrees of freedom of each sum.
+    """
+    harmonic = np.arange(low + 1.0, low + 1.0 + len(squares))
+    mean = squares / freedom
+    white = float(mean.mean())
+    flat = Spectrum(np.full(low + 1, white), freedom * len(squares))
+    if not white > 0.0:
+        return flat
+    powers, likely, variances = [], [], []
+    for corner in CORNERS:
+        seen, below = _shape(harmonic, corner), _shape(np.arange(low + 1.0), corner)
+        height = _fitted(mean, seen)
+        power = height @ below
+        powers.append(power)
+        likely.append(_likelihood(mean, height @ seen, freedom))
+        # What floor and height leave uncertain in the low mean, by the information of the likelihood.
+        information = 0.5 * freedom * (seen / (height @ seen)) @ (seen / (height @ seen)).T
+        wanted = (below / power).mean(axis=1)
+        variances.append(float(wanted @ np.linalg.pinv(information) @ wanted))
+    if max(likely) - _likelihood(mean, np.full(len(mean), white), freedom) < WORTH:
+        return flat
+    weight = np.exp(np.array(likely) - max(likely))
+    weight /= weight.sum()
+    power = weight @ np.array(powers)
+    logs = np.log(np.array(powers).mean(axis=1))
+    between = float(weight @ (logs - weight @ logs) ** 2)
+    return Spectrum(power, 2.0 / max(float(weight @ variances) + between, 2.0 / flat.freedom))
+
+
+def _shape(harmonic: NDArray[np.float64], corner: float) -> NDArray[np.float64]:
+    """Floor and first-order process of unit height, shape (2, h)."""
+    return np.vstack([np.ones(len(harmonic)), 1.0 / (1.0 + (harmonic / corner) ** 2)])
+
+
+def _fitted(mean: NDArray[np.float64], shape: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Floor and height, not negative, of greatest likelihood, by reweighted least squares, shape (2,)."""
+    power = np.full(len(mean), mean.mean())
+    for _ in range(_ROUNDS):
+        found, _ = nnls((shape / power).T, mean / power)
+        power = np.maximum(found @ shape, _SMALLEST_SHARE * mean.mean())
+    return np.asarray(found, dtype=np.float64)
+
+
+_ROUNDS = 6
+_SMALLEST_SHARE = 1e-6
+
+
+def _likelihood(mean: NDArray[np.float64], power: NDArray[np.float64], freedom: float) -> float:
+    """Log likelihood of mean squares under a spectrum [Whittle 1953], less a constant."""
+    if not np.all(power > 0.0):
+        return -np.inf
+    return -0.5 * freedom * float(np.sum(np.log(power) + mean / power))

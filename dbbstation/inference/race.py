@@ -172,15 +172,26 @@ def select(race: Race, candidates: Sequence[Candidate], threshold: float, most: 
         candidate, variant, together = max(trials, key=lambda trial: trial[2])
         if together - before < threshold:
             break
-        chosen = _settled(race, [*chosen, Choice(candidate, variant)])
-        kept = [c for c in chosen if _worth(race, chosen, c) >= threshold]
-        if len(kept) < len(chosen) and kept and kept[-1].candidate.name != candidate.name:
+        grown = _pruned(race, _settled(race, [*chosen, Choice(candidate, variant)]), threshold)
+        # Pruning may undo the step or lead back; only what explains more is a step, so that this comes to an end.
+        if race.evidence([choice.variant for choice in grown]) <= before:
             break
-        chosen = kept
+        chosen = grown
     return chosen
 
 
-def _worth(race: Race, chosen: Sequence[Choice], one: Choice) -> float:
+def _pruned(race: Race, chosen: list[Choice], threshold: float) -> list[Choice]:
+    """Choices without those that are not worth it beside the others, the least worthy first."""
+    while chosen:
+        worth = [worth_of(race, chosen, one) for one in chosen]
+        least = int(np.argmin(worth))
+        if worth[least] >= threshold:
+            break
+        chosen = [one for k, one in enumerate(chosen) if k != least]
+    return chosen
+
+
+def worth_of(race: Race, chosen: Sequence[Choice], one: Choice) -> float:
     """Log evidence that one of the chosen brings beside the others."""
     others = [c.variant for c in chosen if c is not one]
     _, together = race.best_variant(one.candidate, others)

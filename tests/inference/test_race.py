@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.harmonics import coefficients, misfit, smooth
+from dbbstation.inference.harmonics import bands, coefficients, misfit, smooth
 from dbbstation.inference.held_out import held_out_rms
 from dbbstation.inference.race import Candidate, Race, Variant, select
 from dbbstation.inference.square_root import Columns, compress, solve
@@ -164,6 +165,55 @@ def test_misfit_probability_is_uniform_on_noise_and_small_on_a_misfit(rng):
     seen = misfit(runs(0.5 * np.sin(3 * phase)), [phase] * 10, groups, 0.0)
     assert seen.probability < 1e-6
     assert seen.rms == pytest.approx(0.5 / np.sqrt(2), rel=0.1)
+
+
+@pytest.mark.parametrize(("white", "pushed", "phi"), [(0.5, 0.5, 0.6), (0.3, 0.3, 0.9)])
+def test_correlated_noise_is_no_misfit_and_its_low_level_is_known(rng, white, pushed, phi):
+    """A first-order process has S(0) = s² (1 + phi) / (1 - phi), which the harmonics above the low ones do not reach."""
+    phase = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+
+    def run():
+        pushes = pushed * rng.normal(size=820)
+        pushes[1:] *= np.sqrt(1 - phi**2)
+        return white * rng.normal(size=720) + lfilter([1.0], [1.0, -phi], pushes)[100:]
+
+    found = [misfit([run() for _ in range(20)], [phase] * 20, [k // 2 for k in range(20)], 0.0) for _ in range(12)]
+    assert min(m.probability for m in found) > 1e-3
+    true = np.sqrt(white**2 + pushed**2 * (1 + phi) / (1 - phi))
+    assert np.median([m.noise for m in found]) == pytest.approx(true, rel=0.3)
+
+
+@pytest.mark.parametrize("size", [0.3, 1.0, 5.0])
+def test_steps_are_a_misfit_though_they_reach_into_the_harmonics_that_noise_is_read_from(rng, size):
+    phase = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    runs = [rng.normal(0, 0.5, 720) + size * (-1) ** k * np.sign(np.sin(phase + 0.2 * k)) for k in range(20)]
+    seen = misfit(runs, [phase] * 20, [k // 2 for k in range(20)], 0.0)
+    assert seen.probability < 1e-6
+    assert seen.rms == pytest.approx(size, rel=0.1)
+
+
+def test_few_samples_per_period_are_looked_at_in_fewer_harmonics(rng):
+    phase = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    assert bands(720) == (30, 240)
+    assert bands(90) == (7, 30)
+    found = [misfit([rng.normal(0, 1.0, 90) for _ in range(10)], [phase] * 10, range(10), 0.0) for _ in range(50)]
+    assert np.mean([m.probability < 0.05 for m in found]) < 0.2
+    assert np.mean([m.noise for m in found]) == pytest.approx(1.0, rel=0.05)
+
+
+def test_nothing_left_at_all_is_no_misfit():
+    phase = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    assert misfit([np.zeros(720)] * 4, [phase] * 4, [0, 0, 1, 1], 0.0).probability == 1.0
+
+
+def test_two_that_make_each_other_needless_do_not_hang_the_selection(rng):
+    """A square and its copy with a little noise: at the most one of them is worth anything beside the other."""
+    x = np.sign(np.sin(2 * np.pi * T))
+    columns = np.column_stack([np.ones(60), T, x, x + 0.02 * rng.normal(size=60), x + 0.02 * rng.normal(size=60)])
+    target = columns @ np.array([1.0, 0.0, 0.5, 0.5, 0.5]) + rng.normal(0, NOISE, 60)
+    race = Race([compress(np.arange(5), columns, target)], BASE, NONE_HELD, 5, NOISE)
+    candidates = [Candidate(str(k), (Variant(np.array([k]), np.array([2.0])),)) for k in (2, 3, 4)]
+    assert len(select(race, candidates, 6.0, 3)) == 1
 
 
 def test_smoothing_keeps_low_and_drops_high_harmonics():

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.fit import Calibration, calibrate, default_sources
+from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration, calibrate, default_sources
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
 from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.next_test import propose
 from dbbstation.diagnosis.verdicts import judge, testable, unexplained
-from dbbstation.errors import ModelError
+from dbbstation.errors import CalibrationError, ModelError
 from dbbstation.inference.harmonics import Misfit, misfit
 from dbbstation.inference.held_out import held_out_rms
-from dbbstation.inference.race import Choice, Race, select
+from dbbstation.inference.race import Choice, Race, select, worth_of
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
@@ -86,12 +86,14 @@ def diagnose(
     progress("verdicts")
     joint = channel_of(after, sources) if chosen else channel
     findings = judge(channel, settled.race, joint, settled.left.noise, chosen, by_name, after)
-    rest = unexplained(channel, joint, settled.left, chosen, significant=SIGNIFICANT)
+    rest = unexplained(channel, joint, first, settled.left, chosen, significant=SIGNIFICANT)
     progress("held-out tests")
-    held_out = _held_out(channel, chosen, settled.left.noise)
     if rest.overrules:
+        # Nothing has a name then: what is left, and what could be asked next, is that of the base model.
         chosen, after = (), before
-        findings = tuple(finding for finding in rest.demoted(findings))
+        settled = Round((), before, first, settled.race)
+        findings = tuple(rest.demoted(findings))
+    held_out = _held_out(channel, chosen, settled.left.noise)
     progress("next test")
     mismatch = first.probability < SIGNIFICANT or bool(chosen)
     found = [by_name[choice.candidate.name] for choice in chosen]
@@ -149,27 +151,37 @@ def _settle(
     The race knows shape parameters at the points of their grids only. Beside a strong source whose time constant
     falls between two points, a second one may seem to be needed; the exact fit then finds no amplitude for it.
     """
-    names: set[str] | None = None
     dropped: set[str] = set()
-    after, left = before, first
-    chosen: list[Choice] = []
+    best = Round((), before, first, _race(channel, first))
     for _ in range(MOST_ROUNDS):
-        race = Race(channel.blocks, channel.base, channel.held, channel.columns, left.noise)
+        race = _race(channel, best.left)
         candidates = [candidate for candidate in channel.named if candidate.name not in dropped]
         chosen = select(race, candidates, THRESHOLD, MOST_SOURCES)
         found = {choice.candidate.name for choice in chosen}
-        if found == names:
+        if found == {choice.candidate.name for choice in best.chosen}:
             break
-        names = found
         progress("joint fit with " + (", ".join(sorted(found)) or "nothing more"))
-        after = _joint(channel, race, chosen, sources) if chosen else before
+        try:
+            after = _joint(channel, race, chosen, sources) if chosen else before
+        except CalibrationError:
+            # An amplitude of next to nothing leaves the time constant beside it without a hold.
+            dropped.add(min(chosen, key=lambda one: worth_of(race, chosen, one)).candidate.name)
+            continue
         weak = {name for name in found if not _stands_out(after, name)}
+        left = misfit_of(after)
         if weak:
             dropped |= weak
-            names = None
-        left = misfit_of(after)
-    race = Race(channel.blocks, channel.base, channel.held, channel.columns, left.noise)
-    return Round(tuple(chosen), after, left, race)
+            best = replace(best, left=left)
+        else:
+            best = Round(tuple(chosen), after, left, race)
+    # Names, fit and what is left of it belong together, whatever ended the rounds.
+    left = misfit_of(best.after)
+    return replace(best, left=left, race=_race(channel, left))
+
+
+def _race(channel: Channel, left: Misfit) -> Race:
+    """Race on a channel with the noise that a fit leaves."""
+    return Race(channel.blocks, channel.base, channel.held, channel.columns, max(left.noise, SMALLEST_NOISE_MM))
 
 
 def _stands_out(calibration: Calibration, name: str) -> bool:

@@ -41,7 +41,8 @@ class SourceFinding:
         concealed: share of its signature's sum of squares that the fitted machine parameters swallow.
         whole_um: root mean square of its signature over the runs [µm].
         rest_um: of what the fitted parameters leave of it [µm].
-        parameters: values, where it was fitted; what would just be seen (five sigma), where it was not.
+        parameters: values with their uncertainty as fitted; for a source that was not, the best amplitudes beside those
+            that were, whose uncertainty says how much could hide.
         text: one sentence for people.
     """
 

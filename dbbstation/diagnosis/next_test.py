@@ -31,6 +31,8 @@ SAMPLES = 180
 TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0), (23.0, 0.0), (-23.0, 0.0), (0.0, 23.0))
 ELEVATIONS_DEG = (0.0, 10.0, -10.0)
 WAITS_S = (0.0, 3600.0)
+SPACING_S = 200.0
+"""From the start of a run to that of the next one [s]."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +74,12 @@ def propose(
     wanted = np.concatenate([np.arange(first), variant.columns, *(other.columns for other in others)])
     used = Columns(known.prior[wanted], known.scale[wanted], known.random[wanted])
     covariance = solve(_thin(channel.blocks, wanted), used, noise_mm, channel.held).covariance
+    ends_s = _ends_s(channel)
     best: tuple[float, Proposal] | None = None
     for proposal in _proposals(channel, timed=Need.TIME in source.needs):
-        rows = np.vstack([_rows(channel, source, variant, motion, len(wanted)) for motion in _motions(proposal)])
+        rows = np.vstack(
+            [_rows(channel, source, variant, motion, len(wanted)) for motion in _motions(proposal, ends_s)]
+        )
         gain = rows @ covariance
         answer = gain @ rows.T + noise_mm**2 * np.eye(len(rows))
         after = covariance[first, first] - gain[:, first] @ np.linalg.solve(answer, gain[:, first])
@@ -125,14 +130,20 @@ def _reachable(machine: Machine, circle: Circle) -> bool:
     return True
 
 
-def _motions(proposal: Proposal) -> list[Motion]:
-    """Both directions, mounted anew on the same ball."""
+def _ends_s(channel: Channel) -> float:
+    """Return the end of the last run, on the clock of its session [s]; zero where times are unknown."""
+    clocks = [o.started_s + float(o.raw.t_s[-1]) for o in channel.observations if o.started_s is not None]
+    return max(clocks, default=0.0)
+
+
+def _motions(proposal: Proposal, ends_s: float) -> list[Motion]:
+    """Both directions, mounted anew on the same ball, so long after the end of the last run [s]."""
     setup: Setup = replace(proposal.observation.setup, mounting="proposed")
     phi = np.linspace(-45.0, 360.0, SAMPLES + SAMPLES // 8, endpoint=False)
     motions = []
     for k, direction in enumerate(Direction):
         circle = replace(proposal.circle, direction=direction)
-        begun = 7200.0 + proposal.wait_s + 200.0 * k
+        begun = ends_s + proposal.wait_s + SPACING_S * (k + 1)
         motions.append(
             Motion(
                 poses=circle.poses(circle.theta_deg(phi)),

@@ -168,13 +168,14 @@ class Rest:
 
 
 def unexplained(
-    channel: Channel, joint: Channel, left: Misfit, chosen: Sequence[Choice], *, significant: float
+    channel: Channel, joint: Channel, first: Misfit, left: Misfit, chosen: Sequence[Choice], *, significant: float
 ) -> Rest:
     """Look for an unnamed shape in what is left; let it overrule names that explain much less than it does.
 
     Args:
         channel: about the base fit.
         joint: about the joint fit.
+        first: misfit of the base fit.
         left: misfit of the joint fit.
         chosen: sources that were found.
         significant: probability below which a misfit counts.
@@ -190,7 +191,7 @@ def unexplained(
     if named and not overrules:
         # The names stand; what is left beside them is looked at about the joint fit.
         _, candidate, _, gain = _best_shape(joint, left.noise)
-    rms_um = 1e3 * left.rms
+    rms_um = 1e3 * (first.rms if overrules else left.rms)
     if gain < SHAPE_THRESHOLD:
         text = "Something is left beyond noise, and no variable organises it clearly."
         return Rest(Unexplained(rms_um, None, None, gain, text), overrules=False)

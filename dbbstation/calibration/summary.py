@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dbbstation.calibration.evaluation import Evaluation, RunFigures, rms_um
+from dbbstation.inference.harmonics import LOW, smooth
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Owner
@@ -17,6 +18,11 @@ if TYPE_CHECKING:
     from dbbstation.calibration.fit import Calibration
     from dbbstation.calibration.layout import Term
     from dbbstation.trace.analysis import CircleFigures
+
+
+STANDS_OUT = 4.0
+LEAST_DOUBT_UM = 3.0
+"""A run is doubtful that leaves four times what the usual one does, and more than a bar's noise could [µm]."""
 
 
 def evaluation_summary(evaluation: Evaluation) -> dict[str, Any]:
@@ -33,15 +39,42 @@ def calibration_summary(calibration: Calibration, evaluation: Evaluation) -> dic
     return {
         **evaluation_summary(evaluation),
         "residual_within_mounting_rms_um": rms_um(calibration.residual_mm),
-        "noise_um": 1e3 * calibration.noise.sigma,
+        "noise_um": 1e3 * fine_noise_mm(calibration),
         "noise_correlation_samples": calibration.noise.correlation_samples,
         "parameters_identified": calibration.parameters_identified,
         "directions_lost": list(calibration.directions_lost),
+        "doubtful_runs": doubtful_runs(calibration),
         "sources": [_term(calibration, term) for term in calibration.layout.terms if _is_machines(term)],
         "measurement_effects": [
             _term(calibration, term) for term in calibration.layout.terms if not _is_machines(term)
         ],
     }
+
+
+def fine_noise_mm(calibration: Calibration) -> float:
+    """Noise of one reading from what lies above the smooth harmonics, which no misfit of the model reaches [mm]."""
+    square, count = 0.0, 0.0
+    for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
+        rough = residual - smooth(residual, np.radians(observation.raw.phi_deg))
+        square += float(rough @ rough)
+        count += max(len(rough) - (2 * LOW + 1), 1)
+    return float(np.sqrt(square / count))
+
+
+def doubtful_runs(calibration: Calibration) -> list[dict[str, Any]]:
+    """Runs that leave far more than the others do, worst first: another circle's samples, a ball that moved.
+
+    A model that lacks physics leaves more everywhere; one run that stands out by four times does not belong.
+    """
+    rms = np.array([1e3 * float(np.sqrt(np.mean(residual**2))) for residual in calibration.residual_mm])
+    usual = float(np.median(rms))
+    limit = max(STANDS_OUT * usual, LEAST_DOUBT_UM)
+    found = [
+        {"test": o.test, "direction": str(o.raw.circle.direction), "repeat": o.repeat, "residual_um": float(left)}
+        for o, left in zip(calibration.observations, rms, strict=True)
+        if left > limit
+    ]
+    return sorted(found, key=lambda run: -run["residual_um"])
 
 
 def identified_model(

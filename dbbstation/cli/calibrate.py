@@ -68,6 +68,11 @@ def calibrate(
     if out is not None:
         kept = {key: value for key, value in summary.items() if key not in ELSEWHERE_IN_MODEL}
         write_model(out, identified_model(calibration, kept, recorded.sessions), force=force)
+    for run in summary["doubtful_runs"]:
+        say(
+            f"doubtful: test {run['test']} {run['direction']} {run['repeat']} leaves {run['residual_um']:.1f} µm rms, far "
+            "more than the others; another circle's samples or a ball that moved? Leave it out with --exclude"
+        )
     if as_json:
         print_json(summary)
     else:
@@ -75,6 +80,9 @@ def calibrate(
         if out is not None:
             say(f"model written to {out}")
 
+
+MORE_THAN_NOISE = 1.2
+"""Residual over noise above which something smooth must be left."""
 
 ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost"})
 """Parts of the summary that the model file holds in places of their own."""
@@ -102,3 +110,5 @@ def _print(summary: Mapping[str, Any]) -> None:
     click.echo(f"model leaves             {summary['residual_rms_um']:8.2f} µm rms")
     click.echo(f"... within each mounting {summary['residual_within_mounting_rms_um']:8.2f} µm rms")
     click.echo(f"noise of one reading     {summary['noise_um']:8.2f} µm")
+    if summary["residual_within_mounting_rms_um"] > MORE_THAN_NOISE * summary["noise_um"]:
+        click.echo("more is left than noise: `dbbstation diagnose` says which physics may be missing")

@@ -83,3 +83,4 @@ def _print(numbers: dict[str, Any]) -> None:
         for name, of in numbers["tilted_circle"].items()
     ]
     print_table(["", "circularity", "centre deviation", "greatest position error [µm]"], rows)
+    click.echo("(in the last column a common height remains, which level circles on the jig do not see)")

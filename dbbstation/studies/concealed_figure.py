@@ -23,7 +23,7 @@ COLOURS = ("#888888", "#c0392b", "#1f6fb2")
 def concealed_figure(study: ConcealedGravity) -> bytes:
     """Draw residuals on the jig, the tilted circle and the pull on the joints, as SVG."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+        figure = Figure(figsize=(11.0, 5.4), layout="constrained")
         jig, pull = figure.add_subplot(1, 3, 1), figure.add_subplot(1, 3, 3)
         _residuals(jig, study)
         _circle(figure.add_subplot(1, 3, 2, projection="polar"), study)
@@ -53,7 +53,7 @@ def _circle(axes: Axes, study: ConcealedGravity) -> None:
     axes.plot(angle, np.full(len(angle), 1.6 * reach), color="black", linewidth=0.5, linestyle=":")
     axes.set_yticks([])
     axes.set_title("tilted by -23°: circularity left after", pad=14)
-    axes.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, -0.42), fontsize=8)
+    axes.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.08), fontsize=8)
 
 
 def _pull(axes: Axes, study: ConcealedGravity) -> None:

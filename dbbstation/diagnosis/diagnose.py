@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import chi2
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration, calibrate, default_sources
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
 from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.next_test import propose
-from dbbstation.diagnosis.verdicts import judge, testable, unexplained
+from dbbstation.diagnosis.verdicts import doubted, judge, testable, unexplained
 from dbbstation.errors import CalibrationError, ModelError
 from dbbstation.inference.harmonics import Misfit, misfit
 from dbbstation.inference.held_out import held_out_rms
@@ -93,13 +94,14 @@ def diagnose(
         chosen, after = (), before
         settled = Round((), before, first, settled.race)
         findings = tuple(rest.demoted(findings))
+    findings = doubted(findings, rest.finding, by_name)
     held_out = _held_out(channel, chosen, settled.left.noise)
     progress("next test")
     mismatch = first.probability < SIGNIFICANT or bool(chosen)
     found = [by_name[choice.candidate.name] for choice in chosen]
     return Diagnosis(
         mismatch=mismatch,
-        misfit=first,
+        misfit=replace(first, probability=min(first.probability, _by_chance(channel, settled))),
         left=settled.left,
         before=before,
         after=after,
@@ -177,6 +179,16 @@ def _settle(
     # Names, fit and what is left of it belong together, whatever ended the rounds.
     left = misfit_of(best.after)
     return replace(best, left=left, race=_race(channel, left))
+
+
+def _by_chance(channel: Channel, settled: Round) -> float:
+    """Probability that noise alone lets any candidate explain as much as the best chosen one does; 1 where none is.
+
+    An effect in few of the low harmonics, such as the mean of every run, stands out of them less than by its name.
+    """
+    tried = sum(len(candidate.variants) for candidate in channel.named)
+    found = [(settled.race.explained([c.variant]), len(c.variant.columns)) for c in settled.chosen]
+    return min((min(1.0, tried * float(chi2.sf(square, freedom))) for square, freedom in found), default=1.0)
 
 
 def _race(channel: Channel, left: Misfit) -> Race:

@@ -9,10 +9,12 @@ import numpy as np
 
 from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.race import Race
+from dbbstation.inference.race import Race, free_directions
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
     from dbbstation.diagnosis.channel import Channel
@@ -60,7 +62,9 @@ def judge(
         sources: by name.
         after: joint fit.
     """
+    # The joint fit keeps the base's columns where they were and adds those of the chosen behind.
     machine_columns = np.flatnonzero(~channel.base.random)
+    free = free_directions(channel.base, machine_columns, channel.held)
     names = [choice.candidate.name for choice in chosen]
     likes = _likenesses(race, chosen, channel)
     rest = Race(joint.blocks, joint.base, joint.held, joint.columns, noise_mm)
@@ -71,9 +75,9 @@ def judge(
         alike = likes.get(candidate.name, ())
         if candidate.name in names:
             others = [c.variant for c in chosen if c.candidate.name != candidate.name]
-            variant, together = race.best_variant(candidate, others)
+            _, together = race.best_variant(candidate, others)
             gain = together - race.evidence(others)
-            amplitudes = race.amplitudes([variant, *others]).values[: len(variant.columns)]
+            signature = concealment(joint.blocks, machine_columns, *_fitted_amplitudes(after, candidate.name), free)
             values = _fitted_values(after, candidate.name)
             verdict = Verdict.AMBIGUOUS if alike else Verdict.IDENTIFIED
         else:
@@ -83,17 +87,16 @@ def judge(
             verdict = Verdict.RULED_OUT if seen else Verdict.NOT_TESTABLE
             verdict = Verdict.AMBIGUOUS if alike else verdict
             variant, _ = race.best_variant(candidate, [])
-            amplitudes = variant.prior
-        hidden = concealment(channel.blocks, machine_columns, variant.columns, amplitudes)
+            signature = concealment(channel.blocks, machine_columns, variant.columns, variant.prior, free)
         findings.append(
             SourceFinding(
                 name=candidate.name,
                 verdict=verdict,
                 ambiguous_with=alike,
                 gain=gain,
-                concealed=hidden.share,
-                whole_um=1e3 * hidden.whole_rms,
-                rest_um=1e3 * hidden.rest_rms,
+                concealed=signature.share,
+                whole_um=1e3 * signature.whole_rms,
+                rest_um=1e3 * signature.rest_rms,
                 parameters=values,
                 text=_text(source, verdict, alike),
             )
@@ -131,6 +134,18 @@ def _fitted_values(after: Calibration, name: str) -> dict[str, Value]:
     return values
 
 
+def _fitted_amplitudes(after: Calibration, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Columns of a source's amplitudes in the joint fit and their values: its signature with its shape as fitted."""
+    columns = [
+        term.columns.start + k
+        for term in after.layout.terms
+        if term.source.name == name
+        for k, parameter in enumerate(term.parameters)
+        if not parameter.shape
+    ]
+    return np.array(columns, dtype=np.int64), after.x[columns]
+
+
 def _best_values(source: ErrorSource, machine: Machine, race: Race, variant: Variant) -> dict[str, Value]:
     """Best amplitudes of a source that was not chosen, with the uncertainties that say how much could hide."""
     found = race.amplitudes([variant])
@@ -165,6 +180,36 @@ class Rest:
             else f
             for f in findings
         ]
+
+
+def doubted(
+    findings: Sequence[SourceFinding], rest: Unexplained, sources: Mapping[str, ErrorSource]
+) -> tuple[SourceFinding, ...]:
+    """Findings where several named sources follow the variable that still organises what is left.
+
+    Then the law of one of them is not quite what the machine does, such as a warm-up in two stages, and another may
+    have been called in only to make up for that: each stands, but not beside the others.
+
+    Args:
+        findings: as judged.
+        rest: what is left.
+        sources: by name.
+    """
+    variable = (rest.variable or "").removesuffix(" of the reading")
+    of_it = {
+        f.name
+        for f in findings
+        if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS} and sources[f.name].varies_with == variable
+    }
+    if not variable or len(of_it) < 2:  # noqa: PLR2004 - one alone makes up for nothing
+        return tuple(findings)
+    told = []
+    for finding in findings:
+        alike = tuple(sorted((of_it | set(finding.ambiguous_with)) - {finding.name}))
+        text = f"What is left follows {variable} too, so it may only make up for another law of {', '.join(alike)}."
+        doubtful = replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text)
+        told.append(doubtful if finding.name in of_it else finding)
+    return tuple(told)
 
 
 def unexplained(

@@ -34,7 +34,11 @@ class Concealment:
 
 
 def concealment(
-    blocks: Sequence[Block], fitted: NDArray[np.int64], columns: NDArray[np.int64], amplitudes: NDArray[np.float64]
+    blocks: Sequence[Block],
+    fitted: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    amplitudes: NDArray[np.float64],
+    free: NDArray[np.float64] | None = None,
 ) -> Concealment:
     """Share of a signature that fitted columns swallow, unweighted over all samples.
 
@@ -43,6 +47,8 @@ def concealment(
         fitted: columns of the fitted parameters, shape (f,).
         columns: of the signature, shape (p,).
         amplitudes: that make the signature of its columns, shape (p,).
+        free: directions of the fitted parameters that were fitted, as columns, shape (f, g); all of them if None. A
+            direction that was held swallows nothing, even where it is not quite lost.
     """
     wanted = np.concatenate([fitted, columns])
     size = int(max(int(block.columns.max()) for block in blocks)) + 1
@@ -53,6 +59,7 @@ def concealment(
         rows.append(wide[:, wanted])
     stacked = np.vstack(rows)
     explaining, signature = stacked[:, : len(fitted)], stacked[:, len(fitted) :] @ amplitudes
+    explaining = explaining if free is None else explaining @ free
     u, s, _ = np.linalg.svd(explaining / np.maximum(np.linalg.norm(explaining, axis=0), 1e-300), full_matrices=False)
     u = u[:, s > SEEN * s[0]]
     rest = signature - u @ (u.T @ signature)

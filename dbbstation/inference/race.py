@@ -78,7 +78,7 @@ class Race:
         count = len(base.prior)
         whole = _whole(blocks, columns) / noise
         random, fitted = np.flatnonzero(base.random), np.flatnonzero(~base.random)
-        free = _free(base, fitted, held)
+        free = free_directions(base, fitted, held)
         eliminated = np.hstack([whole[:, random], whole[:, fitted] @ free])
         priors = np.zeros((len(random), eliminated.shape[1] + columns - count + 1))
         priors[np.arange(len(random)), np.arange(len(random))] = 1.0 / base.prior[random]
@@ -219,7 +219,7 @@ def _whole(blocks: Sequence[Block], columns: int) -> NDArray[np.float64]:
     return np.asarray(triangle, dtype=np.float64)[: columns + 1]
 
 
-def _free(base: Columns, fitted: NDArray[np.int64], held: NDArray[np.float64]) -> NDArray[np.float64]:
+def free_directions(base: Columns, fitted: NDArray[np.int64], held: NDArray[np.float64]) -> NDArray[np.float64]:
     """Fitted columns in units of their scales, along the directions that are not held, shape (f, free)."""
     if len(held) == 0:
         return np.diag(base.scale[fitted])

@@ -122,6 +122,9 @@ def test_concealed_share_by_hand():
     assert share([1]) == pytest.approx(0.0, abs=1e-6)
     assert share([0]) == pytest.approx(5 / 9, abs=1e-3)
     assert share([0, 1]) == pytest.approx(5 / 9, abs=1e-3)
+    slope_only = np.array([[0.0], [1.0]])
+    held = concealment([block], np.array([0, 1]), np.array([2]), np.array([1.0]), slope_only)
+    assert held.share == pytest.approx(0.0, abs=1e-6)
 
 
 def test_left_out_runs_are_predicted_as_by_hand(rng):

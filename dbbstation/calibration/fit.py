@@ -9,10 +9,12 @@ import numpy as np
 
 from dbbstation.calibration.directions import in_words
 from dbbstation.calibration.layout import Layout, lay_out
+from dbbstation.calibration.nodes import Nodes, nodes_of, smooth
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.noise import Noise, noise_of
 from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve
-from dbbstation.sources.contract import Owner
+from dbbstation.machine.compiled import in_parallel
+from dbbstation.sources.contract import Need, Owner
 from dbbstation.sources.registry import sources_named
 from dbbstation.trace.circle import RawCircle
 
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
-    from dbbstation.model.machine_model import BarReading, MachineModel
+    from dbbstation.model.machine_model import MachineModel
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
@@ -44,6 +46,9 @@ CONVERGED = 1e-6
 CONVERGED_SIGMA = 1e-3
 """The same as a share of their standard deviations, for what the runs hardly see."""
 FIRST_NOISE_MM = 1e-3
+
+AT_NODES = frozenset({Need.POSE, Need.TIME})
+"""What a source may need for its effect to be as smooth as the circle; a path's history and logged values are not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +121,8 @@ def calibrate(
         layout = _near(layout, start)
     x = _start_values(layout, start or {})
     noise = Noise(FIRST_NOISE_MM, 1.0)
-    nominal, _ = linearise(layout, observations, x)
+    runs = looked_at(observations, layout.needs)
+    nominal, _ = linearise(layout, runs, x)
     blocks, before, share = nominal, np.zeros_like(x), 1.0
     for _ in range(MOST_STEPS):
         held = lost_directions(nominal, layout.known, noise.effective)
@@ -129,10 +135,9 @@ def calibrate(
         share = _share(layout, step, before, share)
         x = x + share * step
         before = step
-        blocks, readings = linearise(layout, observations, x)
         if change < 1.0:
             break
-        left = [o.raw.length_mm - reading.length_mm for o, reading in zip(observations, readings, strict=True)]
+        blocks, left = linearise(layout, runs, x)
         noise = noise_of(left, solution.freedom_used)
     else:
         raise CalibrationError(
@@ -145,8 +150,8 @@ def calibrate(
         solution=solution,
         noise=noise,
         observations=tuple(observations),
-        machine_residual_mm=residuals(layout.model(x).of_the_machine(), observations),
-        residual_mm=residuals(layout.model(x), observations),
+        machine_residual_mm=_residuals(layout.model(x).of_the_machine(), runs),
+        residual_mm=_residuals(layout.model(x), runs),
         directions_lost=in_words(layout, held),
     )
 
@@ -185,25 +190,51 @@ def _start_values(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> N
     return x
 
 
+def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> list[Observation | Nodes]:
+    """Runs as a fit looks at them: through nodes where they are long and sources need no more than pose and time."""
+    if not needs <= AT_NODES:
+        return list(observations)
+    nodes = in_parallel(nodes_of, observations, _usual_length(observations))
+    return [run if seen is None else seen for run, seen in zip(observations, nodes, strict=True)]
+
+
 def linearise(
-    layout: Layout, observations: Sequence[Observation], x: NDArray[np.float64]
-) -> tuple[list[Block], list[BarReading]]:
-    """Compress every run about the values x, shape (k,), so that a solution of the blocks is x less its nominal."""
+    layout: Layout, runs: Sequence[Observation | Nodes], x: NDArray[np.float64]
+) -> tuple[list[Block], list[NDArray[np.float64]]]:
+    """Compress every run about the values x, shape (k,), so that a solution of the blocks is x less its nominal.
+
+    Returns:
+        The blocks, and per run measured minus predicted length at x, shape (n,) [mm].
+    """
     model = layout.model(x)
-    blocks, readings = [], []
-    for observation in observations:
-        motion = observation.motion()
-        reading = model.bar(motion)
-        terms = [term for term in layout.terms if term.acts_on(motion)]
-        jacobian = np.hstack(
-            [np.zeros((len(observation.raw), 0))]
-            + [reading.by_parameters(term.source.derivative(motion, layout.machine, x[term.columns])) for term in terms]
-        )
-        columns = np.concatenate([np.r_[term.columns] for term in terms])
-        target = observation.raw.length_mm - reading.length_mm + jacobian @ (x - layout.nominal)[columns]
-        blocks.append(compress(columns, jacobian, target))
-        readings.append(reading)
-    return blocks, readings
+
+    def of_run(run: Observation | Nodes) -> tuple[Block, NDArray[np.float64]]:
+        if isinstance(run, Nodes):
+            columns, jacobian, length = _predicted(layout, model, run.coarse, x)
+            if smooth(jacobian) and smooth(length[:, None] - run.run.raw.circle.bar_mm):
+                block = run.compressed(columns, jacobian, length, (x - layout.nominal)[columns])
+                return block, run.run.raw.length_mm - run.samples_of(length)
+            run = run.run
+        columns, jacobian, length = _predicted(layout, model, run, x)
+        left = run.raw.length_mm - length
+        return compress(columns, jacobian, left + jacobian @ (x - layout.nominal)[columns]), left
+
+    done = in_parallel(of_run, runs, _usual_length(runs))
+    return [block for block, _ in done], [left for _, left in done]
+
+
+def _predicted(
+    layout: Layout, model: MachineModel, observation: Observation, x: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Columns that act on a run, shape (k,), their derivatives, shape (n, k), and the reading, shape (n,) [mm]."""
+    motion = observation.motion()
+    reading = model.bar(motion)
+    terms = [term for term in layout.terms if term.acts_on(motion)]
+    jacobian = np.hstack(
+        [np.zeros((len(observation.raw), 0))]
+        + [reading.by_parameters(term.source.derivative(motion, layout.machine, x[term.columns])) for term in terms]
+    )
+    return np.concatenate([np.r_[term.columns] for term in terms]), jacobian, reading.length_mm
 
 
 def _settled(
@@ -226,7 +257,26 @@ SMALLEST_NOISE_MM = 1e-7
 
 def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple[NDArray[np.float64], ...]:
     """Measured minus predicted length of every run, shape (n,) each [mm]."""
-    return tuple(o.raw.length_mm - model.bar(o.motion()).length_mm for o in observations)
+    needs = frozenset[Need]().union(*(fitted.source.needs for fitted in model.sources))
+    return _residuals(model, looked_at(observations, needs))
+
+
+def _residuals(model: MachineModel, runs: Sequence[Observation | Nodes]) -> tuple[NDArray[np.float64], ...]:
+    def of_run(run: Observation | Nodes) -> NDArray[np.float64]:
+        if isinstance(run, Nodes):
+            length = model.bar(run.coarse.motion()).length_mm
+            if smooth(length[:, None] - run.run.raw.circle.bar_mm):
+                return run.run.raw.length_mm - run.samples_of(length)
+            run = run.run
+        return run.raw.length_mm - model.bar(run.motion()).length_mm
+
+    return tuple(in_parallel(of_run, runs, _usual_length(runs)))
+
+
+def _usual_length(runs: Sequence[Observation | Nodes]) -> int:
+    """Poses of a run at which a model is asked, on average."""
+    poses = sum(len((run.coarse if isinstance(run, Nodes) else run).raw) for run in runs)
+    return poses // max(len(runs), 1)
 
 
 def _check_raw(observations: Sequence[Observation]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.inference.square_root import Columns
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.sources.contract import ErrorSource, Fitted, Parameter
+from dbbstation.sources.contract import ErrorSource, Fitted, Need, Parameter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,6 +63,11 @@ class Layout:
     def names(self) -> tuple[tuple[str, str, str], ...]:
         """Source, set and parameter of every column."""
         return tuple((term.source.name, term.shared, p.name) for term in self.terms for p in term.parameters)
+
+    @property
+    def needs(self) -> frozenset[Need]:
+        """What all sources together must be given."""
+        return frozenset[Need]().union(*(term.source.needs for term in self.terms))
 
     def model(self, x: NDArray[np.float64]) -> MachineModel:
         """Machine model with the values of all columns, shape (k,)."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,7 +61,6 @@ _LAGS = 201
 
 def _autocovariance(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sums of products at lags 0 to 200."""
-    count = len(residual)
-    size = 1 << (2 * count - 1).bit_length()
+    size = next_fast_len(len(residual) + _LAGS, real=True)  # room for the lags: nothing wraps round into them
     spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
     return np.fft.irfft(spectrum, size)[:_LAGS]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
@@ -11,8 +12,10 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numba
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 Kernel = TypeVar("Kernel", bound="Callable[..., Any]")
 
 SMALLEST_BLOCK = 2048
@@ -41,14 +44,9 @@ def inlined(part: Kernel) -> Kernel:
     return cast("Kernel", numba.njit(forceinline=True, error_model="numpy", fastmath=set(REORDER))(part))
 
 
-@cache
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(max_workers=os.cpu_count(), thread_name_prefix="kernel")
-
-
 def in_blocks(kernel: Callable[[int, int], None], count: int) -> None:
     """Call `kernel(start, stop)` for blocks that cover `range(count)`, on all cores where that pays."""
-    workers = min(os.cpu_count() or 1, count // SMALLEST_BLOCK)
+    workers = 1 if _is_worker() else min(os.cpu_count() or 1, count // SMALLEST_BLOCK)
     if workers <= 1:
         kernel(0, count)
         return
@@ -56,3 +54,26 @@ def in_blocks(kernel: Callable[[int, int], None], count: int) -> None:
     blocks = [_pool().submit(kernel, start, stop) for start, stop in pairwise(edges)]
     for block in blocks:
         block.result()
+
+
+def in_parallel(work: Callable[[Item], Result], items: Iterable[Item], poses: int) -> list[Result]:
+    """Call `work` on every item, on all cores where so many `poses` per item make it pay; results in order.
+
+    What an item's work does in blocks stays on its own core. An exception is that of the first item that fails.
+    """
+    if poses < SMALLEST_BLOCK or _is_worker():
+        return [work(item) for item in items]
+    return list(_pool().map(work, items))
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(max_workers=os.cpu_count(), thread_name_prefix=_WORKER)
+
+
+def _is_worker() -> bool:
+    """Whether this is one of the pool's threads: waiting for others of them, all could wait for each other."""
+    return threading.current_thread().name.startswith(_WORKER)
+
+
+_WORKER = "dbbstation-kernel"

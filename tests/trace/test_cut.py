@@ -130,5 +130,18 @@ def test_samples_that_the_instrument_called_bad_are_left_out():
 def test_a_ball_that_left_its_seat_is_refused():
     recording = trace()
     spoilt = recording.length_mm + np.where((recording.t_s > 30) & (recording.t_s < 30.5), -0.9, 0.0)
-    with pytest.raises(TraceError, match=r"0\.\d* mm off the bar's 150 mm"):
+    with pytest.raises(TraceError, match=r"jumps by 0\.\d* mm from one sample to the next, at 1\d\d\.\d degrees"):
         cut(replace(recording, length_mm=spoilt), CIRCLE)
+
+
+@pytest.mark.parametrize("error_mm", [-1.2, 1.2])
+def test_a_machine_wrong_by_a_millimetre_is_cut_all_the_same(error_mm):
+    recording = trace(noise_mm=0.0005)
+    raw = cut(replace(recording, length_mm=recording.length_mm + error_mm), CIRCLE)
+    assert np.std(raw.length_mm - 150 - error_mm - shape(raw.theta_deg)) < 0.0006
+
+
+def test_a_bar_of_another_length_is_refused():
+    recording = trace()
+    with pytest.raises(TraceError, match=r"mm off the bar's 150 mm"):
+        cut(replace(recording, length_mm=recording.length_mm + 5.0), CIRCLE)

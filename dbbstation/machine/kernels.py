@@ -10,8 +10,7 @@ anything for itself: there is no pivot search and no branch, lanes that are done
 not depend on its neighbours, nor on where the group begins. A last group that is not full repeats the last pose.
 
 Names of work arrays: t and r are positions (3, LANES) and rotations (3, 3, LANES) of the platform, q and p the joints
-on base and platform (6, 3, LANES); a Jacobian (6, 6, LANES) has the row [u, (R P) x u] for each strut; a system
-(6, 7, LANES) is a matrix with the right-hand side as its last column.
+on base and platform (6, 3, LANES); a Jacobian (6, 6, LANES) has the row [u, (R P) x u] for each strut.
 
 All of it stands in this one file because the compiler's cache on disk looks at a kernel's own file only.
 """
@@ -30,6 +29,9 @@ if TYPE_CHECKING:
 CONVERGED = 0
 SINGULAR = 1
 TOO_MANY_STEPS = 2
+
+REUSING = 2
+"""Number of the Newton step, from 0, that takes the Jacobian of the one before."""
 
 LANES = 64
 """Poses in a group: the fewest whose loops the compiler does not unroll away; work arrays stay in the inner caches."""
@@ -88,6 +90,38 @@ def _gather_machine(
 
 
 @inlined
+def _arm_and_span(
+    i: int,
+    lane: int,
+    t: NDArray[np.float64],
+    r: NDArray[np.float64],
+    q: NDArray[np.float64],
+    p: NDArray[np.float64],
+) -> tuple[float, float, float, float, float, float]:
+    """Arm R P and vector R P + t - Q of strut i [CAL eq 1]."""
+    px, py, pz = p[i, 0, lane], p[i, 1, lane], p[i, 2, lane]
+    ax = r[0, 0, lane] * px + r[0, 1, lane] * py + r[0, 2, lane] * pz
+    ay = r[1, 0, lane] * px + r[1, 1, lane] * py + r[1, 2, lane] * pz
+    az = r[2, 0, lane] * px + r[2, 1, lane] * py + r[2, 2, lane] * pz
+    return ax, ay, az, ax + t[0, lane] - q[i, 0, lane], ay + t[1, lane] - q[i, 1, lane], az + t[2, lane] - q[i, 2, lane]
+
+
+@inlined
+def _lengths(
+    t: NDArray[np.float64],
+    r: NDArray[np.float64],
+    q: NDArray[np.float64],
+    p: NDArray[np.float64],
+    length: NDArray[np.float64],
+) -> None:
+    """Lengths of the struts, shape (6, LANES)."""
+    for i in range(6):
+        for lane in range(LANES):
+            _, _, _, sx, sy, sz = _arm_and_span(i, lane, t, r, q, p)
+            length[i, lane] = np.sqrt(sx * sx + sy * sy + sz * sz)
+
+
+@inlined
 def _struts(
     t: NDArray[np.float64],
     r: NDArray[np.float64],
@@ -97,19 +131,10 @@ def _struts(
     arm: NDArray[np.float64],
     jacobian: NDArray[np.float64],
 ) -> None:
-    """Lengths (6, LANES), arms R P (6, 3, LANES) and Jacobian of the struts [CAL eq 1].
-
-    Only the first six columns of `jacobian` are written, so that it may be part of a system.
-    """
+    """Lengths (6, LANES), arms (6, 3, LANES) and Jacobian (6, 6, LANES) of the struts."""
     for i in range(6):
         for lane in range(LANES):
-            px, py, pz = p[i, 0, lane], p[i, 1, lane], p[i, 2, lane]
-            ax = r[0, 0, lane] * px + r[0, 1, lane] * py + r[0, 2, lane] * pz
-            ay = r[1, 0, lane] * px + r[1, 1, lane] * py + r[1, 2, lane] * pz
-            az = r[2, 0, lane] * px + r[2, 1, lane] * py + r[2, 2, lane] * pz
-            sx = ax + t[0, lane] - q[i, 0, lane]
-            sy = ay + t[1, lane] - q[i, 1, lane]
-            sz = az + t[2, lane] - q[i, 2, lane]
+            ax, ay, az, sx, sy, sz = _arm_and_span(i, lane, t, r, q, p)
             distance = np.sqrt(sx * sx + sy * sy + sz * sz)
             inverse = 1.0 / distance
             ux, uy, uz = sx * inverse, sy * inverse, sz * inverse
@@ -120,55 +145,58 @@ def _struts(
 
 
 @inlined
-def _solve(
-    system: NDArray[np.float64],
-    triangle: NDArray[np.float64],
-    solution: NDArray[np.float64],
-    sound: NDArray[np.float64],
-) -> None:
-    """Solve a system, shape (6, 7, LANES), by modified Gram-Schmidt; it is overwritten.
+def _orthogonalise(matrix: NDArray[np.float64], triangle: NDArray[np.float64], sound: NDArray[np.float64]) -> None:
+    """Make the columns of a matrix, shape (6, 6, LANES), orthogonal in place, by modified Gram-Schmidt.
 
-    Column by column what lies along it is taken out of the columns behind it, the right-hand side among them; what
-    was taken out is a unit triangle. This is as stable as elimination with row exchanges, yet exchanges nothing: with
-    the right-hand side treated as a column it is Householder's method in disguise. [Björck, BIT 7 (1967) 1-21; Björck
-    and Paige, SIAM J. Matrix Anal. Appl. 13 (1992) 176-190]
+    Column by column what lies along it is taken out of the columns behind it. With the right-hand side treated as one
+    more column, as `_substitute` does, this is as stable as elimination with row exchanges, yet exchanges nothing: it
+    is Householder's method in disguise. [Björck, BIT 7 (1967) 1-21; Björck and Paige, SIAM J. Matrix Anal. Appl. 13
+    (1992) 176-190]
 
     Args:
-        system: matrix and right-hand side.
-        triangle: work, shape (6, 7, LANES).
-        solution: shape (6, LANES).
+        matrix: to solve with.
+        triangle: gets what was along each column c and, on its diagonal, 1/|c|², shape (6, 6, LANES).
         sound: 1.0 where the matrix has full rank, 0.0 where it has not or is not a number, shape (LANES,).
     """
-    _orthogonalise(system, triangle)
-    for lane in range(LANES):
-        sound[lane] = 1.0
-    for k in range(5, -1, -1):
-        for lane in range(LANES):
-            solution[k, lane] = triangle[k, 6, lane]
-            sound[lane] = sound[lane] if triangle[k, k, lane] < 1.0 / LOOSE else 0.0
-        for j in range(k + 1, 6):
-            for lane in range(LANES):
-                solution[k, lane] -= triangle[k, j, lane] * solution[j, lane]
-
-
-@inlined
-def _orthogonalise(system: NDArray[np.float64], triangle: NDArray[np.float64]) -> None:
-    """Make the columns of a system orthogonal; the triangle gets what was along them and, on its diagonal, 1/|c|²."""
     for k in range(6):
         for lane in range(LANES):
             square = 0.0
             for i in range(6):
-                square += system[i, k, lane] * system[i, k, lane]
+                square += matrix[i, k, lane] * matrix[i, k, lane]
             triangle[k, k, lane] = 1.0 / square
-        for j in range(k + 1, 7):
+            sound[lane] = (1.0 if k == 0 else sound[lane]) if square > LOOSE else 0.0
+        for j in range(k + 1, 6):
             for lane in range(LANES):
                 along = 0.0
                 for i in range(6):
-                    along += system[i, k, lane] * system[i, j, lane]
+                    along += matrix[i, k, lane] * matrix[i, j, lane]
                 along *= triangle[k, k, lane]
                 triangle[k, j, lane] = along
                 for i in range(6):
-                    system[i, j, lane] -= along * system[i, k, lane]
+                    matrix[i, j, lane] -= along * matrix[i, k, lane]
+
+
+@inlined
+def _substitute(
+    matrix: NDArray[np.float64],
+    triangle: NDArray[np.float64],
+    right: NDArray[np.float64],
+    solution: NDArray[np.float64],
+) -> None:
+    """Solve with what `_orthogonalise` left; the right-hand side, shape (6, LANES), is overwritten."""
+    for k in range(6):
+        for lane in range(LANES):
+            along = 0.0
+            for i in range(6):
+                along += matrix[i, k, lane] * right[i, lane]
+            along *= triangle[k, k, lane]
+            solution[k, lane] = along
+            for i in range(6):
+                right[i, lane] -= along * matrix[i, k, lane]
+    for k in range(4, -1, -1):
+        for j in range(k + 1, 6):
+            for lane in range(LANES):
+                solution[k, lane] -= triangle[k, j, lane] * solution[j, lane]
 
 
 @inlined
@@ -176,24 +204,43 @@ def _compare(
     wanted: NDArray[np.float64],
     length: NDArray[np.float64],
     tolerance: float,
-    system: NDArray[np.float64],
+    residual: NDArray[np.float64],
     square: NDArray[np.float64],
     state: NDArray[np.int64],
 ) -> int:
-    """Set a system's right-hand side to wanted less present lengths; return how many lanes are still searching."""
+    """Set the residual to wanted less present lengths, (6, LANES); return how many lanes are still searching."""
     for lane in range(LANES):
         square[lane] = 0.0
     for i in range(6):
         for lane in range(LANES):
-            residual = wanted[i, lane] - length[i, lane]
-            system[i, 6, lane] = residual
-            square[lane] += residual * residual
+            missing = wanted[i, lane] - length[i, lane]
+            residual[i, lane] = missing
+            square[lane] += missing * missing
     searching = 0
     for lane in range(LANES):
         if state[lane] == TOO_MANY_STEPS and square[lane] <= tolerance * tolerance:
             state[lane] = CONVERGED
         searching += 1 if state[lane] == TOO_MANY_STEPS else 0
     return searching
+
+
+@inlined
+def _newton(
+    reuse: bool,  # noqa: FBT001 - compiled kernels take no keywords
+    matrix: NDArray[np.float64],
+    triangle: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    step: NDArray[np.float64],
+    sound: NDArray[np.float64],
+    state: NDArray[np.int64],
+) -> None:
+    """Step that takes the residual away to first order, with the matrix given or what is left of the one before."""
+    if not reuse:
+        _orthogonalise(matrix, triangle, sound)
+        for lane in range(LANES):
+            if state[lane] == TOO_MANY_STEPS and sound[lane] == 0.0:
+                state[lane] = SINGULAR
+    _substitute(matrix, triangle, residual, step)
 
 
 @inlined
@@ -235,10 +282,10 @@ def strut_lengths(
 ) -> None:
     """Strut lengths, shape (n, 6) [mm], at positions (n, 3) and rotations (n, 3, 3) [CAL eq 1]."""
     t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
-    length, arm, jacobian = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, 6, LANES))
+    length = np.empty((6, LANES))
     for first in range(start, stop, LANES):
         _gather_machine(start, first, stop, position, rotation, base, platform, t, r, q, p)
-        _struts(t, r, q, p, length, arm, jacobian)
+        _lengths(t, r, q, p, length)
         for n in range(first, min(first + LANES, stop)):
             for i in range(6):
                 lengths[n, i] = length[i, n - first]
@@ -288,26 +335,29 @@ def forward(
     """Newton-Raphson on the strut lengths [CAL eq 2], from near poses to those with the lengths `target` (n, 6).
 
     Each step solves J (dt, w) = target - L with the exact Jacobian and turns the platform by an exact rotation, so
-    convergence is quadratic. `outcome` (n,) says how each pose ended: converged where the root of the sum of the six
+    convergence is quadratic. Only the third step takes the Jacobian of the second: poses that are off by tenths of a
+    millimetre are at rounding after it, for the price of a residual. `outcome` (n,) says how each pose ended: converged where the root of the sum of the six
     squared residuals is within `tolerance` [mm], which no NaN can be.
     """
     t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
     length, arm, wanted = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, LANES))
-    system, triangle, step = np.empty((6, 7, LANES)), np.empty((6, 7, LANES)), np.empty((6, LANES))
-    square, sound, state = np.empty(LANES), np.empty(LANES), np.empty(LANES, dtype=np.int64)
+    matrix, triangle = np.empty((6, 6, LANES)), np.empty((6, 6, LANES))
+    residual, step, square = np.empty((6, LANES)), np.empty((6, LANES)), np.empty(LANES)
+    sound, state = np.empty(LANES), np.empty(LANES, dtype=np.int64)
     for first in range(start, stop, LANES):
         _gather_machine(start, first, stop, near_position, near_rotation, base, platform, t, r, q, p)
         _gather(first, stop, target, wanted)
         for lane in range(LANES):
             state[lane] = TOO_MANY_STEPS  # until it turns out otherwise
-        for _ in range(most_steps):
-            _struts(t, r, q, p, length, arm, system)
-            if _compare(wanted, length, tolerance, system, square, state) == 0:
+        for number in range(most_steps):
+            reuse = number == REUSING
+            if reuse:
+                _lengths(t, r, q, p, length)
+            else:
+                _struts(t, r, q, p, length, arm, matrix)
+            if _compare(wanted, length, tolerance, residual, square, state) == 0:
                 break
-            _solve(system, triangle, step, sound)
-            for lane in range(LANES):
-                if state[lane] == TOO_MANY_STEPS and sound[lane] == 0.0:
-                    state[lane] = SINGULAR
+            _newton(reuse, matrix, triangle, residual, step, sound, state)
             _move(t, r, step, state)
         for n in range(first, min(first + LANES, stop)):
             outcome[n] = state[n - first]
@@ -332,14 +382,10 @@ def adjoint(
 
     Shapes: units and arms (n, 6, 3), direction and moment (n, 3).
     """
-    unit, arm, force, turning = (
-        np.empty((6, 3, LANES)),
-        np.empty((6, 3, LANES)),
-        np.empty((3, LANES)),
-        np.empty((3, LANES)),
-    )
-    system, triangle, g = np.empty((6, 7, LANES)), np.empty((6, 7, LANES)), np.empty((6, LANES))
-    sound = np.empty(LANES)
+    unit, arm = np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
+    force, turning, sound = np.empty((3, LANES)), np.empty((3, LANES)), np.empty(LANES)
+    matrix, triangle = np.empty((6, 6, LANES)), np.empty((6, 6, LANES))
+    right, g = np.empty((6, LANES)), np.empty((6, LANES))
     for first in range(start, stop, LANES):
         _gather_matrices(first, stop, units, unit)
         _gather_matrices(first, stop, arms, arm)
@@ -348,14 +394,15 @@ def adjoint(
         for i in range(6):
             for lane in range(LANES):
                 ux, uy, uz = unit[i, 0, lane], unit[i, 1, lane], unit[i, 2, lane]
-                system[0, i, lane], system[1, i, lane], system[2, i, lane] = ux, uy, uz
-                system[3, i, lane], system[4, i, lane], system[5, i, lane] = _cross(
+                matrix[0, i, lane], matrix[1, i, lane], matrix[2, i, lane] = ux, uy, uz
+                matrix[3, i, lane], matrix[4, i, lane], matrix[5, i, lane] = _cross(
                     arm[i, 0, lane], arm[i, 1, lane], arm[i, 2, lane], ux, uy, uz
                 )
         for k in range(3):
             for lane in range(LANES):
-                system[k, 6, lane], system[3 + k, 6, lane] = force[k, lane], turning[k, lane]
-        _solve(system, triangle, g, sound)
+                right[k, lane], right[3 + k, lane] = force[k, lane], turning[k, lane]
+        _orthogonalise(matrix, triangle, sound)
+        _substitute(matrix, triangle, right, g)
         for n in range(first, min(first + LANES, stop)):
             outcome[n] = CONVERGED if sound[n - first] == 1.0 else SINGULAR
             for i in range(6):
@@ -370,13 +417,14 @@ def _bar_system(
     tool: NDArray[np.float64],
     jacobian: NDArray[np.float64],
     span: NDArray[np.float64],
-    system: NDArray[np.float64],
+    matrix: NDArray[np.float64],
+    right: NDArray[np.float64],
 ) -> None:
     """Length of the bar, shape (LANES,), and the system J^T g = [n, (R o) x n] with n its direction, o the tool ball."""
     for i in range(6):
         for k in range(6):
             for lane in range(LANES):
-                system[k, i, lane] = jacobian[i, k, lane]
+                matrix[k, i, lane] = jacobian[i, k, lane]
     for lane in range(LANES):
         ox, oy, oz = tool[0, lane], tool[1, lane], tool[2, lane]
         lx = r[0, 0, lane] * ox + r[0, 1, lane] * oy + r[0, 2, lane] * oz
@@ -388,8 +436,8 @@ def _bar_system(
         span[lane] = np.sqrt(sx * sx + sy * sy + sz * sz)
         inverse = 1.0 / span[lane]
         nx, ny, nz = sx * inverse, sy * inverse, sz * inverse
-        system[0, 6, lane], system[1, 6, lane], system[2, 6, lane] = nx, ny, nz
-        system[3, 6, lane], system[4, 6, lane], system[5, 6, lane] = _cross(lx, ly, lz, nx, ny, nz)
+        right[0, lane], right[1, lane], right[2, lane] = nx, ny, nz
+        right[3, lane], right[4, lane], right[5, lane] = _cross(lx, ly, lz, nx, ny, nz)
 
 
 @compiled
@@ -417,19 +465,21 @@ def bar(
     """
     t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
     length, arm, jacobian = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, 6, LANES))
-    system, triangle, g = np.empty((6, 7, LANES)), np.empty((6, 7, LANES)), np.empty((6, LANES))
+    matrix, triangle = np.empty((6, 6, LANES)), np.empty((6, 6, LANES))
+    right, g = np.empty((6, LANES)), np.empty((6, LANES))
     ball, tool, span, sound = np.empty((3, LANES)), np.empty((3, LANES)), np.empty(LANES), np.empty(LANES)
     for first in range(start, stop, LANES):
         _gather_machine(start, first, stop, position, rotation, base, platform, t, r, q, p)
         _gather(first, stop, fixed_ball, ball)
         _gather(first, stop, tool_ball, tool)
         _struts(t, r, q, p, length, arm, jacobian)
-        _bar_system(t, r, ball, tool, jacobian, span, system)
+        _bar_system(t, r, ball, tool, jacobian, span, matrix, right)
         for n in range(first, min(first + LANES, stop)):
             lengths[n] = span[n - first]
             for k in range(3):
-                directions[n, k] = system[k, 6, n - first]
-        _solve(system, triangle, g, sound)
+                directions[n, k] = right[k, n - first]
+        _orthogonalise(matrix, triangle, sound)
+        _substitute(matrix, triangle, right, g)
         for n in range(first, min(first + LANES, stop)):
             outcome[n] = CONVERGED if sound[n - first] == 1.0 else SINGULAR
             for i in range(6):

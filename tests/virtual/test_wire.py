@@ -52,9 +52,10 @@ def test_the_display_takes_its_time() -> None:
         first_s = time.monotonic() - asked_s
         port.read(16)
         last_s = time.monotonic() - asked_s
-    # Request 1.15 ms, latency 51 ms, then 17 characters of 1.15 ms; a loaded computer may only be later.
+    # Request 1.15 ms, latency 51 ms, then 17 characters of 1.15 ms. A loaded computer may be later, and then hands over
+    # the last few characters at once: up to four of them have been seen to come early.
     assert first_s > 0.0525
-    assert last_s > 0.0714
+    assert last_s > 0.0714 - 4 * 0.00115
     assert last_s - first_s > 0.010
 
 

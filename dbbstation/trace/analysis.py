@@ -53,20 +53,20 @@ def best_circle(
         TraceError: the points do not determine a circle.
     """
     theta = np.radians(theta_deg)
-    points = radius_mm[:, None] * np.column_stack([np.cos(theta), np.sin(theta)])
+    x, y = radius_mm * np.cos(theta), radius_mm * np.sin(theta)
+    columns = np.ones((len(theta), 3))
     centre, radius = np.zeros(2), float(radius_mm.mean())
     for _ in range(MOST_STEPS):
-        spokes = points - centre
-        distance = np.linalg.norm(spokes, axis=1)
-        columns = np.column_stack([spokes / distance[:, None], np.ones(len(theta))])
+        across, along = x - centre[0], y - centre[1]
+        distance = np.sqrt(across * across + along * along)
+        columns[:, 0], columns[:, 1] = across / distance, along / distance
         step, _, rank, _ = np.linalg.lstsq(columns, distance - radius, rcond=1e-9)
         if rank < columns.shape[1]:
             break
         centre += step[:2]
         radius += step[2]
         if np.abs(step).max() < CENTRE_TOLERANCE_MM:
-            deviation = np.linalg.norm(points - centre, axis=1) - radius
-            return centre, radius, deviation
+            return centre, radius, np.hypot(x - centre[0], y - centre[1]) - radius
     raise TraceError(
         "its points do not determine a circle",
         remedy="record more of the turn",

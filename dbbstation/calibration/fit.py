@@ -241,11 +241,11 @@ def _settled(
     blocks: Sequence[Block], layout: Layout, noise: Noise, held: NDArray[np.float64]
 ) -> tuple[Solution, Noise]:
     """Solve with the noise that the solution itself leaves: three rounds settle it to a per mille."""
-    count = sum(block.count for block in blocks)
+    count = sum(block.count for block in blocks if block.noise is None)
     sigma = noise.sigma
     for _ in range(3):
         solution = solve(blocks, layout.known, sigma * np.sqrt(noise.correlation_samples), held)
-        square = (solution.chi2 - solution.prior_chi2) * sigma**2 * noise.correlation_samples
+        square = (solution.chi2 - solution.stated_chi2) * sigma**2 * noise.correlation_samples
         sigma = float(np.sqrt(max(square, 0.0) / max(count - solution.freedom_used, 1.0)))
         sigma = max(sigma, SMALLEST_NOISE_MM)
     return solution, Noise(sigma, noise.correlation_samples)

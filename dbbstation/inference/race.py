@@ -69,14 +69,14 @@ class Race:
         base: what is known of the base columns.
         held: orthonormal rows of fitted base directions to keep at zero, in units of the scales.
         columns: number of all columns.
-        noise: standard deviation of one measurement.
+        noise: standard deviation of one measurement, where a block does not state its own.
     """
 
     def __init__(
         self, blocks: Sequence[Block], base: Columns, held: NDArray[np.float64], columns: int, noise: float
     ) -> None:
         count = len(base.prior)
-        whole = _whole(blocks, columns) / noise
+        whole = _whole(blocks, columns, noise)
         random, fitted = np.flatnonzero(base.random), np.flatnonzero(~base.random)
         free = free_directions(base, fitted, held)
         eliminated = np.hstack([whole[:, random], whole[:, fitted] @ free])
@@ -207,14 +207,14 @@ def _settled(race: Race, chosen: list[Choice]) -> list[Choice]:
     return chosen
 
 
-def _whole(blocks: Sequence[Block], columns: int) -> NDArray[np.float64]:
-    """One triangle of all blocks, target last, at unit noise."""
+def _whole(blocks: Sequence[Block], columns: int, noise: float) -> NDArray[np.float64]:
+    """One triangle of all blocks, target last, weighted by their noise."""
     rows = []
     for block in blocks:
         wide = np.zeros((len(block.target), columns + 1))
         wide[:, block.columns] = block.triangle
         wide[:, -1] = block.target
-        rows.append(wide)
+        rows.append(wide / (noise if block.noise is None else block.noise))
     (triangle,) = qr(np.vstack(rows), mode="r", overwrite_a=True)
     return np.asarray(triangle, dtype=np.float64)[: columns + 1]
 

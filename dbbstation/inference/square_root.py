@@ -39,6 +39,8 @@ class Block:
         target: transformed right-hand side, shape (r,).
         count: measurements that went into it.
         square: sum of squares of the target, which bounds what any fit can explain.
+        noise: standard deviation of one measurement where the block does not share the channel's: another
+            instrument's readings, whose uncertainty is stated; None for the channel's.
     """
 
     columns: NDArray[np.int64]
@@ -46,6 +48,7 @@ class Block:
     target: NDArray[np.float64]
     count: int
     square: float
+    noise: float | None = None
 
 
 def compress(columns: NDArray[np.int64], jacobian: NDArray[np.float64], target: NDArray[np.float64]) -> Block:
@@ -94,8 +97,8 @@ class Solution:
         directions: what the measurement sees of the fitted columns, the random ones averaged over.
         held: orthonormal rows of directions, in units of the scales, that were held at zero, shape (h, f).
         chi2: weighted sum of squares that remains, priors included.
-        prior_chi2: the priors' part of it.
-        freedom_used: degrees of freedom that the fit spent on the measurements.
+        stated_chi2: the part of it that comes from what is stated: priors, and blocks with a noise of their own.
+        freedom_used: degrees of freedom that the fit spent on measurements of the channel's own noise.
     """
 
     x: NDArray[np.float64]
@@ -103,7 +106,7 @@ class Solution:
     directions: Directions
     held: NDArray[np.float64]
     chi2: float
-    prior_chi2: float
+    stated_chi2: float
     freedom_used: float
 
 
@@ -118,7 +121,7 @@ def solve(
     Args:
         blocks: compressed runs.
         known: priors and scales.
-        noise: standard deviation of one measurement.
+        noise: standard deviation of one measurement, where a block does not state its own.
         held: orthonormal rows of fitted directions, in units of the scales, to keep at zero, shape (h, f).
     """
     random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
@@ -145,15 +148,20 @@ def solve(
     covariance = factor @ factor.T
     remaining = target - root @ np.concatenate([x[random], x[fitted]])
     with_prior = np.isfinite(known.prior)
-    prior_chi2 = float(np.sum((x[with_prior] / known.prior[with_prior]) ** 2))
+    stated_chi2 = float(np.sum((x[with_prior] / known.prior[with_prior]) ** 2))
     used = m + len(s) - float(np.sum(np.diag(covariance)[with_prior] / known.prior[with_prior] ** 2))
+    for block in blocks:
+        if block.noise is not None:
+            rows = block.triangle / block.noise
+            stated_chi2 += float(np.sum((rows @ x[block.columns] - block.target / block.noise) ** 2))
+            used -= float(np.sum((rows @ factor[block.columns]) ** 2))
     return Solution(
         x=x,
         covariance=covariance,
         directions=directions,
         held=held,
         chi2=chi2_floor + float(remaining @ remaining),
-        prior_chi2=prior_chi2,
+        stated_chi2=stated_chi2,
         freedom_used=used,
     )
 
@@ -187,8 +195,9 @@ def _stacked(
     rows = [np.zeros((0, total + 1))]
     for block in blocks:
         wide = np.zeros((len(block.target), total + 1))
-        wide[:, place[block.columns]] = block.triangle / noise
-        wide[:, -1] = block.target / noise
+        own = noise if block.noise is None else block.noise
+        wide[:, place[block.columns]] = block.triangle / own
+        wide[:, -1] = block.target / own
         rows.append(wide)
     finite = np.flatnonzero(np.isfinite(known.prior))
     priors = np.zeros((len(finite), total + 1))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball on the table, as the coordinate measuring machine (CMM) knows it.
+    """A ball on the table, as the coordinate measuring machine (CMM) knows it, or put up under the spindle.
 
     Attributes:
         name: its key in the plan.
@@ -25,6 +25,8 @@ class Ball:
         centre_mm: centre in the machine frame (x, y, z) [mm].
         uncertainty_mm: of the CMM, one standard deviation per axis [mm].
         repeatability_mm: of putting the holder up, one standard deviation per axis [mm].
+        place_known: False for a ball that is put up under the spindle, as the standard circular test does
+            [CAL III-A]; `centre_mm` is then where the machine is told to stand.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Ball:
     centre_mm: tuple[float, float, float]
     uncertainty_mm: float
     repeatability_mm: float
+    place_known: bool = True
 
 
 @dataclass(frozen=True)

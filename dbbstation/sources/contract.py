@@ -43,6 +43,22 @@ class Need(StrEnum):
     CURRENT = "current"
 
 
+@dataclass(frozen=True, eq=False)
+class SetUpErrors:
+    """What a micrometer read of balls that were put up at the spindle [CAL III-A, IV]; NaN where nobody measured.
+
+    Attributes:
+        fixed_ball_mm: fixed ball less tool tip while the machine stood at the ball's commanded place, machine frame,
+            shape (3,) [mm].
+        moving_ball_mm: moving ball less tool tip, platform frame, shape (3,) [mm].
+        uncertainty_mm: of each reading, one standard deviation [mm].
+    """
+
+    fixed_ball_mm: NDArray[np.float64]
+    moving_ball_mm: NDArray[np.float64]
+    uncertainty_mm: float
+
+
 @dataclass(frozen=True)
 class Setup:
     """How a run was set up: which ball, which mounting, which bar, and how well each is known.
@@ -58,6 +74,9 @@ class Setup:
         mounting_repeatability_mm: of the holder, one standard deviation per axis [mm].
         ball_uncertainty_mm: of the CMM, one standard deviation per axis [mm].
         bar_uncertainty_mm: of the bar's calibrated length, one standard deviation [mm].
+        place_known: False for a ball that was put up under the spindle: `fixed_ball_mm` is where the machine was told
+            to stand then, and nobody knows where the ball is.
+        set_up_errors: micrometer readings of such a ball; None where there are none.
     """
 
     session: str
@@ -68,6 +87,8 @@ class Setup:
     mounting_repeatability_mm: float
     ball_uncertainty_mm: float
     bar_uncertainty_mm: float
+    place_known: bool = True
+    set_up_errors: SetUpErrors | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dbbstation.inference.noise import noise_of
+from dbbstation.inference.race import Race
 from dbbstation.inference.square_root import Columns, compress, lost_directions, solve
 
 NOISE = 0.3
@@ -70,10 +73,30 @@ def test_chi2_and_freedom(problem):
     solution = solve(blocks_of(jacobians, columns, targets), known, NOISE)
     residual = np.concatenate([t - j @ solution.x[c] for j, c, t in zip(jacobians, columns, targets, strict=True)])
     prior = np.sum((solution.x[3:] / 0.8) ** 2)
-    assert solution.prior_chi2 == pytest.approx(prior)
+    assert solution.stated_chi2 == pytest.approx(prior)
     assert solution.chi2 == pytest.approx(residual @ residual / NOISE**2 + prior)
     hat = sum(np.trace(j @ solution.covariance[np.ix_(c, c)] @ j.T) for j, c in zip(jacobians, columns, strict=True))
     assert solution.freedom_used == pytest.approx(hat / NOISE**2)
+
+
+def test_readings_of_another_instrument_count_with_their_own_noise(problem, rng):
+    jacobians, columns, targets, known, _ = problem
+    other, own = rng.normal(size=(4, 3)), 0.02
+    read = rng.normal(size=4)
+    block = replace(compress(np.arange(3), other, read), noise=own)
+    blocks = [*blocks_of(jacobians, columns, targets), block]
+    solution = solve(blocks, known, NOISE)
+    scaled = [*jacobians, other * NOISE / own]
+    x, covariance = dense(scaled, [*columns, np.arange(3)], [*targets, read * NOISE / own], known)
+    assert np.allclose(solution.x, x, atol=1e-12)
+    assert np.allclose(solution.covariance, covariance, atol=1e-14)
+    left = (read - other @ solution.x[:3]) / own
+    prior = np.sum((solution.x[3:] / 0.8) ** 2)
+    assert solution.stated_chi2 == pytest.approx(left @ left + prior)
+    hat = sum(np.trace(j @ covariance[np.ix_(c, c)] @ j.T) for j, c in zip(jacobians, columns, strict=True))
+    assert solution.freedom_used == pytest.approx(hat / NOISE**2)
+    race = Race(blocks, Columns(known.prior, known.scale, known.random), np.zeros((0, 3)), 8, NOISE)
+    assert race.chi2 == pytest.approx(solution.chi2)
 
 
 def test_a_direction_that_no_run_sees_is_lost_and_held(rng):

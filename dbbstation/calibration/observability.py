@@ -95,6 +95,7 @@ def setup_of(test: PlannedTest) -> Setup:
         mounting_repeatability_mm=ball.repeatability_mm,
         ball_uncertainty_mm=ball.uncertainty_mm,
         bar_uncertainty_mm=0.0,
+        plate=ball.plate,
     )
 
 

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
+PROPOSED = frozenset({Need.POSE, Need.PATH, Need.TIME})
+"""What is known of a test before it is measured."""
+
 SAMPLES = 180
 TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0), (23.0, 0.0), (-23.0, 0.0), (0.0, 23.0))
 ELEVATIONS_DEG = (0.0, 10.0, -10.0)
@@ -62,6 +65,8 @@ def propose(
 ) -> NextTest | None:
     """Return the test that lowers the standard deviation of a source's first amplitude most.
 
+    None where no circle is within reach, or where only the measurement itself shows what the source needs.
+
     Args:
         channel: what was measured.
         source: to reveal, or to tell apart from others.
@@ -69,6 +74,8 @@ def propose(
         others: of the sources that it must be told apart from.
         noise_mm: of one sample [mm].
     """
+    if not source.needs <= PROPOSED:
+        return None
     known = channel.known
     first = len(channel.base.prior)
     wanted = np.concatenate([np.arange(first), variant.columns, *(other.columns for other in others)])

@@ -14,7 +14,7 @@ from dbbstation.files.quantities import Quantity, twice
 from dbbstation.files.schema import Schema, dotted, read_document, validate
 from dbbstation.files.yaml_text import YamlDocument
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.plan.plan import Ball, Plan, PlannedTest
+from dbbstation.plan.plan import Ball, Plan, PlannedTest, Plate
 
 _RADIANS_BELOW_DEG = 0.6
 """A plan whose greatest tilt is smaller than this was written in radians: 0.6 rad is 34 deg."""
@@ -144,7 +144,8 @@ class InlinePlan:
             origin[2] + z,
         )
         repeatability = self.plan.holders[ball.holder].repeatability_um / 1e3
-        return Ball(name, ball.bore, ball.holder, centre, ball.uncertainty_um / 1e3, repeatability)
+        plate = None if ball.bore is None else Plate(origin, self.jig.plate_expansion_um_m_k)
+        return Ball(name, ball.bore, ball.holder, centre, ball.uncertainty_um / 1e3, repeatability, plate=plate)
 
 
 def plan_data(plan: InlinePlan) -> dict[str, Any]:

@@ -176,6 +176,7 @@ class SessionFolder:
             mounting_repeatability_mm=ball.repeatability_mm,
             ball_uncertainty_mm=ball.uncertainty_mm,
             bar_uncertainty_mm=0.0 if self.bar is None else self.bar.calibrator_uncertainty_mm,
+            plate=ball.plate,
         )
 
     def started_s(self, run: RunEntry) -> float | None:

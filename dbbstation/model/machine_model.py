@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import BarSensitivity, Response, bar_sensitivity, forward, strut_lengths
 from dbbstation.machine.rotation import Frames
-from dbbstation.sources.contract import Effect, Fitted, Motion, Owner
+from dbbstation.sources.contract import Effect, Fitted, Motion, Need, Owner
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,10 +71,15 @@ class MachineModel:
 
     def bar(self, motion: Motion) -> BarReading:
         """What a bar about the motion's fixed ball reads, and how that answers to every error, kept rows only."""
-        if motion.setup is None:
+        setup = motion.setup
+        if setup is None:
             raise ValueError("a motion without a set-up has no bar")
+        if motion.reading_mm is None and any(Need.READING in f.source.needs for f in self.sources):
+            # Nobody measured: the encoder stands where all other sources put it.
+            others = replace(self, sources=tuple(f for f in self.sources if Need.READING not in f.source.needs))
+            motion = replace(motion, reading_mm=others.bar(replace(motion, kept=slice(None))).length_mm)
         actual = self.actual(motion)
-        ball = motion.setup.fixed_ball_mm
+        ball = setup.fixed_ball_mm
         if actual.effect.fixed_ball_mm is not None:
             ball = ball + actual.effect.fixed_ball_mm
         sensitivity = bar_sensitivity(actual.hexapod, actual.frames, ball, actual.effect.tool_tip_mm)

@@ -69,6 +69,7 @@ class Observation:
             temperature_degc={name: _held_back(values, before) for name, values in raw.temperature_degc.items()},
             motor_current_a=None if raw.motor_current_a is None else _held_back(raw.motor_current_a, before),
             setup=self.setup,
+            reading_mm=_held_back(raw.length_mm, before),
         )
 
 

@@ -15,6 +15,19 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class Plate:
+    """The jig plate that balls stand on.
+
+    Attributes:
+        origin_mm: where the origin of its frame stands, machine frame (x, y, z) [mm].
+        expansion_um_m_k: thermal expansion [µm/(m K)]; None where not noted.
+    """
+
+    origin_mm: tuple[float, float, float]
+    expansion_um_m_k: float | None = None
+
+
+@dataclass(frozen=True)
 class Ball:
     """A ball on the table, as the coordinate measuring machine (CMM) knows it, or put up under the spindle.
 
@@ -27,6 +40,7 @@ class Ball:
         repeatability_mm: of putting the holder up, one standard deviation per axis [mm].
         place_known: False for a ball that is put up under the spindle, as the standard circular test does
             [CAL III-A]; `centre_mm` is then where the machine is told to stand.
+        plate: that its bore is in; None where it stands in no bore.
     """
 
     name: str
@@ -36,6 +50,7 @@ class Ball:
     uncertainty_mm: float
     repeatability_mm: float
     place_known: bool = True
+    plate: Plate | None = None
 
 
 @dataclass(frozen=True)

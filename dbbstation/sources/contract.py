@@ -1,8 +1,9 @@
 """The contract of an error source: what it is given, what it declares, what it answers.
 
 A machine model is its nominal geometry plus a list of error sources. A source is asked for its `effect` on a
-`Motion` and for the derivative of that effect by each of its parameters. It never sees a measured length, and
-never changes anything but struts, joints, the tool tip, the bar's reading or a motor's current.
+`Motion` and for the derivative of that effect by each of its parameters. It sees a measured length only as the place
+of the bar's own encoder, and never changes anything but struts, joints, the tool tip, the bar's reading or a motor's
+current.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.plan import Plate
 
 
 class Owner(StrEnum):
@@ -41,6 +43,7 @@ class Need(StrEnum):
     TIME = "time"
     TEMPERATURE = "temperature"
     CURRENT = "current"
+    READING = "reading"
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,7 @@ class Setup:
         place_known: False for a ball that was put up under the spindle: `fixed_ball_mm` is where the machine was told
             to stand then, and nobody knows where the ball is.
         set_up_errors: micrometer readings of such a ball; None where there are none.
+        plate: jig plate that the ball stands on; None where it stands in no bore.
     """
 
     session: str
@@ -89,6 +93,7 @@ class Setup:
     bar_uncertainty_mm: float
     place_known: bool = True
     set_up_errors: SetUpErrors | None = None
+    plate: Plate | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +112,8 @@ class Motion:
             `strut1` ...), each of shape (n,) [degC].
         motor_current_a: logged motor currents, shape (n, 6) [A]; None where not logged.
         setup: None for poses that nobody measured.
+        reading_mm: what the bar showed, shape (n,) [mm]: the place of its encoder, for errors of that encoder alone;
+            None where nothing was measured.
     """
 
     poses: NDArray[np.float64]
@@ -116,6 +123,7 @@ class Motion:
     temperature_degc: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     motor_current_a: NDArray[np.float64] | None = None
     setup: Setup | None = None
+    reading_mm: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -125,6 +133,7 @@ class Motion:
         """What sources may ask of this motion."""
         given = {Need.POSE: True, Need.PATH: self.is_path, Need.TIME: self.time_s is not None}
         given |= {Need.TEMPERATURE: bool(self.temperature_degc), Need.CURRENT: self.motor_current_a is not None}
+        given[Need.READING] = self.reading_mm is not None
         return frozenset(need for need, there in given.items() if there)
 
 
@@ -139,6 +148,8 @@ class Parameter:
         meaning: one line with the sign.
         shape: values to search over, where the effect is not proportional to the parameter (a time constant, a
             phase); empty for an amplitude, which the effect is proportional to.
+        tolerance: standard deviation that the machine file states, in that unit: a fit takes it for known; None where
+            nothing is stated.
     """
 
     name: str
@@ -146,6 +157,7 @@ class Parameter:
     plausible: float
     meaning: str
     shape: tuple[float, ...] = ()
+    tolerance: float | None = None
 
 
 @dataclass(frozen=True)
@@ -275,6 +287,7 @@ _HOW_TO_GIVE = {
     Need.TIME: "give a recording with times, or a model without this source",
     Need.TEMPERATURE: "give recordings with a temperature column, or a model without this source",
     Need.CURRENT: "give recordings with motor currents, or a model without this source",
+    Need.READING: "give recordings of the bar, or a model without this source",
 }
 
 

@@ -170,6 +170,7 @@ class VirtualMachine:
             mounting_repeatability_mm=ball.repeatability_mm,
             ball_uncertainty_mm=ball.uncertainty_mm,
             bar_uncertainty_mm=self.sizes.bar_uncertainty_mm,
+            plate=ball.plate,
         )
 
     def _of_the_measurement(self, ball: Ball) -> tuple[Fitted, ...]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dbbstation.machine.geometry import Compliance, Machine, Masses, StrutMasses
 from dbbstation.machine.rotation import Rotation
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.plan.plan import Plate
 from dbbstation.sources.base_joints import BaseJoints
 from dbbstation.sources.contract import Motion, Setup
 from dbbstation.sources.strut_reference_length import StrutReferenceLength
@@ -56,6 +57,7 @@ BORES_MM = {
     8: (100, 100),
     9: (0, 0),
 }
+PLATE = Plate((0.0, 0.0, -1150.0), 11.5)
 LEVELS_MM = {1: -1150.0, 2: -1008.0, 3: -870.0}
 DEG_PER_S = np.degrees(1000.0 / 60.0 / 150.0)
 
@@ -67,7 +69,7 @@ def circle(centre_mm, tilt_deg, theta_deg, radius_mm=150.0, **given) -> Motion:
     poses = np.zeros((len(theta), 6))
     poses[:, :3] = ball + radius_mm * np.column_stack([np.cos(theta), np.sin(theta), np.zeros(len(theta))])
     poses[:, 3:5] = tilt_deg
-    setup = Setup("session", "mounting", "ball", "bar", ball, 1e-3, 1e-3, 5e-4)
+    setup = Setup("session", "mounting", "ball", "bar", ball, 1e-3, 1e-3, 5e-4, plate=PLATE)
     return Motion(poses, setup=setup, **given)
 
 
@@ -118,9 +120,10 @@ def random_run(rng, count=300) -> Motion:
     s = np.linspace(0, 1, count)[:, None]
     waves = sum(rng.normal(0, 1 / k, 6) * np.sin(2 * np.pi * k * s + rng.uniform(0, 2 * np.pi, 6)) for k in range(1, 4))
     poses = np.array([0, 0, -1030, 0, 0, 0]) + waves * np.array([50, 50, 30, 4, 4, 2])
-    setup = Setup("session", "mounting", "ball", "bar", np.array([10.0, 20.0, -1150.0]), 1e-3, 1e-3, 5e-4)
+    setup = Setup("session", "mounting", "ball", "bar", np.array([10.0, 20.0, -1150.0]), 1e-3, 1e-3, 5e-4, plate=PLATE)
     time_s = np.sort(rng.uniform(0, 5000, count))
-    return Motion(poses, is_path=True, kept=slice(20, None), time_s=time_s, setup=setup)
+    reading = 150.0 + 0.05 * np.sin(6 * np.pi * s[:, 0])
+    return Motion(poses, is_path=True, kept=slice(20, None), time_s=time_s, setup=setup, reading_mm=reading)
 
 
 def concealed(machine: Machine, runs: list[Motion], derivative) -> tuple[NDArray, NDArray, int]:

@@ -19,6 +19,7 @@ WITHOUT = {
     Need.TIME: {"time_s": None},
     Need.TEMPERATURE: {"temperature_degc": {}},
     Need.CURRENT: {"motor_current_a": None},
+    Need.READING: {"reading_mm": None},
 }
 
 

@@ -10,9 +10,15 @@ from pydantic_core import PydanticCustomError
 from dbbstation.errors import Problem
 from dbbstation.files.quantities import Coordinate, ExpansionUmMK, Point, Quantity, TemperatureDegc
 from dbbstation.files.schema import Schema, dotted, read_document, validate
-from dbbstation.files.yaml_text import YamlDocument
+from dbbstation.files.yaml_text import Location, YamlDocument
+
+BY_CMM, UNDER_SPINDLE = "cmm", "under-spindle"
+"""How a ball is placed: where a CMM measured it, or where nobody knows."""
 
 _CLOSEST_BORES_MM = 5.0
+
+_OF_THE_CMM = ("bore", "holder", "uncertainty_um")
+"""What only a ball has that a CMM measured."""
 
 
 def _spaced(bores: dict[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
@@ -53,16 +59,19 @@ class HolderSchema(Schema):
 
 
 class BallSchema(Schema):
-    """A ball as the coordinate measuring machine found it."""
+    """A ball as the coordinate measuring machine found it, or one that is put up under the spindle."""
 
+    placed: Literal["cmm", "under-spindle"] = "cmm"
+    """`cmm`: a CMM measured where it stands; `under-spindle`: the machine drives there and it is put up at the tool tip,
+    as the standard circular test does: nobody knows where it stands."""
     bore: int | None = None
     """Bore that it stands in; null for a ball that stands in none."""
-    holder: str
-    """Holder that it stands on."""
+    holder: str | None = None
+    """Holder that it stands on; only of a ball placed by CMM."""
     centre_mm: Point
-    """Centre: x, y, z, jig frame [mm]."""
-    uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000, or_zero=True)]
-    """Uncertainty of each coordinate, one standard deviation [µm]."""
+    """Centre: x, y, z, jig frame; under the spindle, where the machine is told to stand when it is put up [mm]."""
+    uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000, or_zero=True)] | None = None
+    """Uncertainty of each coordinate, one standard deviation; only of a ball placed by CMM [µm]."""
 
 
 class JigFile(Schema):
@@ -95,12 +104,15 @@ def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Pro
 
     Args:
         document: holds `balls`.
-        jig: the mapping with the bores.
+        jig: the mapping with the bores; None where there is no plate.
         holders: the mapping of holders, or their names.
         faults: grows.
     """
     bores = _plain_bores(jig)
     for location, ball in document.entries("balls"):
+        _check_placed(document, location, ball, faults)
+        if ball.get("placed") == UNDER_SPINDLE:
+            continue
         holder = ball.get("holder")
         if isinstance(holders, dict | set) and isinstance(holder, str) and holder not in holders:
             known = ", ".join(sorted(map(str, holders))) or "none"
@@ -123,6 +135,21 @@ def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Pro
                     "expected mm in the jig frame"
                 )
                 faults.append(document.problem((*location, "centre_mm"), what, "check bore, centre and unit"))
+
+
+def _check_placed(document: YamlDocument, location: Location, ball: dict[Any, Any], faults: list[Problem]) -> None:
+    """Check that a ball says what is known of its place, and nothing that nobody can know."""
+    if ball.get("placed") == UNDER_SPINDLE:
+        for key in _OF_THE_CMM:
+            if ball.get(key) is not None:
+                what = f"{dotted(location)}: a ball that is put up under the spindle has no `{key}`"
+                remedy = "take it out, or take `placed` out where a CMM measured the ball"
+                faults.append(document.problem((*location, key), what, remedy, at_key=True))
+    elif ball.get("placed", BY_CMM) == BY_CMM:
+        for key in ("holder", "uncertainty_um"):
+            if ball.get(key) is None:
+                what = f"{dotted(location)}: the key `{key}` is missing"
+                faults.append(document.problem((*location, key), what, "add it"))
 
 
 def _plain_bores(jig: Any) -> dict[int, tuple[float, float]] | None:  # noqa: ANN401 - raw data

@@ -9,12 +9,24 @@ from pydantic import AfterValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.jig_file import BallSchema, HolderSchema, JigFile, JigSchema, check_balls, parse_jig
+from dbbstation.files.jig_file import (
+    BY_CMM,
+    UNDER_SPINDLE,
+    BallSchema,
+    HolderSchema,
+    JigFile,
+    JigSchema,
+    check_balls,
+    parse_jig,
+)
 from dbbstation.files.quantities import Quantity, twice
 from dbbstation.files.schema import Schema, dotted, read_document, validate
 from dbbstation.files.yaml_text import YamlDocument
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.plan import Ball, Plan, PlannedTest, Plate
+
+NO_PLATE = JigSchema(bores={}, origin_in_machine_mm=(0.0, 0.0, 0.0))
+"""A plan that puts all its balls up under the spindle needs no plate: places are in the machine frame."""
 
 _RADIANS_BELOW_DEG = 0.6
 """A plan whose greatest tilt is smaller than this was written in radians: 0.6 rad is 34 deg."""
@@ -101,11 +113,15 @@ class PlanFile(Schema):
     """What people call the plan."""
     path: PathSchema
     """How the circles are travelled."""
-    jig: Annotated[
-        Annotated[JigSchema, Tag("inline")] | Annotated[str, Tag("path")],
-        Discriminator(lambda jig: "path" if isinstance(jig, str) else "inline"),
-    ]
-    """The plate; or the path of a `dbb-jig/1` file, from this file's folder, that holds plate, holders and balls."""
+    jig: (
+        Annotated[
+            Annotated[JigSchema, Tag("inline")] | Annotated[str, Tag("path")],
+            Discriminator(lambda jig: "path" if isinstance(jig, str) else "inline"),
+        ]
+        | None
+    ) = None
+    """The plate; or the path of a `dbb-jig/1` file, from this file's folder, that holds plate, holders and balls. Absent
+    where every ball is put up under the spindle: places are in the machine frame then."""
     holders: dict[str, HolderSchema] = Field(default_factory=dict)
     """Holders by name."""
     balls: dict[str, BallSchema] = Field(default_factory=dict)
@@ -122,7 +138,7 @@ class InlinePlan:
 
     Attributes:
         plan: as the file has it; its `jig` is no path any more.
-        jig: the plate.
+        jig: the plate; one without bores where the plan has none.
     """
 
     plan: PlanFile
@@ -143,6 +159,9 @@ class InlinePlan:
             origin[1] + x * math.sin(turn) + y * math.cos(turn),
             origin[2] + z,
         )
+        if ball.holder is None or ball.uncertainty_um is None:
+            # Only a ball under the spindle comes without them. How well it stands is for a micrometer to say.
+            return Ball(name, None, "", centre, 0.0, 0.0, place_known=False)
         repeatability = self.plan.holders[ball.holder].repeatability_um / 1e3
         plate = None if ball.bore is None else Plate(origin, self.jig.plate_expansion_um_m_k)
         return Ball(name, ball.bore, ball.holder, centre, ball.uncertainty_um / 1e3, repeatability, plate=plate)
@@ -150,7 +169,11 @@ class InlinePlan:
 
 def plan_data(plan: InlinePlan) -> dict[str, Any]:
     """Return a plan as its file holds it, the jig inline."""
-    return plan.plan.model_dump(exclude_none=True)
+    data = plan.plan.model_dump(exclude_none=True)
+    for ball in data["balls"].values():
+        if ball["placed"] != UNDER_SPINDLE:
+            del ball["placed"]  # the usual case goes without saying
+    return data
 
 
 def _planned(test: TestSchema, ball: Ball, general: PathSchema) -> PlannedTest:
@@ -206,12 +229,16 @@ def parse_plan(path: Path, faults: list[Problem]) -> InlinePlan | None:
     jig_file = parse_jig(path.parent / named, faults) if isinstance(named, str) else None
     holders, balls = _merged(document, jig_file, faults)
     check_balls(document, jig_file.model_dump()["jig"] if jig_file else named, holders, faults)
+    if named is None and any(ball.get("placed", BY_CMM) == BY_CMM for _, ball in document.entries("balls")):
+        remedy = "add it; only a plan that puts all its balls up under the spindle needs none"
+        faults.append(document.problem((), "the key `jig` is missing", remedy))
     if jig_file is not None or not isinstance(named, str):
         _check_tests(document, balls, faults)
+        _check_under_spindle(document, jig_file, faults)
     if plan is None or len(faults) > before:
         return None
     if jig_file is None:
-        return None if isinstance(plan.jig, str) else InlinePlan(plan, plan.jig)
+        return None if isinstance(plan.jig, str) else InlinePlan(plan, plan.jig or NO_PLATE)
     whole = {"jig": jig_file.jig, "holders": jig_file.holders | plan.holders, "balls": jig_file.balls | plan.balls}
     return InlinePlan(plan.model_copy(update=whole), jig_file.jig)
 
@@ -248,6 +275,27 @@ def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem])
             what = f"repeat_at_end: there is no test `{name}`"
             faults.append(document.problem(("repeat_at_end", index), what, "name tests of this plan"))
     _check_tilt_unit(document, faults)
+
+
+def _check_under_spindle(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) -> None:
+    """Refuse a ball that is put up under the spindle at one tilt and measured at another.
+
+    Errors of the machine lie between the two; what a micrometer reads against the spindle holds for one tilt alone.
+    """
+    balls = document.entries("balls")
+    under = {location[-1] for location, ball in balls if ball.get("placed") == UNDER_SPINDLE}
+    under |= set() if jig is None else {name for name, ball in jig.balls.items() if ball.placed == UNDER_SPINDLE}
+    first: dict[Any, tuple[tuple[Any, ...], Any]] = {}
+    for location, test in document.entries("tests"):
+        ball, tilt = test.get("ball"), tuple(test.get(key, 0) for key in ("a_deg", "b_deg", "c_deg"))
+        if not isinstance(ball, str) or ball not in under:
+            continue
+        tilt_then, name_then = first.setdefault(ball, (tilt, test.get("name")))
+        if tilt != tilt_then:
+            what = (
+                f"{dotted(location)}: the ball `{ball}` is put up under the spindle at the tilt of test `{name_then}`"
+            )
+            faults.append(document.problem((*location, "ball"), what, "give each tilt a ball of its own"))
 
 
 def _check_tilt_unit(document: YamlDocument, faults: list[Problem]) -> None:

@@ -154,3 +154,27 @@ def test_the_jig_frame_is_turned_and_moved_into_the_machine(tmp_path: Path) -> N
     # +X of the jig points along +Y of the machine.
     assert ball.centre_mm == pytest.approx((10.0 - 5.0, 20.0 + 100.0, -1120.0))
     assert (ball.uncertainty_mm, ball.repeatability_mm) == (0.8e-3, 0.58e-3)
+
+
+def test_the_conventional_plan_has_the_places_of_table_2_and_balls_that_nobody_knows() -> None:
+    folder = shipped_folder("protocols") / "plans"
+    plan, on_the_plate = read_plan(folder / "conventional.yaml"), read_plan(folder / "table2.yaml")
+    assert list(plan.tests) == list(on_the_plate.tests)
+    for name, test in plan.tests.items():
+        assert test.circle == on_the_plate.tests[name].circle
+        assert test.directions == on_the_plate.tests[name].directions
+        assert not test.ball.place_known
+        assert (test.ball.bore, test.ball.holder, test.ball.plate) == (None, "", None)
+    assert len({test.ball.name for test in plan.tests.values()}) == 15
+    assert all(test.ball.place_known for test in on_the_plate.tests.values())
+
+
+def test_a_ball_under_the_spindle_may_stand_beside_a_plate_and_is_placed_in_its_frame() -> None:
+    tests = read_plan(EVERY_KEY).tests
+    assert tests["conventional"].ball.centre_mm == (50.0, 50.0, -1008.0)
+    assert [test.ball.place_known for test in tests.values()] == [True, True, True, False]
+
+
+def test_the_usual_placing_is_not_written_down() -> None:
+    assert "placed: cmm" not in yaml_text(plan_data(read_inline_plan(EVERY_KEY)))
+    assert yaml_text(plan_data(read_inline_plan(EVERY_KEY))).count("placed: under-spindle") == 1

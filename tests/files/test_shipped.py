@@ -45,4 +45,4 @@ def test_from_a_wheel(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, env=environment, check=True, capture_output=True, text=True
     )
-    assert done.stdout.split() == [str(installed / "dbbstation" / "protocols"), "15", "3"]
+    assert done.stdout.split() == [str(installed / "dbbstation" / "protocols"), "15", "4"]

@@ -16,6 +16,7 @@ from dbbstation.files.shipped import shipped_folder
 FIXTURES = shipped_folder("fixtures")
 MACHINE = (FIXTURES / "machines" / "every-key.yaml").read_text()
 PLAN = (shipped_folder("protocols") / "plans" / "ten-minute-check.yaml").read_text()
+CONVENTIONAL = (shipped_folder("protocols") / "plans" / "conventional.yaml").read_text()
 JIG = (FIXTURES / "jigs" / "reference-plate.yaml").read_text()
 
 
@@ -286,3 +287,44 @@ def test_a_plan_that_names_no_jig_file_that_exists(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read_plan(path)
     assert [Path(problem.file).name for problem in caught.value.problems] == ["none.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("a: {placed: under-spindle,", "a: {placed: under-spindle, bore: 9,", "balls.a: a ball that is put up under the spindle has no `bore`"),
+        ("a: {placed: under-spindle,", "a: {placed: under-spindle, holder: short,", "balls.a: a ball that is put up under the spindle has no `holder`"),
+        ("a: {placed: under-spindle,", "a: {placed: under-spindle, uncertainty_um: 0.8,", "balls.a: a ball that is put up under the spindle has no `uncertainty_um`"),
+        ("a: {placed: under-spindle,", "a: {placed: under-the-spindle,", "balls.a.placed: the text `under-the-spindle` is not one of 'cmm' or 'under-spindle'"),
+        ("ball: f, a_deg: 0", "ball: a, a_deg: 5", "tests[5]: the ball `a` is put up under the spindle at the tilt of test `a`; give each tilt a ball of its own"),
+    ],
+)  # fmt: skip
+def test_faults_of_balls_under_the_spindle(tmp_path: Path, old: str, new: str, said: str) -> None:
+    text, _ = changed(CONVENTIONAL, old, new)
+    faults = faults_of(read_plan, tmp_path / "plan.yaml", text)
+    where, what = re.fullmatch(r":(\d+):\d+: (.*)", faults[0], re.DOTALL).groups()
+    assert what.startswith(said)
+    assert new in text.split("\n")[int(where) - 1]
+
+
+def test_a_bore_that_says_nothing_may_stand_at_a_ball_under_the_spindle(tmp_path: Path) -> None:
+    text, _ = changed(CONVENTIONAL, "a: {placed: under-spindle,", "a: {placed: under-spindle, bore: null,")
+    (tmp_path / "plan.yaml").write_text(text)
+    assert not read_plan(tmp_path / "plan.yaml").tests["a"].ball.place_known
+
+
+def test_a_measured_ball_needs_plate_holder_and_uncertainty(tmp_path: Path) -> None:
+    text, place = changed(
+        CONVENTIONAL, "{placed: under-spindle, centre_mm: [0, 0, -1150]}", "{centre_mm: [0, 0, -1150]}"
+    )
+    faults = faults_of(read_plan, tmp_path / "plan.yaml", text)
+    assert faults == [
+        f"{place_of(text, 'format:')}: the key `jig` is missing; add it; only a plan that puts all its balls up under the "
+        "spindle needs none",
+        f"{place}: balls.a: the key `holder` is missing; add it",
+        f"{place}: balls.a: the key `uncertainty_um` is missing; add it",
+    ]
+    text, place = changed(PLAN, "holder: short, centre_mm", "holder: null, centre_mm")
+    assert faults_of(read_plan, tmp_path / "plan.yaml", text)[0].endswith(
+        "balls.9-short: the key `holder` is missing; add it"
+    )

@@ -1,0 +1,52 @@
+"""How quickly struts move along a motion, for sources that act in time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.kinematics import strut_lengths
+from dbbstation.machine.rotation import Frames
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Motion
+
+SHORTEST_S = 1e-6
+"""Rows that are closer in time than this are one: their difference is rounding, not movement [s]."""
+
+
+def driven_in_time(
+    motion: Motion, machine: Machine
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Commanded strut lengths at rising times.
+
+    Args:
+        motion: a path with times, in time order.
+        machine: nominal.
+
+    Returns:
+        Times, shape (m,) [s], lengths then, shape (m, 6) [mm], and for each row of the motion its place among them,
+        shape (n,). Of rows at one time the last one holds.
+    """
+    time_s = np.asarray(motion.time_s)
+    length = strut_lengths(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+    later = np.diff(time_s) > SHORTEST_S
+    return (
+        time_s[np.append(later, True)],
+        length[np.append(later, True)],
+        np.concatenate([[0], np.cumsum(later)]),
+    )
+
+
+def speed_mm_s(time_s: NDArray[np.float64], length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Speed at rising times by differences of second order, shape (m, 6) [mm/s]; zero where there is one row only."""
+    rows = len(time_s)
+    if rows == 1:
+        return np.zeros_like(length_mm)
+    # At the ends a parabola through three rows.
+    speed: NDArray[np.float64] = np.gradient(length_mm, time_s, axis=0, edge_order=1 if rows == 2 else 2)  # noqa: PLR2004
+    return speed

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.warm_up import time_constant, warmed, warmed_by_constant
+from dbbstation.sources.warm_up import grown_by, time_constant, warmed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,9 +64,7 @@ class BarDrift(ErrorSource):
         Raises:
             ModelError: the motion has no time.
         """
-        time_s = self._time_s(motion)
-        law = [warmed(time_s, values[1]), values[0] * warmed_by_constant(time_s, values[1])]
-        return Effect(reading_mm=MM_PER_UM * np.column_stack(law))
+        return Effect(reading_mm=MM_PER_UM * grown_by(self._time_s(motion), *values))
 
     def _time_s(self, motion: Motion) -> NDArray[np.float64]:
         self.require(motion)

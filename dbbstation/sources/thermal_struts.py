@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.warm_up import time_constant, warmed, warmed_by_constant
+from dbbstation.sources.warm_up import grown_by, time_constant, warmed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -69,8 +69,7 @@ class ThermalStruts(ErrorSource):
             ModelError: the motion has no time.
         """
         per_growth, time_s = self._growth_mm(motion, machine)
-        law = np.column_stack([warmed(time_s, values[1]), values[0] * warmed_by_constant(time_s, values[1])])
-        return Effect(strut_mm=per_growth[:, :, None] * law[:, None, :])
+        return Effect(strut_mm=per_growth[:, :, None] * grown_by(time_s, *values)[:, None, :])
 
     def _growth_mm(self, motion: Motion, machine: Machine) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Growth per µm/m of fully warmed struts, shape (n, 6) [mm], and the times, shape (n,) [s]."""

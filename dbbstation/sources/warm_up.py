@@ -44,3 +44,8 @@ def warmed_by_constant(time_s: NDArray[np.float64], constant_s: float) -> NDArra
         return np.zeros(len(time_s))
     ratio = np.maximum(time_s, 0.0) / constant_s
     return -ratio * np.exp(-ratio) / constant_s
+
+
+def grown_by(time_s: NDArray[np.float64], amplitude: float, constant_s: float) -> NDArray[np.float64]:
+    """Derivatives of a growth a (1 - exp(-t / tau)) by a and by tau, shape (n, 2) [1, unit of a per s]."""
+    return np.column_stack([warmed(time_s, constant_s), amplitude * warmed_by_constant(time_s, constant_s)])

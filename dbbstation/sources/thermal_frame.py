@@ -1,0 +1,78 @@
+"""Error source: the base plate grows as it warms up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.warm_up import grown_by, time_constant, warmed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM_M = 1e-6
+"""One µm/m in mm/mm."""
+
+
+class ThermalFrame(ErrorSource):
+    """The base joints move away from the centre of the base plate: dQ_i = Q_i e (1 - exp(-t / tau)).
+
+    The plate is taken as evenly warm and held at its centre, the origin of the machine frame; one that is held elsewhere
+    shifts as a whole as well, which is a matter of where the jig stands. Counted from the session's first sample,
+    where the growth is zero by definition, as thermal-struts is.
+    """
+
+    name = "thermal-frame"
+    belongs_to = Owner.MACHINE
+    needs = frozenset({Need.TIME})
+    varies_with = "time"
+    texts = Texts(
+        what="The base plate that carries the struts warms up while the machine works, or with the shop, and grows. The "
+        "growth given is counted from the first sample of the session.",
+        shows="The same circle, repeated, comes out higher or lower and of another size than an hour before; both "
+        "directions drift alike. Growing struts look almost the same.",
+        confirm="Log the temperature of the base plate: about 1 K for each 11 µm/m of steel. Measure one circle every "
+        "half hour over a morning.",
+        cure="Let machine and shop come to rest before measuring; keep the sun and warm air off the frame; repeat early "
+        "tests at the end, so that the drift does not mix with the height of the ball.",
+        equation="dQ_i = Q_i e (1 - exp(-t / tau)), t since the session's first sample",
+        origin="linear expansion and the first-order warm-up of a body that is heated evenly",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Growth in the end and time constant."""
+        return (
+            Parameter("growth_um_m", "µm/m", 15.0, "growth of the base from the first sample to the end of warm-up"),
+            time_constant(7200.0, "the growth"),
+        )
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Shift of each base joint.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        share = warmed(self._time_s(motion), values[1])
+        return Effect(base_joint_mm=values[0] * share[:, None, None] * _per_growth_mm(machine))
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """By the growth and by the time constant.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        law = grown_by(self._time_s(motion), *values)
+        return Effect(base_joint_mm=_per_growth_mm(machine)[:, :, None] * law[:, None, None, :])
+
+    def _time_s(self, motion: Motion) -> NDArray[np.float64]:
+        self.require(motion)
+        return np.asarray(motion.time_s)
+
+
+def _per_growth_mm(machine: Machine) -> NDArray[np.float64]:
+    """Shift of each base joint per µm/m, shape (6, 3) [mm]."""
+    return MM_PER_UM_M * machine.hexapod.base_joints_mm

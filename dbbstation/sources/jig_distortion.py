@@ -1,0 +1,86 @@
+"""Error source: the jig plate is bent by its clamps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Effect, ErrorSource, Motion, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+REACH_MM = 100.0
+"""Distance from the plate's origin at which the height of a bent plate is stated [mm]."""
+
+
+class JigDistortion(ErrorSource):
+    """The plate is bent by clamping: its height changes by w(x, y), and its holders lean with its slope.
+
+    With r = 100 mm, w = a (x² + y²)/r² + b (x² - y²)/r² + c 2 x y/r²: every plate bent evenly, so that its curvatures are
+    the same all over, which is what moments along its edges do to a thin plate. Normals stay normal to the plate's
+    middle surface (Kirchhoff): a ball h above that surface moves by (-h dw/dx, -h dw/dy, w). With h = z + d, where d is
+    how deep the middle surface lies under the origin of the jig's frame, holders lean and the surface that carries them
+    is stretched or squeezed at once. Zero at the jig's origin: shift and tilt of the whole plate define the machine's
+    coordinates. x and y run along the machine's axes, from the origin of the jig.
+    """
+
+    name = "jig-distortion"
+    belongs_to = Owner.SESSION
+    texts = Texts(
+        what="Clamps, or a chip under the plate, bend the jig plate: its bores rise or sink and its holders lean.",
+        shows="Tests at the outer bores are shifted, at long holders and risers sideways and most; a bow sends opposite "
+        "bores apart or together. Nothing is deformed, nor shifted in the middle.",
+        confirm="Run a dial gauge over the plate while the clamps are loosened and tightened: it must not move by more "
+        "than a micrometre. Or measure the plate on the CMM clamped in the same way.",
+        cure="Clamp at three points above three supports, lightly; clean plate and table.",
+        equation="db = (-h dw/dx, -h dw/dy, w), w = a (x² + y²)/r² + b (x² - y²)/r² + c 2xy/r², h = z + d, r = 100 mm",
+        origin="pure bending of a thin plate with constant curvatures, Timoshenko and Woinowsky-Krieger, Theory of Plates "
+        "and Shells, chapter 2",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Bow, saddle and twist, and how deep the middle of the plate lies."""
+        return (
+            Parameter("bow_um", "µm", 5.0, "height of the plate 100 mm from its origin all round, minus CMM"),
+            Parameter("saddle_um", "µm", 5.0, "further height at 100 mm along X, as much less along Y"),
+            Parameter("twist_um", "µm", 5.0, "further height at 100 mm between +X and +Y, as much less across"),
+            Parameter(
+                "middle_depth_mm",
+                "mm",
+                50.0,
+                "depth of the plate's middle surface under the origin of the jig",
+                shape=(0.0, 25.0, 50.0, 100.0, 200.0),
+            ),
+        )
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shift of the ball."""
+        place, lean = _bends(motion)
+        return Effect(fixed_ball_mm=(place + values[3] * lean) @ values[:3])
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """By the three heights and by the depth."""
+        place, lean = _bends(motion)
+        return Effect(fixed_ball_mm=np.column_stack([place + values[3] * lean, lean @ values[:3]]))
+
+
+def _bends(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Shift of the ball per bow, saddle and twist with the middle surface at the jig's origin, and per mm of depth.
+
+    Shapes (3, 3), [mm/µm] and [1/µm]; zero for a ball that stands in no bore.
+    """
+    setup = motion.setup
+    if setup is None or setup.plate is None:
+        return np.zeros((3, 3)), np.zeros((3, 3))
+    x, y, z = setup.fixed_ball_mm - setup.plate.origin_mm
+    per_um = MM_PER_UM / REACH_MM**2
+    lean = -2.0 * per_um * np.array([[x, x, y], [y, -y, x], [0.0, 0.0, 0.0]])
+    place = z * lean
+    place[2] = per_um * np.array([x**2 + y**2, x**2 - y**2, 2.0 * x * y])
+    return place, lean

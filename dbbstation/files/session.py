@@ -19,6 +19,7 @@ from dbbstation.files.run_lines import split_file
 from dbbstation.files.schema import read_document, validate
 from dbbstation.files.session_checks import check_runs
 from dbbstation.files.session_file import BarSchema, ProgramSchema, RunSchema, SessionFile
+from dbbstation.files.session_set_up import SetUpReadings, check_set_up_errors, mounted_name, set_up_readings
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
 
@@ -139,6 +140,7 @@ class SessionFolder:
         operator: empty where not noted.
         ambient_temp_c: temperature of the shop [degC]; None where not noted.
         bar: None where not noted.
+        set_up_errors: micrometer readings of balls that were put up under the spindle, at most one per mounting.
     """
 
     name: str
@@ -153,6 +155,7 @@ class SessionFolder:
     operator: str = ""
     ambient_temp_c: float | None = None
     bar: Bar | None = None
+    set_up_errors: tuple[SetUpReadings, ...] = ()
 
     def in_state(self, *states: RunState) -> tuple[RunEntry, ...]:
         """Return the runs in one of these states."""
@@ -166,16 +169,19 @@ class SessionFolder:
     def setup(self, run: RunEntry) -> Setup:
         """Return ball, mounting and bar of a run, named so that no other session has the same names."""
         ball = self.plan.tests[run.test].ball
-        mounted = f"test {run.test}" if run.mounting is None else f"mounting {run.mounting}"
+        mounted = mounted_name(self.plan, run.test, run.mounting)
+        readings = (r for r in self.set_up_errors if mounted_name(self.plan, r.test, r.mounting) == mounted)
         return Setup(
             session=self.name,
-            mounting=f"{self.name}: {ball.name}, {mounted}",
+            mounting=f"{self.name}: {mounted}",
             ball=f"{self.name}: {ball.name}",
             instrument=f"{self.name}: bar" if self.bar is None else self.bar.serial_number or f"{self.name}: bar",
             fixed_ball_mm=np.array(ball.centre_mm, dtype=np.float64),
             mounting_repeatability_mm=ball.repeatability_mm,
             ball_uncertainty_mm=ball.uncertainty_mm,
             bar_uncertainty_mm=0.0 if self.bar is None else self.bar.calibrator_uncertainty_mm,
+            place_known=ball.place_known,
+            set_up_errors=next((reading.to_domain() for reading in readings), None),
             plate=ball.plate,
         )
 
@@ -269,6 +275,7 @@ def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
     plan = parse_plan(folder / named["plan"], faults) if isinstance(named["plan"], str) else None
     planned = None if plan is None else plan.to_domain()
     check_runs(document, planned, folder, faults)
+    check_set_up_errors(document, planned, faults)
     if session is None or machine is None or planned is None:
         return None
     entries = [run_entry(run, folder) for run in session.runs]
@@ -286,6 +293,7 @@ def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
         operator=session.operator,
         ambient_temp_c=session.ambient_temp_c,
         bar=None if session.bar is None else _bar(session.bar),
+        set_up_errors=tuple(map(set_up_readings, session.set_up_errors)),
     )
 
 

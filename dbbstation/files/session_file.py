@@ -32,6 +32,8 @@ def _moment(text: str) -> str:
     return text
 
 
+_NOT_READ = (None, None, None)
+
 InsidePath = Annotated[str, AfterValidator(_inside)]
 Moment = Annotated[str, AfterValidator(_moment), Field(json_schema_extra={"format": "date-time"})]
 Sha256Hex = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -104,6 +106,25 @@ class RunSchema(Schema):
         return self
 
 
+_Reading = Annotated[float, Quantity("µm", 0, 5_000, signed=True)]
+
+
+class SetUpErrorsSchema(Schema):
+    """What a micrometer read of balls that were put up under the spindle, for one mounting."""
+
+    test: str
+    """A test that was run on the mounting."""
+    mounting: Annotated[int, Field(ge=1)] | None = None
+    """Number of the mounting as the runs have it; absent where they have none."""
+    fixed_ball_um: tuple[_Reading | None, _Reading | None, _Reading | None] = _NOT_READ
+    """Fixed ball less tool tip while the machine stands at the ball's commanded place: x, y, z, machine frame; null where
+    nobody measured [µm]."""
+    moving_ball_um: tuple[_Reading | None, _Reading | None, _Reading | None] = _NOT_READ
+    """Moving ball less tool tip: x, y, z, platform frame; null where nobody measured [µm]."""
+    uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000)]
+    """Of each reading, one standard deviation [µm]."""
+
+
 class SessionFile(Schema):
     """What was done: where the machine and plan stand, the bar, one entry per run."""
 
@@ -121,5 +142,7 @@ class SessionFile(Schema):
     """Temperature of the shop [degC]."""
     bar: BarSchema | None = None
     """The bar."""
+    set_up_errors: tuple[SetUpErrorsSchema, ...] = ()
+    """Micrometer readings of balls that were put up under the spindle, one entry per mounting."""
     runs: tuple[RunSchema, ...] = ()
     """Runs in the order they were started."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Self
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from dbbstation.files.session_set_up import SetUpReadings
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
 
@@ -45,12 +46,14 @@ class SessionDetails:
         operator: who measures.
         ambient_temp_c: temperature of the shop [degC].
         bar: the bar.
+        set_up_errors: micrometer readings of balls that were put up under the spindle.
     """
 
     serial_number: str = ""
     operator: str = ""
     ambient_temp_c: float | None = None
     bar: Bar | None = None
+    set_up_errors: tuple[SetUpReadings, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,6 +305,7 @@ def _session_text(folder: Path, names: tuple[Path, Path], details: SessionDetail
         "operator": details.operator,
         "ambient_temp_c": details.ambient_temp_c,
         "bar": bar and {each.name: _plain(getattr(bar, each.name)) for each in fields(bar)},
+        "set_up_errors": [_without_none(asdict(readings)) for readings in details.set_up_errors] or None,
     }
     data = {key: _without_none(value) for key, value in data.items() if value is not None}
     return yaml_text({**data, "runs": [_without_none(_run_data(folder, run)) for run in runs]})

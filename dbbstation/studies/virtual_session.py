@@ -14,6 +14,7 @@ from dbbstation.model.simulation import simulate_circle
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from dbbstation.trace.circle import RawCircle
+from dbbstation.virtual.under_spindle import SET_UP_MM, SetUp, put_up
 
 if TYPE_CHECKING:
     from dbbstation.plan.plan import Plan, PlannedTest
@@ -25,16 +26,26 @@ SPACING_S = 200.0
 
 
 def draw_session(
-    truth: MachineModel, plan: Plan, rng: np.random.Generator, noise_mm: float, samples: int = 720
+    truth: MachineModel,
+    plan: Plan,
+    rng: np.random.Generator,
+    noise_mm: float,
+    samples: int = 720,
+    micrometer_mm: float | None = None,
 ) -> list[Observation]:
     """Record a plan once on the machine `truth`, every ball put up anew for each test.
+
+    Whether a micrometer is at hand does not change anything else that is drawn.
 
     Args:
         truth: the machine as it is.
         plan: what is measured.
-        rng: of mountings, CMM entries, bar length and noise, each with the size that the plan states.
+        rng: of mountings, CMM entries, bar length and noise, each with the size that the plan states; of balls put up
+            under the spindle with `SET_UP_MM`.
         noise_mm: of one sample [mm].
         samples: per turn.
+        micrometer_mm: uncertainty of its readings, one standard deviation [mm]: balls that the plan puts up under the
+            spindle come with their set-up errors as read; None: nobody measured them.
     """
     known = known_sources()
     bar = Fitted(known["bar-offset"], rng.normal(0.0, BAR_UNCERTAINTY_MM, 1), "study")
@@ -42,12 +53,19 @@ def draw_session(
     observations: list[Observation] = []
     for test in plan.tests.values():
         setup = _setup(test)
-        if setup.ball not in balls:
-            error = rng.normal(0.0, max(test.ball.uncertainty_mm, 1e-12), 3)
-            balls[setup.ball] = Fitted(known["ball-coordinate"], error, setup.ball)
-        shift = rng.normal(0.0, max(test.ball.repeatability_mm, 1e-12), 3)
-        mounted = Fitted(known["mounting"], shift, setup.mounting)
-        actual = MachineModel(truth.machine, (*truth.sources, bar, balls[setup.ball], mounted))
+        started_s = len(observations) * SPACING_S
+        if test.ball.place_known:
+            if setup.ball not in balls:
+                error = rng.normal(0.0, max(test.ball.uncertainty_mm, 1e-12), 3)
+                balls[setup.ball] = Fitted(known["ball-coordinate"], error, setup.ball)
+            shift = rng.normal(0.0, max(test.ball.repeatability_mm, 1e-12), 3)
+            mounted: tuple[Fitted, ...] = (balls[setup.ball], Fitted(known["mounting"], shift, setup.mounting))
+        else:
+            stands = SetUp.drawn(rng, SET_UP_MM)
+            mounted = put_up(truth, test.circle, setup, stands, started_s)
+            read = stands.read(rng, micrometer_mm or 0.0)
+            setup = replace(setup, set_up_errors=None if micrometer_mm is None else read)
+        actual = MachineModel(truth.machine, (*truth.sources, bar, *mounted))
         for direction in test.directions:
             circle = test.run(direction)
             started_s = len(observations) * SPACING_S
@@ -60,4 +78,10 @@ def draw_session(
 
 
 def _setup(test: PlannedTest) -> Setup:
-    return replace(setup_of(test), session="study", instrument="bar", bar_uncertainty_mm=BAR_UNCERTAINTY_MM)
+    return replace(
+        setup_of(test),
+        session="study",
+        instrument="bar",
+        bar_uncertainty_mm=BAR_UNCERTAINTY_MM,
+        place_known=test.ball.place_known,
+    )

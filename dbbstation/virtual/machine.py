@@ -11,6 +11,7 @@ from dbbstation.errors import MachineError
 from dbbstation.sources.contract import Motion, Setup
 from dbbstation.virtual.path import circle_path
 from dbbstation.virtual.truth import Scatter
+from dbbstation.virtual.under_spindle import SET_UP_MM, put_up
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Ball, Plan, PlannedTest
     from dbbstation.sources.contract import Fitted
     from dbbstation.virtual.path import CommandedPath
+    from dbbstation.virtual.under_spindle import SetUp
 
 _SESSION, _BAR = "virtual session", "virtual bar"
 
@@ -31,10 +33,12 @@ class Sizes:
     Attributes:
         noise_mm: of one reading [mm].
         bar_uncertainty_mm: of the bar's length [mm].
+        set_up_mm: of balls that are put up under the spindle, fixed and moving, per axis [mm].
     """
 
     noise_mm: float = 0.0003
     bar_uncertainty_mm: float = 0.0005
+    set_up_mm: float = SET_UP_MM
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +80,8 @@ class VirtualMachine:
         self.plan = plan
         self.mountings = 0
         self.mounted: Ball | None = None
-        self._scatter = Scatter(seed, self.sizes.bar_uncertainty_mm)
+        self._scatter = Scatter(seed, self.sizes.bar_uncertainty_mm, self.sizes.set_up_mm)
+        self._under_spindle: dict[int, tuple[Ball, SetUp, tuple[Fitted, ...]]] = {}
         self._bar = self._scatter.bar(_BAR)
         self._noise = np.random.default_rng([seed, 5])
 
@@ -104,6 +109,8 @@ class VirtualMachine:
     ) -> VirtualRun:
         """Compute a run, with its ball put up first where another one stands.
 
+        A ball that is put up under the spindle stands where the tool tip is when its mounting's first run begins.
+
         Args:
             test: name of the test.
             direction: sense of travel.
@@ -124,7 +131,8 @@ class VirtualMachine:
             time_s=begin_s + path.t_s,
             setup=self._setup(planned.ball),
         )
-        model = replace(self.truth, sources=(*self.truth.sources, *self._of_the_measurement(planned.ball)))
+        measurement = self._of_the_measurement(planned, begin_s)
+        model = replace(self.truth, sources=(*self.truth.sources, *measurement))
         return VirtualRun(test, direction, self.mountings, path, model.bar(motion).length_mm)
 
     def noise_mm(self) -> float:
@@ -132,9 +140,22 @@ class VirtualMachine:
         return float(self._noise.normal(0.0, self.sizes.noise_mm)) if self.sizes.noise_mm else 0.0
 
     def describe(self) -> dict[str, Any]:
-        """Everything that is wrong, by source, set and parameter, in the parameters' units."""
-        sources = (*self.truth.sources, self._bar, *self._scatter.all())
+        """Everything that is wrong, by source, set and parameter, in the parameters' units.
+
+        Of balls that were put up under the spindle also how they stand at the tool tip, as a micrometer would read it.
+        """
+        under = self._under_spindle
+        sources = (*self.truth.sources, self._bar, *self._scatter.all(), *(f for *_, of in under.values() for f in of))
         return {
+            "set_up_errors": [
+                {
+                    "ball": ball.name,
+                    "mounting": number,
+                    "fixed_ball_um": (1e3 * balls.fixed_ball_mm).tolist(),
+                    "moving_ball_um": (1e3 * balls.moving_ball_mm).tolist(),
+                }
+                for number, (ball, balls, _) in under.items()
+            ],
             "sources": [
                 {
                     "name": fitted.source.name,
@@ -148,7 +169,7 @@ class VirtualMachine:
                     },
                 }
                 for fitted in sources
-            ]
+            ],
         }
 
     def _planned(self, test: str, direction: Direction) -> PlannedTest:
@@ -170,12 +191,20 @@ class VirtualMachine:
             mounting_repeatability_mm=ball.repeatability_mm,
             ball_uncertainty_mm=ball.uncertainty_mm,
             bar_uncertainty_mm=self.sizes.bar_uncertainty_mm,
+            place_known=ball.place_known,
             plate=ball.plate,
         )
 
-    def _of_the_measurement(self, ball: Ball) -> tuple[Fitted, ...]:
-        of_ball = self._scatter.ball(ball, ball.name)
-        return (self._bar, of_ball, self._scatter.mounting(ball, self.mountings, self._mounting_name))
+    def _of_the_measurement(self, test: PlannedTest, begin_s: float) -> tuple[Fitted, ...]:
+        ball, number = test.ball, self.mountings
+        if ball.place_known:
+            of_ball = self._scatter.ball(ball, ball.name)
+            return (self._bar, of_ball, self._scatter.mounting(ball, number, self._mounting_name))
+        if number not in self._under_spindle:
+            balls = self._scatter.set_up(number)
+            stand = put_up(self.truth, test.circle, self._setup(ball), balls, begin_s)
+            self._under_spindle[number] = (ball, balls, stand)
+        return (self._bar, *self._under_spindle[number][2])
 
     @property
     def _mounting_name(self) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named
+from dbbstation.virtual.under_spindle import SET_UP_MM, SetUp
 
 if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
@@ -31,15 +32,17 @@ def random_kinematics(machine: Machine, seed: int) -> tuple[Fitted, ...]:
 
 @dataclass
 class Scatter:
-    """Errors of the measurement: of each mounting, of each ball's coordinates, of the bar's length.
+    """Errors of the measurement: of each mounting or set-up, of each ball's coordinates, of the bar's length.
 
     Args:
         seed: makes the same errors again; those of a ball do not depend on what else was mounted.
         bar_uncertainty_mm: standard deviation of the bar's length error [mm].
+        set_up_mm: of balls that are put up under the spindle by hand, standard deviation per axis [mm].
     """
 
     seed: int
     bar_uncertainty_mm: float
+    set_up_mm: float = SET_UP_MM
     _of_balls: dict[str, Fitted] = field(default_factory=dict)
     _of_mountings: dict[int, Fitted] = field(default_factory=dict)
 
@@ -64,6 +67,10 @@ class Scatter:
             (source,) = sources_named(("mounting",))
             self._of_mountings[number] = Fitted(source, rng.normal(0.0, ball.repeatability_mm, 3), shared)
         return self._of_mountings[number]
+
+    def set_up(self, number: int) -> SetUp:
+        """How the balls of the `number`-th mounting stand at the tool tip, where one was put up under the spindle."""
+        return SetUp.drawn(np.random.default_rng([self.seed, 6, number]), self.set_up_mm)
 
     def all(self) -> tuple[Fitted, ...]:
         """What was drawn so far, of balls and mountings."""

@@ -1,12 +1,14 @@
-"""Makes `fixtures/sessions/small` and `fixtures/models/small.yaml` anew: `python -m tests.files.make_fixtures`.
+"""Makes the sessions of `fixtures` and `fixtures/models/small.yaml` anew: `python -m tests.files.make_fixtures`.
 
-The recordings come from the independent virtual machine of tests/plant; the numbers of the model are made up.
+The recordings of `small` come from the independent virtual machine of tests/plant, those of `under-spindle` from that of
+`emulate`; the numbers of the model are made up.
 """
 
 from __future__ import annotations
 
 import shutil
 import tempfile
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -15,12 +17,15 @@ import numpy as np
 from dbbstation.files.models import write_model
 from dbbstation.files.plan_file import read_inline_plan
 from dbbstation.files.session import Bar, read_session
-from dbbstation.files.session_writer import SessionDetails, SessionWriter
+from dbbstation.files.session_set_up import SetUpReadings
+from dbbstation.files.session_writer import FinishedRun, SessionDetails, SessionWriter, write_session
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
+from dbbstation.virtual.machine import VirtualMachine
+from dbbstation.virtual.truth import random_kinematics
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import BEGUN, record
@@ -69,6 +74,34 @@ def make_session(folder: Path) -> None:
             journal.append((0.0, 151.5, 20.3, "ok"))
 
 
+def make_conventional_session(folder: Path) -> None:
+    """Two tests about balls put up under the spindle, set up by hand and read with a micrometer to 1 µm."""
+    machine = read_session(FIXTURES / "sessions" / "small").machine
+    whole = read_inline_plan(FIXTURES.parent / "protocols" / "plans" / "conventional.yaml")
+    tests = tuple(test for test in whole.plan.tests if test.name in "dg")
+    balls = {test.ball: whole.plan.balls[test.ball] for test in tests}
+    inline = replace(whole, plan=whole.plan.model_copy(update={"tests": tests, "balls": balls}))
+    virtual = VirtualMachine(MachineModel(machine, random_kinematics(machine, 7)), inline.to_domain(), seed=7)
+    runs = []
+    for test in tests:
+        for direction in Direction:
+            run = virtual.run(test.name, direction, begin_s=180.0 * len(runs))
+            t_s = np.arange(0.0, run.path.duration_s, 0.2).round(7)
+            length_mm = np.array([run.length_mm_at(float(t)) + virtual.noise_mm() for t in t_s])
+            columns = {"t_s": t_s, "length_mm": length_mm.round(5)}
+            started = BEGUN + timedelta(minutes=3 * len(runs))
+            runs.append(FinishedRun(test.name, direction, columns, 1, run.mounting, started))
+    rng = np.random.default_rng(7)
+    readings = []
+    for test, stands in zip(tests, virtual.describe()["set_up_errors"], strict=True):
+        fixed, moving = (
+            np.round(np.array(stands[key]) + rng.normal(0.0, 1.0, 3)).tolist()
+            for key in ("fixed_ball_um", "moving_ball_um")
+        )
+        readings.append(SetUpReadings(test.name, stands["mounting"], tuple(fixed), (*moving[:2], None), 1.0))
+    write_session(folder, machine, inline, runs, SessionDetails(set_up_errors=tuple(readings)))
+
+
 def make_model(path: Path) -> None:
     session = read_session(FIXTURES / "sessions" / "small")
     known, machine = known_sources(), session.machine
@@ -97,4 +130,6 @@ def make_model(path: Path) -> None:
 if __name__ == "__main__":
     shutil.rmtree(FIXTURES / "sessions" / "small", ignore_errors=True)
     make_session(FIXTURES / "sessions" / "small")
+    shutil.rmtree(FIXTURES / "sessions" / "under-spindle", ignore_errors=True)
+    make_conventional_session(FIXTURES / "sessions" / "under-spindle")
     make_model(FIXTURES / "models" / "small.yaml")

@@ -14,12 +14,13 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml_text import load_yaml
 
 FIXTURES = shipped_folder("fixtures")
+SESSIONS = FIXTURES / "sessions"
 EXAMPLES = {
-    "dbb-machine/1": FIXTURES / "machines" / "every-key.yaml",
-    "dbb-jig/1": FIXTURES / "jigs" / "reference-plate.yaml",
-    "dbb-plan/1": FIXTURES / "plans" / "every-key.yaml",
-    "dbb-model/1": FIXTURES / "models" / "small.yaml",
-    "dbb-session/1": FIXTURES / "sessions" / "small" / "session.yaml",
+    "dbb-machine/1": [FIXTURES / "machines" / "every-key.yaml"],
+    "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
+    "dbb-plan/1": [FIXTURES / "plans" / "every-key.yaml"],
+    "dbb-model/1": [FIXTURES / "models" / "small.yaml"],
+    "dbb-session/1": [SESSIONS / "small" / "session.yaml", SESSIONS / "under-spindle" / "session.yaml"],
 }
 UNITS = ("_mm", "_deg", "_um", "_kg", "_temp_c", "_mm_min", "_um_m_k", "_mm_per_n")
 
@@ -62,9 +63,9 @@ def test_the_json_schema_is_plain_json_and_closed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SCHEMAS)
-def test_the_example_uses_every_key(name: str) -> None:
+def test_the_examples_use_every_key(name: str) -> None:
     faults = []
-    document = load_yaml(EXAMPLES[name], faults)
+    documents = [load_yaml(path, faults) for path in EXAMPLES[name]]
     assert not faults
     used: dict[tuple[str, ...], set[str]] = {}
     known: dict[tuple[str, ...], set[str]] = {}
@@ -80,7 +81,8 @@ def test_the_example_uses_every_key(name: str) -> None:
             for index, value in enumerate(data):
                 visit((*location, index), (*general, "*"), value)
 
-    visit((), (), document.data)
+    for document in documents:
+        visit((), (), document.data)
     for general, keys in known.items():
         # The machine of a model has an example of its own.
         if name != "dbb-model/1" or general[:1] != ("machine",):

@@ -319,8 +319,10 @@ def test_a_measured_ball_needs_plate_holder_and_uncertainty(tmp_path: Path) -> N
     )
     faults = faults_of(read_plan, tmp_path / "plan.yaml", text)
     assert faults == [
-        f"{place_of(text, 'format:')}: the key `jig` is missing; add it; only a plan that puts all its balls up under the "
-        "spindle needs none",
+        (
+            f"{place_of(text, 'format:')}: the key `jig` is missing; add it; only a plan that puts all its balls up under the "
+            "spindle needs none"
+        ),
         f"{place}: balls.a: the key `holder` is missing; add it",
         f"{place}: balls.a: the key `uncertainty_um` is missing; add it",
     ]

@@ -1,0 +1,84 @@
+"""A ball that is put up under the spindle, and the moving ball that is attached after it [CAL III-A, Fig 4]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from dbbstation.sources.contract import Fitted, Motion, Owner, SetUpErrors
+from dbbstation.sources.registry import sources_named
+from dbbstation.sources.tool_ball_offset import ToolBallOffset
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.plan.circle import Circle
+    from dbbstation.sources.contract import Setup
+
+SET_UP_MM = 0.05
+"""How far balls stand from where they should that were put up by hand, one standard deviation per axis [mm]."""
+
+_STANDING_S = np.array([0.0, 1.0, 2.0])
+"""The machine has come to rest while a ball is put up: nothing lags any more [s]."""
+
+
+class MovingBall(ToolBallOffset):
+    """The moving ball is off the tool tip, otherwise each time it is attached."""
+
+    name = "moving-ball"
+    belongs_to = Owner.MOUNTING
+
+
+@dataclass(frozen=True, eq=False)
+class SetUp:
+    """How balls really stand.
+
+    Attributes:
+        fixed_ball_mm: fixed ball less tool tip while the machine stood at the ball's commanded place, machine frame,
+            shape (3,) [mm].
+        moving_ball_mm: moving ball less tool tip, platform frame, shape (3,) [mm].
+    """
+
+    fixed_ball_mm: NDArray[np.float64]
+    moving_ball_mm: NDArray[np.float64]
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator, size_mm: float) -> Self:
+        """Draw both balls' errors of a size, one standard deviation per axis [mm]."""
+        fixed, moving = rng.normal(0.0, size_mm, (2, 3))
+        return cls(fixed, moving)
+
+    @classmethod
+    def faultless(cls) -> Self:
+        """Return a set-up without errors."""
+        return cls(np.zeros(3), np.zeros(3))
+
+    def read(self, rng: np.random.Generator, uncertainty_mm: float) -> SetUpErrors:
+        """Return what a micrometer of an uncertainty, one standard deviation [mm], reads of it."""
+        fixed, moving = rng.standard_normal((2, 3)) * uncertainty_mm
+        return SetUpErrors(self.fixed_ball_mm + fixed, self.moving_ball_mm + moving, uncertainty_mm)
+
+
+def put_up(truth: MachineModel, circle: Circle, setup: Setup, balls: SetUp, at_s: float = 0.0) -> tuple[Fitted, Fitted]:
+    """Return what a set-up does to the bar: where the fixed ball came to stand, how the moving ball sits.
+
+    Args:
+        truth: the machine as it is.
+        circle: tells where and at which tilt the machine was told to stand.
+        setup: of the runs about the ball.
+        balls: how they stand at the tool tip.
+        at_s: when, after the start of the session [s].
+
+    Raises:
+        KinematicsError: the machine cannot take the pose.
+        ModelError: a source needs what a standing machine does not give, such as temperatures.
+    """
+    pose = np.array([*circle.ball_mm, *circle.tilt_deg])
+    standing = Motion(np.tile(pose, (len(_STANDING_S), 1)), is_path=True, time_s=at_s + _STANDING_S, setup=setup)
+    tip = truth.of_the_machine().actual(standing).tool_frames().position_mm[-1]
+    (mounting,) = sources_named(("mounting",))
+    stands = tip + balls.fixed_ball_mm - setup.fixed_ball_mm
+    return Fitted(mounting, stands, setup.mounting), Fitted(MovingBall(), balls.moving_ball_mm, setup.mounting)

@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.calibration.directions import in_words
 from dbbstation.calibration.layout import Layout, lay_out
 from dbbstation.calibration.nodes import Nodes, nodes_of, smooth
+from dbbstation.calibration.prescription import Name, names_of, prescribed
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.noise import Noise, noise_of
 from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve
@@ -63,7 +64,11 @@ class Calibration:
         observations: the runs that went in.
         machine_residual_mm: per run, what the machine's own sources leave [mm].
         residual_mm: per run, what is left after the measurement's effects too [mm].
+        blocks: what the runs say of the columns, about the values found.
         directions_lost: what the recordings could not see, in words.
+        directions_regularised: what they could not see and the machine file's tolerances stand in for, in words.
+        prescribed: parameters that were held at nominal in place of the lost directions; empty where the directions
+            themselves were.
     """
 
     layout: Layout
@@ -73,7 +78,10 @@ class Calibration:
     observations: tuple[Observation, ...]
     machine_residual_mm: tuple[NDArray[np.float64], ...]
     residual_mm: tuple[NDArray[np.float64], ...]
+    blocks: tuple[Block, ...]
     directions_lost: tuple[str, ...]
+    directions_regularised: tuple[str, ...]
+    prescribed: tuple[Name, ...]
 
     @property
     def model(self) -> MachineModel:
@@ -96,12 +104,15 @@ def calibrate(
     observations: Sequence[Observation],
     sources: Sequence[ErrorSource] | None = None,
     start: Mapping[str, NDArray[np.float64]] | None = None,
+    *,
+    prescribe: Sequence[Name] | None = None,
 ) -> Calibration:
     """Fit error sources to raw circles.
 
     Directions that the runs cannot see are found at the nominal geometry, where they are lost exactly, judged by
     the noise, and held at nominal. The fit looks for whole values, not for steps, so that nothing walks along a
-    direction that only the curvature of the model makes visible.
+    direction that only the curvature of the model makes visible. Where the machine file states tolerances, these are
+    priors, and nothing that they bound is lost.
 
     Args:
         machine: nominal machine.
@@ -109,9 +120,12 @@ def calibrate(
         sources: what to fit; the default sources if None.
         start: values near the answer by source name, for sources with parameters of shape, which a fit that starts
             at zero amplitude cannot see.
+        prescribe: parameters to hold at nominal in place of the lost directions, as many as are lost; an empty
+            sequence has them chosen among the base joints; None holds the directions themselves.
 
     Raises:
-        CalibrationError: centred circles, too few tests, or no convergence.
+        CalibrationError: centred circles, too few tests, parameters that cannot stand in for what is lost, or no
+            convergence.
         ModelError: a source lacks what it needs.
     """
     _check_raw(observations)
@@ -124,8 +138,12 @@ def calibrate(
     runs = looked_at(observations, layout.needs)
     nominal, _ = linearise(layout, runs, x)
     blocks, before, share = nominal, np.zeros_like(x), 1.0
+    lost, held = np.zeros((0, 0)), None
     for _ in range(MOST_STEPS):
-        held = lost_directions(nominal, layout.known, noise.effective)
+        seen = lost_directions(nominal, layout.known, noise.effective)
+        if len(seen) != len(lost) or held is None:
+            lost = seen
+            held = lost if prescribe is None else prescribed(layout, lost, prescribe)
         solution, noise = _settled(blocks, layout, noise, held)
         update = layout.nominal + solution.x
         sigma = np.sqrt(np.diag(solution.covariance))
@@ -152,8 +170,20 @@ def calibrate(
         observations=tuple(observations),
         machine_residual_mm=_residuals(layout.model(x).of_the_machine(), runs),
         residual_mm=_residuals(layout.model(x), runs),
-        directions_lost=in_words(layout, held),
+        blocks=tuple(blocks),
+        directions_lost=in_words(layout, lost),
+        directions_regularised=in_words(layout, unseen(nominal, layout, noise)),
+        prescribed=() if prescribe is None else names_of(layout, held),
     )
+
+
+def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> NDArray[np.float64]:
+    """Orthonormal rows of fitted directions, in units of the scales, of which only priors say anything, shape (r, f)."""
+    known = layout.known
+    if not layout.bounded.any():
+        return np.zeros((0, int(np.count_nonzero(~known.random))))
+    free = replace(known, prior=np.where(layout.bounded, np.inf, known.prior))
+    return lost_directions(blocks, free, noise.effective)
 
 
 def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64], share: float) -> float:

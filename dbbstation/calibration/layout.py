@@ -65,6 +65,11 @@ class Layout:
         return tuple((term.source.name, term.shared, p.name) for term in self.terms for p in term.parameters)
 
     @property
+    def bounded(self) -> NDArray[np.bool_]:
+        """Columns that a tolerance of the machine file bounds, shape (k,)."""
+        return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
+
+    @property
     def needs(self) -> frozenset[Need]:
         """What all sources together must be given."""
         return frozenset[Need]().union(*(term.source.needs for term in self.terms))
@@ -82,6 +87,7 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
 
     A set whose size is stated becomes a random effect; one whose stated size is zero does not exist. Parameters of
     shape, which say nothing while their amplitude is zero, have their plausible size as prior about a usual value.
+    A tolerance that the machine file states is a prior; without one nothing is regularised.
 
     Raises:
         ModelError: a source needs what machine file or recordings lack.
@@ -98,10 +104,14 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
             if stated is not None and not np.any(stated > 0.0):
                 continue
             terms.append(Term(source, shared, parameters, slice(len(prior), len(prior) + len(parameters))))
-            sizes = [np.inf] * len(parameters) if stated is None else [float(size) for size in stated]
+            sizes = [_prior(p) for p in parameters] if stated is None else [float(size) for size in stated]
             prior += [p.plausible if p.shape else size for p, size in zip(parameters, sizes, strict=True)]
             random += [stated is not None] * len(parameters)
     every = [p for term in terms for p in term.parameters]
     scale = np.array([p.plausible for p in every])
     nominal = np.array([p.shape[len(p.shape) // 2] if p.shape else 0.0 for p in every])
     return Layout(machine, tuple(terms), Columns(np.array(prior), scale, np.array(random, dtype=bool)), nominal)
+
+
+def _prior(parameter: Parameter) -> float:
+    return np.inf if parameter.tolerance is None else parameter.tolerance

@@ -50,7 +50,10 @@ class Observation:
         return np.arange(-self.raw.circle.overshoot_deg, 0.0, LEAD_IN_STEP_DEG)
 
     def motion(self) -> Motion:
-        """The run as error sources see it: the overshoot arc that leads to the turn, then the turn's samples."""
+        """The run as error sources see it: the overshoot arc that leads to the turn, then the turn's samples.
+
+        Where the ball was put up under the spindle, the pose at which that was done comes first.
+        """
         raw, circle = self.raw, self.raw.circle
         lead_in = self.lead_in_deg
         phi = np.concatenate([lead_in, raw.phi_deg])
@@ -61,6 +64,10 @@ class Observation:
             time = self.started_s + np.concatenate(
                 [raw.t_s[0] + (lead_in - raw.phi_deg[0]) / circle.turning_deg_s, raw.t_s]
             )
+        if not self.setup.place_known:
+            before += 1
+            poses = np.vstack([[*self.setup.fixed_ball_mm, *circle.tilt_deg], poses])
+            time = None if time is None else np.concatenate([time[:1], time])
         return Motion(
             poses=poses,
             is_path=True,
@@ -69,6 +76,7 @@ class Observation:
             temperature_degc={name: _held_back(values, before) for name, values in raw.temperature_degc.items()},
             motor_current_a=None if raw.motor_current_a is None else _held_back(raw.motor_current_a, before),
             setup=self.setup,
+            put_up=not self.setup.place_known,
             reading_mm=_held_back(raw.length_mm, before),
         )
 

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
 
+USUAL_MM = 0.2
+"""Usual error of a joint's coordinate where the machine file states no tolerance [mm]."""
+
 
 class BaseJoints(LinearSource):
     """A base joint is not where the design has it: dQ_i, i = 1 to 6, three coordinates each [CAL II-C 2]."""
@@ -31,9 +34,15 @@ class BaseJoints(LinearSource):
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         """Eighteen coordinates; their usual size is the machine file's joint tolerance where it has one."""
-        size = machine.joint_tolerance_mm or 0.2
+        stated = machine.joint_tolerance_mm
         return tuple(
-            Parameter(f"joint_{i + 1}_{axis}_mm", "mm", size, f"base joint {i + 1} actual minus nominal {axis.upper()}")
+            Parameter(
+                name=f"joint_{i + 1}_{axis}_mm",
+                unit="mm",
+                plausible=stated or USUAL_MM,
+                meaning=f"base joint {i + 1} actual minus nominal {axis.upper()}",
+                tolerance=stated,
+            )
             for i in range(STRUTS)
             for axis in "xyz"
         )

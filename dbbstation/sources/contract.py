@@ -74,7 +74,7 @@ class Setup:
         ball: entry of the CMM sheet.
         instrument: the bar.
         fixed_ball_mm: centre of the fixed ball as the CMM knows it, machine frame, shape (3,) [mm].
-        mounting_repeatability_mm: of the holder, one standard deviation per axis [mm].
+        mounting_repeatability_mm: of the holder, one standard deviation, for all axes or each, shape (3,) [mm].
         ball_uncertainty_mm: of the CMM, one standard deviation per axis [mm].
         bar_uncertainty_mm: of the bar's calibrated length, one standard deviation [mm].
         place_known: False for a ball that was put up under the spindle: `fixed_ball_mm` is where the machine was told
@@ -88,7 +88,7 @@ class Setup:
     ball: str
     instrument: str
     fixed_ball_mm: NDArray[np.float64]
-    mounting_repeatability_mm: float
+    mounting_repeatability_mm: float | NDArray[np.float64]
     ball_uncertainty_mm: float
     bar_uncertainty_mm: float
     place_known: bool = True
@@ -114,6 +114,8 @@ class Motion:
         setup: None for poses that nobody measured.
         reading_mm: what the bar showed, shape (n,) [mm]: the place of its encoder, for errors of that encoder alone;
             None where nothing was measured.
+        put_up: True where the first row, not among the kept, is the pose at which the machine stood while the fixed
+            ball was put up at its tool tip: the ball then stands there, wherever that really is.
     """
 
     poses: NDArray[np.float64]
@@ -124,6 +126,7 @@ class Motion:
     motor_current_a: NDArray[np.float64] | None = None
     setup: Setup | None = None
     reading_mm: NDArray[np.float64] | None = None
+    put_up: bool = False
 
     def __len__(self) -> int:
         return len(self.poses)

@@ -41,4 +41,4 @@ class Mounting(LinearSource):
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
         """Repeatability of the holder in every axis."""
-        return None if motion.setup is None else np.full(3, motion.setup.mounting_repeatability_mm)
+        return None if motion.setup is None else np.zeros(3) + motion.setup.mounting_repeatability_mm

@@ -1,0 +1,96 @@
+"""Parameters held at nominal in place of what circles cannot see, as the standard circular test must [CAL III-A-2].
+
+Six directions are lost there. Six prescribed parameters define the machine's coordinates instead: whichever six are
+taken, the circles are explained alike, and the machine's place and tilt in space are what was assumed of them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from scipy.linalg import qr
+
+from dbbstation.errors import CalibrationError
+from dbbstation.sources.contract import Owner
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.layout import Layout
+
+Name: TypeAlias = tuple[str, str]
+"""A parameter by source and its name there."""
+
+PREFERRED = "base-joints"
+"""Parameters that are prescribed where nobody chooses: places of base joints define coordinates as a 3-2-1 seat does."""
+
+LEAST_SHARE = 1e-3
+"""How much of a lost direction prescribed parameters must hold for the rest to stay where it is."""
+
+
+def prescribed(layout: Layout, lost: NDArray[np.float64], wanted: Sequence[Name]) -> NDArray[np.float64]:
+    """Rows that hold parameters in place of lost directions.
+
+    Args:
+        layout: columns of the fit.
+        lost: orthonormal rows of lost directions, in units of the scales, shape (h, f).
+        wanted: as many parameters as directions are lost; where none is named, base joints that hold them best.
+
+    Returns:
+        Unit rows, shape (h, f).
+
+    Raises:
+        CalibrationError: another number of parameters, a parameter that is not fitted, parameters that leave a lost
+            direction free.
+    """
+    fitted = _fitted(layout)
+    if not wanted:
+        rows = _best(fitted, lost)
+    else:
+        unknown = [f"{source}.{name}" for source, name in wanted if (source, name) not in fitted]
+        if unknown:
+            raise CalibrationError(
+                f"{', '.join(unknown)} cannot be prescribed: not among the parameters that are fitted",
+                remedy=f"name them as in {'.'.join(fitted[0])}",
+            )
+        if len(set(wanted)) != len(lost):
+            raise CalibrationError(
+                f"{len(set(wanted))} parameters are prescribed, but these tests lose {len(lost)} directions",
+                remedy=f"prescribe {len(lost)}, or leave the choice to the program",
+            )
+        rows = [fitted.index(name) for name in dict.fromkeys(wanted)]
+    if rows and np.linalg.svd(lost[:, rows], compute_uv=False)[-1] < LEAST_SHARE:
+        raise CalibrationError(
+            f"the parameters {', '.join('.'.join(fitted[row]) for row in rows)} do not hold every direction that these "
+            "tests lose",
+            remedy="prescribe, for example, all three coordinates of one base joint, two of another, one of a third",
+        )
+    return np.eye(len(fitted))[rows]
+
+
+def names_of(layout: Layout, held: NDArray[np.float64]) -> tuple[Name, ...]:
+    """Parameters of unit rows, shape (h, f)."""
+    fitted = _fitted(layout)
+    return tuple(fitted[int(np.argmax(np.abs(row)))] for row in held)
+
+
+def _fitted(layout: Layout) -> list[Name]:
+    names = [
+        (term.source.name, parameter.name) if term.source.belongs_to is Owner.MACHINE else ("", "")
+        for term in layout.terms
+        for parameter in term.parameters
+    ]
+    return [names[column] for column in np.flatnonzero(~layout.known.random)]
+
+
+def _best(fitted: Sequence[Name], lost: NDArray[np.float64]) -> list[int]:
+    """Parameters that hold the lost directions most firmly, base joints first."""
+    if not len(lost):
+        return []
+    preferred = [k for k, (source, _) in enumerate(fitted) if source == PREFERRED]
+    candidates = preferred if len(preferred) >= len(lost) else list(range(len(fitted)))
+    (_, order) = qr(lost[:, candidates], mode="r", pivoting=True)
+    return sorted(candidates[k] for k in order[: len(lost)])

@@ -1,0 +1,152 @@
+"""Error source: struts that stick when they turn round."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.compiled import compiled
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import strut_lengths
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+DECAY_MM = tuple(float(f"{decay:.2g}") for decay in np.geomspace(0.02, 1.0, 8))
+"""Decay lengths worth trying: on a circle of 150 mm, spikes of about two to ten degrees [mm]."""
+
+TURNED_MM = 1e-3
+"""A strut has turned round once it has come back by this: less is rounding of the program or of recorded angles."""
+
+
+class ReversalSpike(ErrorSource):
+    """A strut sticks when it turns round, and is drawn back over a short way: -s a (1 - exp(-d / 2|a|)) exp(-d / l).
+
+    With d the way since the turning point and s the sign of the new movement. The way, not the time, because the
+    drive has to run through the friction of its guides and seals; at one feed the two cannot be told apart. The rise
+    is there because no strut stays behind by more than its drive has moved; with the 2 only half of that is lost,
+    so that the error can be compensated. It is over within a degree, and at a = 0 the error is proportional to a.
+
+    Before the first turning point of a run there is no spike.
+    """
+
+    name = "reversal-spike"
+    belongs_to = Owner.MACHINE
+    needs = frozenset({Need.POSE, Need.PATH})
+    varies_with = "strut-speed-sign"
+    texts = Texts(
+        what="A strut sticks for a moment when it turns from growing to shrinking or back, until the position loop has "
+        "raised the motor's torque by twice the friction.",
+        shows="A short spike behind the place where one strut turns round, not where X or Y does, and one of the opposite "
+        "sign at the other end of its travel. In the other direction it lies on the other side of that place with the "
+        "same sign. It fades within some degrees, where backlash stays.",
+        confirm="Record the following error of that strut on the control's oscilloscope while it turns round; repeat the "
+        "circle at another feed: the spike changes, backlash does not.",
+        cure="Adjust the control's friction (quadrant) compensation for that strut; look after lubrication and seals. A "
+        "negative amplitude is a friction compensation that is set too large.",
+        equation="actual minus driven length = -s a (1 - exp(-d / 2|a|)) exp(-d / l), d the travel since the strut turned "
+        "round, s its new direction",
+        origin="stick motion of a drive at reversal, as in Kakino, Ihara and Shinohara, Accuracy Inspection of NC "
+        "Machine Tools by Double Ball Bar Method, 1993; the exponential is the simplest decay",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Six heights and one decay length."""
+        heights = tuple(
+            Parameter(
+                f"strut_{i + 1}_um", "µm", 2.0, f"height of the spike of strut {i + 1}; positive: it stays behind"
+            )
+            for i in range(STRUTS)
+        )
+        meaning = "travel of a strut over which its spike falls to 37 %, all struts alike"
+        return (*heights, Parameter("decay_mm", "mm", 0.2, meaning, DECAY_MM))
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Spikes of each strut.
+
+        Raises:
+            ModelError: the motion is no path.
+        """
+        rise, _, decay, _ = self._spikes(motion, machine, values)
+        return Effect(strut_mm=rise * decay)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """By the heights, each strut its own, and by the decay length.
+
+        Raises:
+            ModelError: the motion is no path.
+        """
+        rise, by_height, decay, by_length = self._spikes(motion, machine, values)
+        own = MM_PER_UM * (by_height * decay)[:, :, None] * np.eye(STRUTS)
+        return Effect(strut_mm=np.concatenate([own, (rise * by_length)[:, :, None]], axis=2))
+
+    def _spikes(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Both factors of the spike and their derivatives, shapes (n, 6).
+
+        Returns:
+            Rise -s a (1 - exp(-d / 2|a|)) [mm], its derivative by a [1], exp(-d / l) [1], its derivative by l [1/mm].
+        """
+        self.require(motion)
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        since = since_turning(strut_lengths(machine.hexapod, frames))
+        way, sign = np.abs(since), np.sign(since)
+        height, length = MM_PER_UM * values[:STRUTS], float(values[STRUTS])
+        # What rises over no way has risen; a strut that has not turned has no sign, and no spike.
+        ratio = np.divide(way, 2.0 * np.abs(height), out=np.full_like(way, np.inf), where=height != 0.0)
+        lacking = np.exp(-ratio)
+        by_height = -sign * (1.0 - lacking - np.where(lacking > 0.0, np.minimum(ratio, FULLY) * lacking, 0.0))
+        if length <= 0.0:  # the limit, which a fit may try: a spike without width
+            decay, by_length = np.zeros_like(way), np.zeros_like(way)
+        else:
+            decay = np.exp(-way / length)
+            by_length = way / length**2 * decay
+        return -sign * height * (1.0 - lacking), by_height, decay, by_length
+
+
+FULLY = 750.0
+"""Multiple of its own length after which an exponential is zero in double precision."""
+
+
+def since_turning(travel: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed way of each column since it last turned round, shape (n, m).
+
+    Zero at the turning point itself, which is the outermost row, and before the first one.
+    """
+    since = np.zeros_like(travel)
+    _since(np.ascontiguousarray(travel), TURNED_MM, since)
+    return since
+
+
+@compiled
+def _since(travel: NDArray[np.float64], turned: float, since: NDArray[np.float64]) -> None:
+    count, columns = travel.shape
+    for i in range(columns):
+        turn, way, has_turned = 0.0, 0.0, False  # where the column last turned, and which way it goes
+        low = high = 0  # outermost rows since then
+        for k in range(count):
+            x = travel[k, i]
+            low = k if x < travel[low, i] else low
+            high = k if x > travel[high, i] else high
+            new = 0.0
+            if way >= 0.0 and travel[high, i] - x > turned:
+                new = -1.0
+            elif way <= 0.0 and x - travel[low, i] > turned:
+                new = 1.0
+            if new != 0.0:
+                start = high if new < 0.0 else low
+                if way != 0.0:  # the first movement is one that was already under way
+                    turn, has_turned = travel[start, i], True
+                    for j in range(start, k):
+                        since[j, i] = travel[j, i] - turn
+                way, low, high = new, k, k
+            if has_turned:
+                since[k, i] = x - turn

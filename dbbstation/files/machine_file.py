@@ -1,20 +1,39 @@
 """`dbb-machine/1`: the nominal machine, as its controller believes it."""
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
 from dbbstation.files.schema import Schema, read_document, validate
-from dbbstation.machine.geometry import Compliance, Hexapod, Machine, Masses, StrutMasses, Travel
+from dbbstation.machine.geometry import Compliance, Hexapod, JointAxes, Machine, Masses, StrutMasses, Travel
 from dbbstation.machine.rotation import Rotation
 
 _Millimetre = Annotated[float, Quantity("mm", 0, 20, signed=True)]
+_Component = Annotated[float, Quantity("", 0, 1, signed=True)]
+
+_UNIT_WITHIN = 0.01
+"""How far the length of a direction may be from one, written with two or three digits."""
+
+
+def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Refuse what is no unit vector: a point in mm, or three zeros."""
+    length = math.hypot(*vector)
+    if abs(length - 1.0) > _UNIT_WITHIN:
+        raise PydanticCustomError(
+            "direction", "a direction has the length 1, not {length}", {"length": f"{length:.3g}"}
+        )
+    return vector
+
+
+_Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_direction)]
 
 
 class TravelSchema(Schema):
@@ -71,6 +90,15 @@ class StrutMassesSchema(Schema):
     """Length of that screw; its rear end sticks out behind the joint [mm]."""
 
 
+class JointAxesSchema(Schema):
+    """Axes of the universal joints of struts 1 to 6 that are fixed in base and platform, as unit vectors."""
+
+    base: tuple[_Direction, _Direction, _Direction, _Direction, _Direction, _Direction]
+    """Of the base joints, machine frame [1]."""
+    platform: tuple[_Direction, _Direction, _Direction, _Direction, _Direction, _Direction]
+    """Of the platform joints, platform frame [1]."""
+
+
 class MachineParts(Schema):
     """The machine itself: what a machine file holds beside its `format` line, and a model holds inline."""
 
@@ -105,10 +133,13 @@ class MachineParts(Schema):
     """Compliance of the struts as designed; needed by the sources that model gravity."""
     strut_masses: StrutMassesSchema | None = None
     """Weight of struts and motors; needed by the source that models it."""
+    joint_axes: JointAxesSchema | None = None
+    """Axes of universal joints; needed by the source that models how they turn the screws."""
 
     def to_domain(self) -> Machine:
         """Return the machine that calculations use."""
         masses, compliance, strut_masses = self.masses, self.compliance, self.strut_masses
+        axes = self.joint_axes
         return Machine(
             name=self.name,
             hexapod=Hexapod(
@@ -123,6 +154,7 @@ class MachineParts(Schema):
             joint_tolerance_mm=self.joint_tolerance_mm,
             compliance=None if compliance is None else Compliance(**compliance.model_dump()),
             strut_masses=None if strut_masses is None else StrutMasses(**strut_masses.model_dump()),
+            joint_axes=None if axes is None else JointAxes(np.array(axes.base), np.array(axes.platform)),
         )
 
 
@@ -145,6 +177,8 @@ def machine_parts(machine: Machine) -> MachineParts:
             "masses": machine.masses and asdict(machine.masses),
             "compliance": machine.compliance and asdict(machine.compliance),
             "strut_masses": machine.strut_masses and asdict(machine.strut_masses),
+            "joint_axes": machine.joint_axes
+            and {"base": points(machine.joint_axes.base), "platform": points(machine.joint_axes.platform)},
         }
     )
 

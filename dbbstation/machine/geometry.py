@@ -99,6 +99,21 @@ class StrutMasses:
 
 
 @dataclass(frozen=True, eq=False)
+class JointAxes:
+    """Directions of the axes of universal joints that are fixed in base and platform, of any length.
+
+    A universal joint turns about two axes: the first is fixed in base or platform, the second in the strut, across it.
+
+    Attributes:
+        base: machine frame, shape (6, 3) [1].
+        platform: platform frame, shape (6, 3) [1].
+    """
+
+    base: NDArray[np.float64]
+    platform: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
 class Machine:
     """The nominal machine: what its controller believes.
 
@@ -114,6 +129,7 @@ class Machine:
             where not known.
         compliance: of the struts as designed; None where not known.
         strut_masses: of the struts as designed; None where not known.
+        joint_axes: of universal joints; None where not known, or where the joints are balls.
     """
 
     name: str
@@ -125,3 +141,4 @@ class Machine:
     joint_tolerance_mm: float | None = None
     compliance: Compliance | None = None
     strut_masses: StrutMasses | None = None
+    joint_axes: JointAxes | None = None

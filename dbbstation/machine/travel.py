@@ -50,6 +50,12 @@ def check_travel(machine: Machine, poses: NDArray[np.float64], *, where: str) ->
     )
 
 
+def middle(machine: Machine) -> Frames:
+    """Frame of the middle of the travel: on the Z axis, half-way down, without tilt, one pose."""
+    height = sum(machine.travel.z_mm) / 2.0
+    return Frames.from_poses(np.array([[0.0, 0.0, height, 0.0, 0.0, 0.0]]), machine.hexapod.rotation)
+
+
 def _limited_quantities(
     machine: Machine,
     poses: NDArray[np.float64],
@@ -74,8 +80,6 @@ def _limited_quantities(
 
 def _hold(machine: Machine, struts: Struts) -> NDArray[np.float64]:
     """Jacobian determinant over that in the middle of the travel, shape (n,); zero where the platform is loose."""
-    middle = np.zeros((1, 6))
-    middle[0, 2] = sum(machine.travel.z_mm) / 2.0
-    there = inverse(machine.hexapod, Frames.from_poses(middle, machine.hexapod.rotation))
+    there = inverse(machine.hexapod, middle(machine))
     with np.errstate(invalid="ignore"):  # a pose that is no number has no hold, and is refused for it
         return np.asarray(np.linalg.det(strut_jacobian(struts)) / np.linalg.det(strut_jacobian(there)))

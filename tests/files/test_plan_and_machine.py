@@ -11,10 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dbbstation.errors import InputError
 from dbbstation.files.machine_file import machine_data, machine_parts, read_machine
 from dbbstation.files.plan_file import plan_data, read_inline_plan, read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml_out import yaml_text
+from dbbstation.machine.geometry import JointAxes
 from dbbstation.machine.rotation import Rotation
 from dbbstation.plan.circle import Direction
 
@@ -31,6 +33,10 @@ EVERY_KEY = FIXTURES / "plans" / "every-key.yaml"
 def same_machine(a: Machine, b: Machine) -> None:
     assert (a.name, a.travel, a.screw_lead_mm, a.masses) == (b.name, b.travel, b.screw_lead_mm, b.masses)
     assert (a.joint_tolerance_mm, a.compliance, a.strut_masses) == (b.joint_tolerance_mm, b.compliance, b.strut_masses)
+    assert (a.joint_axes is None) == (b.joint_axes is None)
+    if a.joint_axes is not None:
+        assert np.array_equal(a.joint_axes.base, b.joint_axes.base)
+        assert np.array_equal(a.joint_axes.platform, b.joint_axes.platform)
     assert a.hexapod.rotation is b.hexapod.rotation
     assert np.array_equal(a.hexapod.base_joints_mm, b.hexapod.base_joints_mm)
     assert np.array_equal(a.hexapod.platform_joints_mm, b.hexapod.platform_joints_mm)
@@ -48,6 +54,18 @@ def test_every_key_of_a_machine_arrives() -> None:
     assert asdict(machine.masses) == {"platform_kg": 400.0, "centre_of_gravity_above_tip_mm": 500.0}
     assert machine.compliance.at_1000mm_mm_per_n == 9.68e-6
     assert machine.strut_masses.screw_length_mm == 1400.0
+    assert machine.joint_axes.base[4] == pytest.approx([-np.sin(np.radians(335)), np.cos(np.radians(335)), 0], abs=1e-6)
+    assert machine.joint_axes.platform.shape == (6, 3)
+
+
+@pytest.mark.parametrize("wrong", ["[0.0, 0.0, 0.0]", "[0.5, 0.5, 0.0]", "[64.1, 732.2, 0.0]"])
+def test_an_axis_is_a_unit_vector(tmp_path: Path, wrong: str) -> None:
+    text = (FIXTURES / "machines" / "every-key.yaml").read_text()
+    assert text.count("[0.573576, 0.819152, 0.0]") == 1
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace("[0.573576, 0.819152, 0.0]", wrong))
+    with pytest.raises(InputError, match=r"joint_axes\.base\[3\].*(has the length 1|is not plausible)"):
+        read_machine(file)
 
 
 def test_the_reference_machine_is_the_one_of_the_papers(reference: Machine) -> None:
@@ -64,7 +82,14 @@ def test_the_reference_machine_is_the_one_of_the_papers(reference: Machine) -> N
 def test_a_machine_survives_writing_and_reading_to_the_last_bit(tmp_path_factory, reference, seed) -> None:
     rng = np.random.default_rng(seed)
     moved = reference.hexapod.moved(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)))
-    machine = replace(reference, hexapod=moved, reference_length_error_mm=rng.normal(size=6), joint_tolerance_mm=0.05)
+    axes = rng.normal(size=(2, 6, 3))
+    machine = replace(
+        reference,
+        hexapod=moved,
+        reference_length_error_mm=rng.normal(size=6),
+        joint_tolerance_mm=0.05,
+        joint_axes=JointAxes(*(axes / np.linalg.norm(axes, axis=2, keepdims=True))),
+    )
     path = tmp_path_factory.mktemp("machine") / "machine.yaml"
     path.write_text(yaml_text({"format": "dbb-machine/1", **machine_data(machine_parts(machine))}))
     same_machine(read_machine(path), machine)

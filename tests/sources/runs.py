@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dbbstation.machine.geometry import Compliance, Machine, Masses, StrutMasses
+from dbbstation.machine.geometry import Compliance, JointAxes, Machine, Masses, StrutMasses
 from dbbstation.machine.rotation import Rotation
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Plate
@@ -104,7 +104,7 @@ def jig_runs(step_deg=2.0, pause_s=120.0) -> list[Motion]:
 
 
 def random_machine(reference: Machine, rotation: Rotation, rng) -> Machine:
-    """A machine with joints some centimetres off the reference, and with all masses known."""
+    """A machine with joints some centimetres off the reference, and with all masses and axes known."""
     hexapod = replace(reference.hexapod, rotation=rotation)
     return replace(
         reference,
@@ -112,6 +112,7 @@ def random_machine(reference: Machine, rotation: Rotation, rng) -> Machine:
         masses=Masses(rng.uniform(200, 600), rng.uniform(300, 600)),
         compliance=Compliance(rng.uniform(5e-6, 2e-5), rng.uniform(0.3, 1.0)),
         strut_masses=StrutMasses(*rng.uniform([10, 5, 200, 5, 1300], [30, 25, 400, 15, 1700])),
+        joint_axes=JointAxes(*rng.normal(0, [1, 1, 0.1], (2, 6, 3))),
     )
 
 

@@ -1,0 +1,65 @@
+"""Error source: struts that sag under their own weight are shorter from joint to joint."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.statics import DOWN
+from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+USUAL_UM = 0.3
+"""Shortening of a level rod of 1000 mm and 25 kg whose stiffness is that of a steel bar of 30 mm diameter [µm]: it sags
+by 0.38 mm."""
+
+
+class StrutBending(LinearSource):
+    """A strut sags across its axis, and the straight line between its joints is shorter than the bent strut.
+
+    A strut of mass m and bending stiffness E I, pinned at both ends, carries q = m g_across / L per length. Its
+    deflection w = q x (L³ - 2 L x² + x³) / (24 E I) takes half the integral of w'² off its length:
+
+        shortening = 17/40320 (m g_across)² L⁵ / (E I)² = 2.487 f² / L, with f the sag in the middle.
+
+    One number says how much that is for a level strut of 1000 mm; it goes with the square of the cosine of the strut's
+    inclination and the fifth power of its length, at an unchanged mass and stiffness. The axial force, which makes a
+    pushed strut sag more and a pulled one less, is left out: 4 kN, a twentieth of the buckling load of a bar of 30 mm
+    diameter, change its shortening by a tenth.
+    """
+
+    name = "strut-bending"
+    belongs_to = Owner.MACHINE
+    varies_with = "strut-length"
+    texts = Texts(
+        what="A strut sags under its own weight; bent, it is shorter from joint to joint than its drive measures along "
+        "it.",
+        shows="Hardly ever: tenths of a micrometre on stiff struts, the same in both directions, most where struts are long "
+        "and lie flat, and almost all of it hidden by joints and lengths.",
+        confirm="Put a dial gauge on the middle of a level strut and lift it there with a spring balance by five eighths "
+        "of its weight: the gauge rises by the sag f, and the shortening is 2.5 f² / L.",
+        cure="Nothing, as long as the sag is below half a millimetre; thicker or lighter struts otherwise.",
+        equation="actual minus driven length = -s (g_across / g)² (L / 1000 mm)⁵, s = 17/40320 (m g)² (1000 mm)⁵ / (E I)²",
+        origin="second-order shortening 1/2 ∫ w'² dx of a simply supported beam under an even load, Timoshenko and Gere, "
+        "Theory of Elastic Stability, chapter 1",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """One shortening, all six struts alike."""
+        return (
+            Parameter("shortening_um", "µm", USUAL_UM, "shortening of a level strut of 1000 mm under its own weight"),
+        )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shortening of each strut."""
+        struts = inverse(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+        across_squared = 1.0 - (struts.unit @ DOWN) ** 2
+        return Effect(strut_mm=-MM_PER_UM * (across_squared * (struts.length_mm / 1000.0) ** 5)[:, :, None])

@@ -70,6 +70,7 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
                 problems += error.problems
             except StationError as error:
                 problems.append(Problem(str(run.path), 0, 0, error.what, error.remedy))
+        warnings += _under_spindle(session, wanted)
     if problems:
         raise InputError(problems)
     if not observations:
@@ -89,6 +90,18 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
     if text is None:
         raise InputError(faults)
     return replace(observation, commanded=commanded_poses(text, str(path), observation))
+
+
+def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
+    """Say which centres tell nothing of the machine's place: those about balls put up under the spindle [CAL III-A]."""
+    tests = dict.fromkeys(run.test for run in runs if not session.plan.tests[run.test].ball.place_known)
+    if not tests:
+        return []
+    what = f"{session.name}: the ball was put up under the spindle in test {', '.join(tests)}"
+    shows = (
+        "centre deviations there, and rms values with them, show how it was put up, less what a micrometer read of that"
+    )
+    return [f"{what}: {shows}, and not how far the machine is off; circularity counts"]
 
 
 def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:

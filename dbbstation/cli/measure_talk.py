@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 _BAR_WIDTH = 40
 _QUARTERS = 4
 
+_OF_MACHINE, _OF_SET_UP = "centre", "set-up"
+"""Under the spindle the centre of a circle shows how the balls were put up, and nothing of the machine."""
+
 _ON_ENTER: dict[State, Command] = {State.ANNOUNCED: Start(), State.COMPLETE: Accept(), State.FLAWED: Repeat()}
 _WORDS: dict[str, Command] = {
     "m": Start(remounted=True),
@@ -51,13 +54,16 @@ class Talk:
         self._terminal = terminal
         self._quarter = 0
         self._drawn = False
+        self._centre = _OF_MACHINE
 
     def __call__(self, event: events.Event) -> None:
         """Say what the event means."""
+        if isinstance(event, events.RunAnnounced):
+            self._centre = _OF_MACHINE if event.ball.place_known else _OF_SET_UP
         if isinstance(event, events.Progress):
             self._progress(event)
             return
-        for line in _lines(event):
+        for line in _lines(event, self._centre):
             self._say(line)
         if self._asking and isinstance(event, events.StateChanged) and event.state in _ASKED:
             self._say(f"  {_ASKED[event.state]}")
@@ -167,8 +173,8 @@ class Keyboard:
         self._send(Quit())
 
 
-def _lines(event: events.Event) -> list[str]:
-    """Return what there is to say of an event."""
+def _lines(event: events.Event, centre: str) -> list[str]:
+    """Return what there is to say of an event; `centre` is whose error the centre of a circle is."""
     match event:
         case events.RunAnnounced():
             head = f"{event.number} of {event.count}: test {event.run.test} {event.run.direction}"
@@ -184,12 +190,13 @@ def _lines(event: events.Event) -> list[str]:
         case (
             events.RunStarted() | events.RunCompleted() | events.RunAccepted() | events.RunRejected() | events.RunLate()
         ):
-            return [f"  {event.run.label}: {_of_run(event)}"]
+            return [f"  {event.run.label}: {_of_run(event, centre)}"]
     return []
 
 
 def _of_run(
     event: events.RunStarted | events.RunCompleted | events.RunAccepted | events.RunRejected | events.RunLate,
+    centre: str,
 ) -> str:
     match event:
         case events.RunStarted():
@@ -201,7 +208,7 @@ def _of_run(
         case events.RunCompleted(figures=figures) if figures is not None:
             lost = f", {event.lost} samples lost" if event.lost else ""
             return (
-                f"{event.samples} samples{lost}; centre off {figures.centre_deviation_um:.1f} µm, "
+                f"{event.samples} samples{lost}; {centre} off {figures.centre_deviation_um:.1f} µm, "
                 f"mean {figures.mean_radial_error_um:+.1f} µm, circularity {figures.circularity_um:.1f} µm"
             )
     return event.problem

@@ -16,14 +16,15 @@ import click
 def simulate(*, model: Path, plan: Path, out: Path, samples: int, interval_s: float) -> None:
     r"""Write the session that a ball bar would record on the machine of a model, without noise.
 
-    Balls stand where the plan has them; only the machine's own error sources act. Rows carry their angles, lengths
-    are written to 1 nm.
+    Balls stand where the plan has them, those that it puts up under the spindle where the model has the tool tip; only
+    the machine's own error sources act. Rows carry their angles, lengths are written to 1 nm.
 
     \b
     Examples:
       dbbstation simulate --model model.yaml --plan table2.yaml --out predicted
       dbbstation evaluate predicted --model other-model.yaml
     """
+    from dataclasses import replace
     from datetime import UTC, datetime, timedelta
 
     from dbbstation.calibration.observability import setup_of
@@ -34,6 +35,7 @@ def simulate(*, model: Path, plan: Path, out: Path, samples: int, interval_s: fl
     from dbbstation.files.session_writer import FinishedRun, write_session
     from dbbstation.model.simulation import simulate_circle
     from dbbstation.sources.registry import known_sources
+    from dbbstation.virtual.under_spindle import SetUp, put_up
 
     if out.exists():
         raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
@@ -46,9 +48,13 @@ def simulate(*, model: Path, plan: Path, out: Path, samples: int, interval_s: fl
     order = [(test, 1) for test in tests.tests.values()] + [(tests.tests[name], 2) for name in tests.repeat_at_end]
     runs: list[FinishedRun] = []
     for mounting, (test, repeat) in enumerate(order, start=1):
+        setup, actual = setup_of(test), machine_model
+        if not test.ball.place_known:
+            stands = put_up(machine_model, test.circle, setup, SetUp.faultless(), len(runs) * interval_s)
+            actual = replace(machine_model, sources=(*machine_model.sources, *stands))
         for direction in test.directions:
             started_s = len(runs) * interval_s
-            turn = simulate_circle(machine_model, test.run(direction), setup_of(test), samples, started_s)
+            turn = simulate_circle(actual, test.run(direction), setup, samples, started_s)
             columns = {"t_s": turn.t_s, "length_mm": turn.length_mm, "theta_deg": turn.theta_deg}
             started = begun + timedelta(seconds=started_s)
             runs.append(FinishedRun(test.name, direction, columns, repeat, mounting, started))

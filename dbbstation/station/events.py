@@ -80,7 +80,7 @@ class RunAnnounced:
 
     Attributes:
         run: which run.
-        ball: the ball on the table with its bore (None: it stands in none) and holder.
+        ball: the ball on the table with its bore (None: it stands in none) and holder, or put up under the spindle.
         circle: the circle: bar length, tilt, elevation, feed, centre.
         put_up: the ball has to be put up; otherwise it stands there already and is not touched.
         program: NC program that commands the run; empty: the plain nominal circle.

@@ -11,17 +11,41 @@ if TYPE_CHECKING:
 
 def instructions(ball: Ball, circle: Circle, *, put_up: bool, program: str) -> tuple[str, ...]:
     """Return the steps, in their order."""
-    a, b, c = circle.tilt_deg
-    x, y, z = circle.centre_mm
     raised = f", raised by {circle.elevation_deg:g}°" if circle.elevation_deg else ", level"
     what = f"NC program {program}" if program else f"{circle.direction} circle"
-    turn = f" and turn it C {c:g}°" if c else ""
     return (
-        _mount(ball) if put_up else f"Leave the ball {ball.name} where it stands, do not touch its holder",
-        f"Tilt the tool to A {a:g}°, B {b:g}°{turn}",
-        f"Bar of {circle.bar_mm:g} mm{raised}; circle about X {x:.3f} Y {y:.3f} Z {z:.3f}",
+        *(_mounted if ball.place_known else _under_spindle)(ball, circle, put_up=put_up),
+        f"Bar of {circle.bar_mm:g} mm{raised}; circle about {_place(circle.centre_mm)}",
         f"Start the {what} at {circle.feed_mm_min:g} mm/min",
     )
+
+
+def _mounted(ball: Ball, circle: Circle, *, put_up: bool) -> tuple[str, ...]:
+    step = _mount(ball) if put_up else f"Leave the ball {ball.name} where it stands, do not touch its holder"
+    return (step, _tilt(circle))
+
+
+def _under_spindle(ball: Ball, circle: Circle, *, put_up: bool) -> tuple[str, ...]:
+    """The standard circular test [CAL III-A]: the machine stands at the circle's centre and tilt first."""
+    if not put_up:
+        return (f"Leave the ball {ball.name} and the moving ball as they stand, do not touch them", _tilt(circle))
+    a, b, c = circle.tilt_deg
+    pose = f"{_place(ball.centre_mm)} A {a:g}° B {b:g}°" + (f" C {c:g}°" if c else "")
+    return (
+        f"Drive the machine to {pose} and put the ball {ball.name} up under the spindle",
+        "With a micrometer: read now how far both balls are from the tool tip, and note it for the session file",
+    )
+
+
+def _tilt(circle: Circle) -> str:
+    a, b, c = circle.tilt_deg
+    turn = f" and turn it C {c:g}°" if c else ""
+    return f"Tilt the tool to A {a:g}°, B {b:g}°{turn}"
+
+
+def _place(point_mm: tuple[float, float, float]) -> str:
+    x, y, z = point_mm
+    return f"X {x:.3f} Y {y:.3f} Z {z:.3f}"
 
 
 def _mount(ball: Ball) -> str:

@@ -1,4 +1,4 @@
-"""The set-up of the announced run: bore, holder, ball, tilt, bar, feed."""
+"""The set-up of the announced run: bore and holder or place under the spindle, ball, tilt, bar."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Ball
     from dbbstation.station.events import RunAnnounced
     from dbbstation.tui.board import Board
 
@@ -25,14 +26,22 @@ class SetUpPanel(Panel):
         if announced is None:
             return Content("")
         ball, circle = announced.ball, announced.circle
-        where = "no bore" if ball.bore is None else f"bore {ball.bore}"
+        where, what, on = _place(ball)
         return lines(
             Content.assemble((where, "bold"), " ", _touch(announced)),
-            Content.assemble("holder ", (ball.holder, "bold")),
+            Content.assemble(what, " ", (on, "bold")),
             Content.assemble("ball ", (ball.name, "bold")),
             Content.assemble("tilt ", (_tilt(circle), "bold")),
             Content(f"bar {circle.bar_mm:g} mm {_elevation(circle)}"),
         )
+
+
+def _place(ball: Ball) -> tuple[str, str, str]:
+    """Return where a ball stands, and on what; under the spindle, where the machine stands while it is put up."""
+    if not ball.place_known:
+        x, y, z = ball.centre_mm
+        return "under spindle", "at", f"X {x:g} Y {y:g} Z {z:g}"
+    return "no bore" if ball.bore is None else f"bore {ball.bore}", "holder", ball.holder
 
 
 def _touch(announced: RunAnnounced) -> Content:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dbbstation.files.machine_file import read_machine
 from dbbstation.files.models import write_model
 from dbbstation.files.plan_file import read_inline_plan
 from dbbstation.files.session import Bar, read_session
@@ -76,7 +77,7 @@ def make_session(folder: Path) -> None:
 
 def make_conventional_session(folder: Path) -> None:
     """Two tests about balls put up under the spindle, set up by hand and read with a micrometer to 1 µm."""
-    machine = read_session(FIXTURES / "sessions" / "small").machine
+    machine = read_machine(FIXTURES / "machines" / "reference.yaml")
     whole = read_inline_plan(FIXTURES.parent / "protocols" / "plans" / "conventional.yaml")
     tests = tuple(test for test in whole.plan.tests if test.name in "dg")
     balls = {test.ball: whole.plan.balls[test.ball] for test in tests}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -163,3 +164,57 @@ def test_the_shipped_plans_can_be_measured() -> None:
     """Every plan that comes with the package passes the dry run on the reference machine."""
     for path in sorted((shipped_folder("protocols") / "plans").glob("*.yaml")):
         check_plan(read_plan(path), read_machine(MACHINE_FILE), file=str(path))
+
+
+def test_balls_under_the_spindle_from_the_plan_to_the_figures(tmp_path: Path) -> None:
+    """Two of the fifteen tests of the shipped plan: measured, checked, continued with readings noted, evaluated."""
+    text = (shipped_folder("protocols") / "plans" / "conventional.yaml").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("  - {name: ") or line[11] in "dg"]
+    plan_file, out = tmp_path / "conventional.yaml", tmp_path / "session"
+    plan_file.write_text("\n".join(lines), encoding="utf-8")
+    with bench(plan_file, sizes=QUIET) as place:
+        done = place.measure(out, "--json")
+        assert done.returncode == 0, done.stderr
+        truth = place.cell.machine.describe()["set_up_errors"]
+        session = read_session(out)
+        for run in session.runs:
+            assert apart(session, run, place.cell.machine)[1] < 0.4, run.label
+        assert [(stands["ball"], stands["mounting"]) for stands in truth] == [("d", 1), ("g", 2)]
+        pose = "X 100.000 Y 100.000 Z -1150.000 A -10° B 10°"
+        assert f"Drive the machine to {pose} and put the ball d up under the spindle" in done.stderr
+        assert "Leave the ball d and the moving ball as they stand" in done.stderr
+        assert "samples; set-up off" in done.stderr
+        assert "bore" not in done.stderr
+    assert [run.mounting for run in session.runs] == [1, 1, 2, 2]
+    readings = "".join(
+        f"  - {{test: {stands['ball']}, mounting: {stands['mounting']}, uncertainty_um: 1.0,"
+        f" fixed_ball_um: {stands['fixed_ball_um']}, moving_ball_um: {stands['moving_ball_um']}}}\n"
+        for stands in truth
+    )
+    noted = (out / "session.yaml").read_text(encoding="utf-8").replace("runs:\n", f"set_up_errors:\n{readings}runs:\n")
+    (out / "session.yaml").write_text(noted, encoding="utf-8")
+    checked = subprocess.run(
+        [sys.executable, "-m", "dbbstation", "check", str(out)], capture_output=True, text=True, check=False
+    )
+    assert checked.returncode == 0, checked.stderr
+    for run in read_session(out).runs:
+        setup = read_session(out).setup(run)
+        assert setup.set_up_errors is not None
+        told = truth[(run.mounting or 0) - 1]
+        np.testing.assert_allclose(setup.set_up_errors.fixed_ball_mm * 1e3, told["fixed_ball_um"], atol=1e-9)
+
+
+def test_a_session_goes_on_with_its_micrometer_readings(tmp_path: Path) -> None:
+    out, source = tmp_path / "session", shipped_folder("fixtures") / "sessions" / "under-spindle"
+    shutil.copytree(source, out)
+    text = (out / "session.yaml").read_text(encoding="utf-8")
+    kept = [line for line in text.splitlines() if not line.startswith("  - {test: g, direction: cw")]
+    (out / "runs" / "g-cw-1.csv").unlink()
+    (out / "session.yaml").write_text("\n".join(kept) + "\n", encoding="utf-8")
+    before = read_session(out)
+    with bench(out / "plan.yaml") as place:
+        done = place.measure(out)
+    assert done.returncode == 0, done.stderr
+    after = read_session(out)
+    assert (len(before.runs), len(after.runs)) == (3, 4)
+    assert after.set_up_errors == before.set_up_errors

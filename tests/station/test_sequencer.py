@@ -7,10 +7,12 @@ import pytest
 
 from dbbstation.errors import InstrumentError
 from dbbstation.files.plan_file import read_plan
+from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Quit, Reject, Repeat, Skip, Start
 from dbbstation.station.detector import Patience
+from dbbstation.station.instructions import instructions
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import State
@@ -216,3 +218,21 @@ def test_a_fault_names_the_run_that_it_interrupts(plan: Plan) -> None:
     assert fault.interrupted is not None
     assert fault.interrupted.label == "a-ccw-1"
     assert sequencer.state is State.FAULTED
+
+
+def test_a_ball_under_the_spindle_is_put_up_where_the_machine_stands() -> None:
+    plan = read_plan(shipped_folder("protocols") / "plans" / "conventional.yaml")
+    test = plan.tests["d"]
+    put_up = instructions(test.ball, test.circle, put_up=True, program="")
+    assert put_up[0] == (
+        "Drive the machine to X 100.000 Y 100.000 Z -1150.000 A -10° B 10° and put the ball d up under the spindle"
+    )
+    assert "micrometer" in put_up[1]
+    assert put_up[2] == "Bar of 150 mm, level; circle about X 100.000 Y 100.000 Z -1150.000"
+    stays = instructions(test.ball, test.run(Direction.CW), put_up=False, program="d-cw.ngc")
+    assert stays == (
+        "Leave the ball d and the moving ball as they stand, do not touch them",
+        "Tilt the tool to A -10°, B 10°",
+        "Bar of 150 mm, level; circle about X 100.000 Y 100.000 Z -1150.000",
+        "Start the NC program d-cw.ngc at 1000 mm/min",
+    )

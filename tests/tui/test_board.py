@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import InstrumentError
+from dbbstation.files.plan_file import read_plan
+from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
+from dbbstation.plan.plan import Plan
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Quit, Reject, Repeat, Skip, Start
 from dbbstation.station.states import State
 from dbbstation.tui.board import Mark, SequenceOpened
 from dbbstation.tui.messages import Weight
 from dbbstation.tui.sentences import now
+from dbbstation.tui.set_up_panel import SetUpPanel
 from tests.tui.happenings import Happening, make_plan
 
 
@@ -145,3 +149,13 @@ def test_the_rate_is_counted_in_the_time_of_the_samples() -> None:
 def test_a_refused_command_is_told() -> None:
     board = Happening().command(Accept()).board()
     assert "`accept` means nothing while waiting for the set-up" in board.messages[-1].text
+
+
+def test_the_place_of_a_ball_under_the_spindle_is_where_the_machine_stands() -> None:
+    plan = read_plan(shipped_folder("protocols") / "plans" / "conventional.yaml")
+    board = Happening(Plan(plan.name, {"g": plan.tests["g"]})).board()
+    assert now(board).startswith(
+        "Drive the machine to X -100.000 Y 0.000 Z -1008.000 A 0° B -15° and put the ball g up"
+    )
+    rows = SetUpPanel().text(board).plain.splitlines()
+    assert rows[:3] == ["under spindle put up", "at X -100 Y 0 Z -1008", "ball g"]

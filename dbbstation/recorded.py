@@ -97,7 +97,8 @@ def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str
     tests = dict.fromkeys(run.test for run in runs if not session.plan.tests[run.test].ball.place_known)
     if not tests:
         return []
-    what = f"{session.name}: the ball was put up under the spindle in test {', '.join(tests)}"
+    where = "every test" if len(tests) == len({run.test for run in runs}) else f"test {', '.join(tests)}"
+    what = f"{session.name}: the ball was put up under the spindle in {where}"
     shows = (
         "centre deviations there, and rms values with them, show how it was put up, less what a micrometer read of that"
     )

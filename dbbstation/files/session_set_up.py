@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from dbbstation.files.schema import dotted
+from dbbstation.errors import InputError
+from dbbstation.files.schema import dotted, read_document, validate
+from dbbstation.files.session_file import SessionFile
 from dbbstation.sources.contract import SetUpErrors
 
 if TYPE_CHECKING:
+    from pathlib import Path
     from typing import Any
 
     from numpy.typing import NDArray
@@ -50,6 +53,22 @@ class SetUpReadings:
 def set_up_readings(entry: SetUpErrorsSchema) -> SetUpReadings:
     """Return an entry of a session file as the rest of the program takes it."""
     return SetUpReadings(entry.test, entry.mounting, entry.fixed_ball_um, entry.moving_ball_um, entry.uncertainty_um)
+
+
+def readings_in(file: Path, plan: Plan) -> tuple[SetUpReadings, ...]:
+    """Return the readings that a session file holds now, whatever its runs are.
+
+    Raises:
+        InputError: every fault of the file's text and of its readings.
+    """
+    faults: list[Problem] = []
+    document = read_document(file, SessionFile, faults)
+    session = None if document is None else validate(document, SessionFile, faults)
+    if document is not None:
+        check_set_up_errors(document, plan, faults)
+    if session is None or faults:
+        raise InputError(faults)
+    return tuple(map(set_up_readings, session.set_up_errors))
 
 
 def mounted_name(plan: Plan, test: str, mounting: int | None) -> str:

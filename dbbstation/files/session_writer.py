@@ -21,6 +21,7 @@ from dbbstation.files.session import (
     SessionFolder,
     read_session,
 )
+from dbbstation.files.session_set_up import readings_in
 from dbbstation.files.yaml_out import yaml_text
 
 if TYPE_CHECKING:
@@ -142,7 +143,8 @@ class SessionWriter:
     """Keeps one session folder while runs are recorded.
 
     The order of writing makes every moment survivable: the `.part` exists before the session file names it, and is
-    sealed before the session file calls it complete.
+    sealed before the session file calls it complete. Micrometer readings that a person saves in the session file meanwhile
+    are taken over; where they are wrong, the next step raises InputError and leaves the file as it is.
     """
 
     def __init__(self, session: SessionFolder) -> None:
@@ -287,11 +289,14 @@ class SessionWriter:
         self._session = replace(self._session, runs=tuple(runs.values()))
 
     def _write(self) -> None:
-        session = self._session
+        file, session = self._session.folder / SESSION_FILE, self._session
+        if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() != session.sha256:
+            # Somebody wrote micrometer readings into it while runs come in; nothing else may be changed there.
+            session = replace(session, set_up_errors=readings_in(file, session.plan))
         details = SessionDetails(**{each.name: getattr(session, each.name) for each in fields(SessionDetails)})
         names = (session.machine_path, session.plan_path)
         text = _session_text(session.folder, names, details, session.runs)
-        write_text(session.folder / SESSION_FILE, text, force=True)
+        write_text(file, text, force=True)
         self._session = replace(session, sha256=hashlib.sha256(text.encode()).hexdigest())
 
 

@@ -54,7 +54,7 @@ def test_evaluate_says_what_the_centres_are_and_still_prints_circularity(run, mo
     outcome = run("evaluate", SESSION, "--model", model_file)
     assert outcome.code == DONE
     assert (
-        "the ball was put up under the spindle in test d, g: centre deviations there, and rms values with them, "
+        "the ball was put up under the spindle in every test: centre deviations there, and rms values with them, "
         in outcome.err
     )
     data = run("evaluate", SESSION, "--model", model_file, "--json").data

@@ -121,6 +121,32 @@ def test_readings_before_any_run_are_refused(session: Path) -> None:
     ]
 
 
+def test_readings_written_in_while_a_run_is_recorded_are_kept(session: Path) -> None:
+    edit(session, f"  - {ENTRY}\n", "")
+    writer = SessionWriter.open(session)
+    with writer.start_run("g", Direction.CW, ("t_s", "length_mm"), started=datetime.now(UTC), mounting=3) as journal:
+        journal.append((0.0, 150.0))
+        edit(session, "runs:\n", f"  - {ENTRY.replace('mounting: 2', 'mounting: 3')}\nruns:\n")
+        writer.judge(writer.finish_run(journal), accepted=True)
+    again = read_session(session)
+    assert [(entry.test, entry.mounting) for entry in again.set_up_errors] == [("d", 1), ("g", 3)]
+    assert again.set_up_errors == writer.session.set_up_errors
+    assert again.setup(again.runs[-1]).set_up_errors.fixed_ball_mm.tolist() == [0.010, 0.035, -0.045]
+
+
+def test_a_slip_in_readings_written_in_meanwhile_is_told_and_nothing_is_overwritten(session: Path) -> None:
+    writer = SessionWriter.open(session)
+    with writer.start_run("g", Direction.CW, ("t_s", "length_mm"), started=datetime.now(UTC), mounting=3) as journal:
+        journal.append((0.0, 150.0))
+        edit(session, "mounting: 2, fixed", "mounting: 9, fixed")
+        written = (session / "session.yaml").read_text()
+        with pytest.raises(InputError, match="no run of test g has the mounting 9"):
+            writer.finish_run(journal)
+    assert (session / "session.yaml").read_text() == written
+    edit(session, "mounting: 9, fixed", "mounting: 2, fixed")
+    assert [run.state.value for run in SessionWriter.open(session).runs][-1] == "complete"
+
+
 def test_going_on_with_a_session_keeps_the_readings_to_the_digit(session: Path) -> None:
     edit(session, "[10.0, 35.0, -45.0]", "[10.1, 35, -0.3]")
     before = read_session(session).set_up_errors

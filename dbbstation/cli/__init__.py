@@ -24,6 +24,7 @@ _DEBUG = "--debug"
 COMMANDS = {
     "calibrate": "Fit the machine's errors to recorded sessions.",
     "check": "Validate files of any format, and whole sessions.",
+    "compare": "Where two sessions differ, and how that is ordered.",
     "compensate": "Compensate any NC program with a calibrated model.",
     "diagnose": "Find the physics that a calibration leaves out.",
     "demo": "The whole job on a simulated machine, start to end.",

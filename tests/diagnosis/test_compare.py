@@ -1,0 +1,311 @@
+"""Two sessions side by side: pairs, chance, and what orders a difference. Readings are made here, without the model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from dbbstation.diagnosis.compare import SIGNIFICANT, compare
+from dbbstation.diagnosis.compare_pairs import at_common_angles, match
+from dbbstation.errors import TraceError
+from dbbstation.files.plan_file import read_plan
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model.observation import Observation
+from dbbstation.plan.circle import Direction
+from dbbstation.sources.contract import Setup
+from dbbstation.trace.circle import RawCircle
+
+NOISE_MM, MOUNTING_MM, BALL_MM, BAR_MM = 0.0004, 0.001, 0.0005, 0.0005
+PLAN = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
+BOTH = (Direction.CCW, Direction.CW)
+
+
+def hexapod(reference):
+    """Joints as plain arrays."""
+    return reference.hexapod.base_joints_mm, reference.hexapod.platform_joints_mm
+
+
+def tilt_matrix(a_deg, b_deg):
+    """Rx(A) Ry(B)."""
+    a, b = np.radians([a_deg, b_deg])
+    rx = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
+    ry = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+    return rx @ ry
+
+
+def strut_gain(reference, circle, theta_deg):
+    """Bar length per strut length, by solving J dpose = dL of the textbook Jacobian pose by pose, shape (n, 6)."""
+    base, platform = hexapod(reference)
+    turn = tilt_matrix(*circle.tilt_deg[:2])
+    gains = []
+    for theta in np.radians(theta_deg):
+        out = np.array([np.cos(theta), np.sin(theta), 0.0])
+        arm = platform @ turn.T
+        leg = np.array(circle.centre_mm) + circle.bar_mm * out + arm - base
+        unit = leg / np.linalg.norm(leg, axis=1)[:, None]
+        jacobian = np.hstack([unit, np.cross(arm, unit)])
+        gains.append(out @ np.linalg.inv(jacobian)[:3])
+    return np.array(gains)
+
+
+def unchanged(*_):
+    return 0.0
+
+
+class Workshop:
+    """Makes sessions of readings: a machine's shape, balls that sit anew, noise."""
+
+    def __init__(self, seed, tests="abcdefghijklmno", samples=720):
+        self.rng = np.random.default_rng(seed)
+        self.tests, self.samples, self.start_deg = tests, samples, 0.0
+        self.shape = {test: self.rng.normal(0, 0.02, 12) for test in tests}
+
+    def session(self, name, change=unchanged):
+        runs = []
+        for test in self.tests:
+            planned = PLAN.tests[test]
+            ball = self.rng.normal(0, MOUNTING_MM, 2)
+            for direction in BOTH:
+                circle = replace(planned.run(direction), start_deg=self.start_deg)
+                phi = (np.arange(self.samples) + self.rng.uniform(0, 1)) * (360.0 / self.samples)
+                theta_deg = circle.theta_deg(phi) % 360.0
+                theta, started_s = np.radians(theta_deg), 200.0 * len(runs)
+                waves = [f(k * theta) for k in range(1, 7) for f in (np.cos, np.sin)]
+                length = circle.bar_mm + self.shape[test] @ np.array(waves)
+                length -= ball @ np.array([np.cos(theta), np.sin(theta)])
+                length = length + change(circle, theta_deg, started_s) + self.rng.normal(0, NOISE_MM, self.samples)
+                raw = RawCircle(name, circle, phi / circle.turning_deg_s, phi, length)
+                at = np.array(planned.ball.centre_mm)
+                setup = Setup(name, f"{name} {test}", f"{name} {test}", name, at, MOUNTING_MM, BALL_MM, BAR_MM)
+                runs.append(Observation(test, 1, raw, setup, started_s))
+        return runs
+
+
+@pytest.mark.slow
+def test_noise_and_mountings_alone_are_no_difference(reference):
+    """One truth, new noise and balls put up anew: the false alarms of a hundred draws are those that were promised."""
+    found = []
+    for seed in range(100):
+        shop = Workshop(seed, tests="abgl", samples=360)
+        found.append(compare(reference, shop.session("A"), shop.session("B")).probability)
+    probabilities = np.array(found)
+    assert np.count_nonzero(probabilities < SIGNIFICANT) <= binom.isf(1e-3, 100, SIGNIFICANT)
+    # Never more alarms than promised at lesser levels either; fewer, since the balls are stated less sure than they sit.
+    for level in (0.01, 0.05, 0.2):
+        assert np.count_nonzero(probabilities < level) <= binom.isf(1e-3, 100, level)
+
+
+def test_noise_alone_gives_every_run_its_promised_probability(reference):
+    """Without any scatter of balls the probabilities of runs are uniform but for what the statement of it takes away."""
+    shop = Workshop(7)
+    runs = compare(reference, shop.session("A"), shop.session("B")).runs
+    probabilities = np.array([run.probability for run in runs])
+    assert 0.3 < probabilities.mean() < 0.7
+    assert probabilities.min() > SIGNIFICANT / 30
+
+
+def test_a_strut_that_became_longer_is_told(reference):
+    shop = Workshop(1)
+    a = shop.session("A")
+    b = shop.session("B", lambda circle, theta, _: strut_gain(reference, circle, theta)[:, 2] * 0.0015)
+    found = compare(reference, a, b)
+    assert found.probability < 1e-12
+    best = found.organised[0]
+    assert (best.variable, best.strut) == ("strut length, a constant", 3)
+    (name, value, sigma, unit) = best.amplitudes[0]
+    assert (name, unit) == ("strut 3", "µm")
+    assert value == pytest.approx(1.5, abs=4 * sigma)
+    assert sigma < 0.1
+    assert best.share > 0.9
+    assert [one.family.name for one in found.taken] == ["strut length, a constant, strut 3"]
+    assert found.halves.opposite_probability > 1e-3
+
+
+def test_the_bar_is_told(reference):
+    shop = Workshop(2)
+    found = compare(reference, shop.session("A"), shop.session("B", lambda *_: 0.005))
+    assert found.differ
+    assert found.organised[0].variable == "the same constant in every run"
+    assert found.organised[0].amplitudes[0][1] == pytest.approx(5.0, abs=0.1)
+    assert all(run.radial_mm == pytest.approx(0.005, abs=0.0002) for run in found.runs)
+    # 5 µm where both bars together are known to 0.7 µm: seven sigma in every run.
+    assert all(run.radial_sigma_mm == pytest.approx(np.hypot(BAR_MM, BAR_MM), rel=0.05) for run in found.runs)
+
+
+def test_a_constant_within_what_is_stated_of_the_bars_is_no_difference(reference):
+    shop = Workshop(3)
+    assert not compare(reference, shop.session("A"), shop.session("B", lambda *_: 0.001)).differ
+
+
+def test_one_ball_that_sits_badly_is_found_in_its_two_runs(reference):
+    shop = Workshop(4)
+
+    def shifted(circle, theta_deg, _):
+        return -0.02 * np.cos(np.radians(theta_deg)) * (circle.ball_mm == PLAN.tests["d"].ball.centre_mm)
+
+    found = compare(reference, shop.session("A"), shop.session("B", shifted))
+    assert [found.runs[r].pair.label for r in found.different] == ["d ccw 1", "d cw 1"]
+    worst = found.runs[found.different[0]]
+    assert worst.centre_mm == pytest.approx((-0.02, 0.0), abs=5 * worst.centre_sigma_mm)
+    assert worst.centre_sigma_mm == pytest.approx(np.sqrt(2) * np.hypot(MOUNTING_MM, BALL_MM), rel=0.02)
+    assert worst.circularity_mm < 0.001
+    assert [one.variable for one in found.taken][:1] == ["a ball shift of its own in every mounting"]
+
+
+def test_a_jig_that_was_put_down_elsewhere_is_one_body(reference):
+    shop = Workshop(5)
+
+    def moved(circle, theta_deg, _):
+        x, y, _z = circle.ball_mm
+        shift = np.array([0.01 - 50e-6 * y, -0.02 + 50e-6 * x])  # and turned by 50 µrad about Z
+        theta = np.radians(theta_deg)
+        return -(shift[0] * np.cos(theta) + shift[1] * np.sin(theta))
+
+    best = compare(reference, shop.session("A"), shop.session("B", moved)).organised[0]
+    assert best.variable == "all balls moved as one body"
+    values = {name: (value, sigma) for name, value, sigma, _ in best.amplitudes}
+    for name, true in (("x", 10.0), ("y", -20.0), ("about z", 50.0)):
+        assert values[name][0] == pytest.approx(true, abs=4 * values[name][1])
+        assert values[name][1] < 10
+    assert values["z"][1] == np.inf  # circles with a level bar see nothing of it
+
+
+def test_a_drift_is_told_from_a_constant(reference):
+    shop = Workshop(6)
+    found = compare(reference, shop.session("A"), shop.session("B", lambda _c, _t, started: 1e-6 * started))
+    assert found.organised[0].variable in {
+        "reading, with time in B",
+        "time in the session: mean and centre",
+    }
+    assert found.organised[0].share > 0.9
+
+
+def test_what_changes_its_sign_with_the_direction(reference):
+    shop = Workshop(8)
+
+    def reversal(circle, theta_deg, _):
+        return circle.direction.sign * 0.001 * np.sign(np.sin(np.radians(theta_deg)))
+
+    found = compare(reference, shop.session("A"), shop.session("B", reversal))
+    assert found.halves.opposite_probability < 1e-9
+    # A square wave of 1 µm; a little of it could be angles that were cut wrongly.
+    assert 0.85 < 1e3 * found.halves.opposite_mm < 1.02
+    assert found.halves.same_mm < 0.0002
+
+
+def test_a_difference_without_order_is_called_that(reference):
+    """A smooth difference of its own in every test, the same in both directions: nothing explains it."""
+    shop = Workshop(9)
+    own = {test.ball.centre_mm: shop.rng.normal(0, 0.002, 6) for test in PLAN.tests.values()}
+
+    def change(circle, theta_deg, _):
+        theta = np.radians(theta_deg)
+        waves = np.array([f(k * theta) for k in (2, 3, 4) for f in (np.cos, np.sin)])
+        return own[circle.ball_mm] @ waves
+
+    found = compare(reference, shop.session("A"), shop.session("B", change))
+    assert found.probability < 1e-12
+    assert len(found.different) == 30
+    assert found.taken == ()
+
+
+def test_other_samplings_and_starts_are_no_difference(reference):
+    """Centres 20 µm off: a quarter of a degree is 0.1 µm, which would show."""
+    shop = Workshop(10)
+    a = shop.session("A")
+    shop.samples, shop.start_deg = 1300, 90.0
+    assert not compare(reference, a, shop.session("B")).differ
+
+
+def test_common_angles_lose_nothing_of_a_smooth_curve():
+    circle = PLAN.tests["a"].run(Direction.CW)
+    phi = np.sort(np.random.default_rng(1).uniform(0, 360, 900))
+
+    def curve(theta_deg):
+        theta = np.radians(theta_deg)
+        return 0.1 * np.cos(theta) + 0.02 * np.sin(3 * theta)
+
+    raw = RawCircle("r", circle, phi, phi, circle.bar_mm + curve(circle.theta_deg(phi)))
+    found = at_common_angles(raw, 180)
+    there = np.isfinite(found)
+    middles = (np.arange(180) + 0.5) * 2.0
+    assert np.count_nonzero(there) > 170
+    assert found[there] == pytest.approx(curve(middles)[there], abs=1e-6)
+
+
+def test_runs_are_matched_by_test_and_direction():
+    shop = Workshop(11, tests="abc")
+    a, b = shop.session("A"), shop.session("B")
+    matching = match([run for run in a if run.test != "c"], [run for run in b if run.label != "a cw 1"])
+    assert [pair.label for pair in matching.pairs] == ["a ccw 1", "b ccw 1", "b cw 1"]
+    assert matching.only_a == ("a cw",)
+    assert matching.only_b == ("c ccw", "c cw")
+    assert (matching.not_comparable, matching.averaged) == ((), ())
+
+
+def test_repeats_pair_in_order_or_are_averaged():
+    shop = Workshop(12, tests="a")
+    a, b, again = shop.session("A"), shop.session("B"), shop.session("B")
+    twice = [replace(run, repeat=3) for run in again]
+    pairs = match([*a, *twice], [*b, *twice]).pairs
+    assert [pair.label for pair in pairs] == ["a ccw 1", "a ccw 2", "a cw 1", "a cw 2"]
+    matching = match(a, [*b, *twice])
+    assert matching.averaged == ("a ccw: mean of 1 against mean of 2", "a cw: mean of 1 against mean of 2")
+    one, other = (at_common_angles(run.raw, 360) for run in (b[0], again[0]))
+    assert matching.pairs[0].b_mm == pytest.approx((one + other) / 2)
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ({"bar_mm": 100.0}, "bar length 150 mm in A, 100 in B"),
+        ({"tilt_deg": (1.0, 0.0, 0.0)}, "tilt 0 0 0 degrees in A, 1 0 0 in B"),
+        ({"elevation_deg": 5.0}, "elevation 0 degrees in A, 5 in B"),
+        ({"ball_mm": (100.0, 0.0, -1150.0)}, "ball 0 0 -1150 mm in A, 100 0 -1150 in B"),
+    ],
+)
+def test_equal_names_of_different_circles_are_not_compared(change, what):
+    shop = Workshop(13, tests="ab")
+    a, b = shop.session("A"), shop.session("B")
+    b = [
+        replace(run, raw=replace(run.raw, circle=replace(run.raw.circle, **change))) if run.test == "a" else run
+        for run in b
+    ]
+    matching = match(a, b)
+    assert {pair.test for pair in matching.pairs} == {"b"}
+    assert matching.not_comparable == (("a", what),)
+
+
+def test_cmm_differences_of_a_ball_are_one_circle():
+    shop = Workshop(14, tests="a")
+    a = shop.session("A")
+    b = [replace(run, raw=replace(run.raw, circle=replace(run.raw.circle, ball_mm=(0.02, 0.0, -1150.03)))) for run in a]
+    assert len(match(a, b).pairs) == 2
+
+
+def test_nothing_in_common():
+    with pytest.raises(TraceError, match="no run in common"):
+        match(Workshop(1, tests="ab").session("A"), Workshop(1, tests="c").session("B"))
+
+
+def test_removed_centres_are_refused(reference):
+    shop = Workshop(15, tests="abc", samples=360)
+    a, b = shop.session("A"), shop.session("B")
+    removed = []
+    for run in b:
+        theta = np.radians(run.raw.theta_deg)
+        columns = np.column_stack([np.cos(theta), np.sin(theta)])
+        centre, *_ = np.linalg.lstsq(columns, run.raw.length_mm - 150.0, rcond=None)
+        removed.append(replace(run, raw=replace(run.raw, length_mm=run.raw.length_mm - columns @ centre)))
+    with pytest.raises(TraceError, match="in session B all circles lie on their commanded centres"):
+        compare(reference, a, removed)
+
+
+def test_two_simulations_without_noise_are_the_same_to_what_a_bar_shows(reference):
+    shop = Workshop(16, tests="abc", samples=360)
+    a = shop.session("A")
+    found = compare(reference, a, a)
+    assert (found.rms_mm, found.probability) == (0.0, 1.0)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dbbstation.errors import InputError, ModelError, OutputError
+from dbbstation.files.machine_file import read_machine
 from dbbstation.files.models import covariance_fault, read_model, write_model
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
@@ -89,6 +90,22 @@ def test_a_model_survives_to_the_last_bit(tmp_path_factory, reference, seed) -> 
         assert np.array_equal(a.values, b.values)
     assert np.array_equal(read.model.machine.hexapod.base_joints_mm, reference.hexapod.base_joints_mm)
     assert len(read.model.of_the_machine().sources) == 1
+
+
+@pytest.mark.parametrize("source", known_sources().values(), ids=lambda source: source.name)
+def test_every_source_survives_in_a_model(tmp_path: Path, source) -> None:
+    """On a machine whose file has every key."""
+    machine = read_machine(shipped_folder("fixtures") / "machines" / "every-key.yaml")
+    parameters = source.parameters(machine)
+    values = np.random.default_rng(5).normal(size=len(parameters))
+    shared = "" if source.belongs_to is Owner.MACHINE else "2026-11-20: one, mounting 1"
+    path = tmp_path / "model.yaml"
+    rows = tuple((source.name, shared, parameter.name) for parameter in parameters)
+    model = MachineModel(machine, (Fitted(source, values, shared),))
+    write_model(path, IdentifiedModel(model, rows, np.eye(len(rows))))
+    (read,) = read_model(path, known_sources()).model.sources
+    assert (read.source, read.shared) == (source, shared)
+    assert np.array_equal(read.values, values)
 
 
 def test_writing_twice_needs_force(tmp_path: Path, reference) -> None:

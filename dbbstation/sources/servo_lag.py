@@ -31,7 +31,8 @@ class ServoLag(ErrorSource):
     A lag that all struts have in common is a delay of the whole machine, to first order the same as `time-skew`, and
     a circle about a ball in its centre does not show it but by its shrinkage, (v tau)² / 2R: 0.2 µm at 1000 mm/min,
     150 mm and 15 ms. Where the turn is found in the recording by feed-in and feed-out, these come late as well, and
-    the delay leaves no trace at all. Differences between struts are what circles see.
+    the delay leaves no trace at all. Differences between struts are what circles see: a fit holds the mean of the six
+    times at zero and says so, and each of them is found less that mean.
     """
 
     name = "servo-lag"

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dbbstation.calibration.evaluation import Evaluation, RunFigures, rms_um
-from dbbstation.inference.harmonics import LOW, smooth
+from dbbstation.calibration.noise_level import fine_noise_mm
+from dbbstation.calibration.scatter import check_scatter, seats_of
+from dbbstation.calibration.visibility import visibility
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from dbbstation.calibration.fit import Calibration
     from dbbstation.calibration.layout import Term
+    from dbbstation.calibration.outliers import Outlier
+    from dbbstation.calibration.scatter import ScatterCheck
+    from dbbstation.calibration.visibility import Visibility
     from dbbstation.trace.analysis import CircleFigures
-
-
-STANDS_OUT = 4.0
-LEAST_DOUBT_UM = 3.0
-"""A run is doubtful that leaves four times what the usual one does, and more than a bar's noise could [µm]."""
 
 
 def evaluation_summary(evaluation: Evaluation) -> dict[str, Any]:
@@ -34,8 +35,10 @@ def evaluation_summary(evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
-def calibration_summary(calibration: Calibration, evaluation: Evaluation) -> dict[str, Any]:
-    """Everything that a fit says."""
+def calibration_summary(
+    calibration: Calibration, evaluation: Evaluation, outliers: Sequence[Outlier] = ()
+) -> dict[str, Any]:
+    """Everything that a fit says, and what was kept from pulling it."""
     return {
         **evaluation_summary(evaluation),
         "residual_within_mounting_rms_um": rms_um(calibration.residual_mm),
@@ -43,38 +46,16 @@ def calibration_summary(calibration: Calibration, evaluation: Evaluation) -> dic
         "noise_correlation_samples": calibration.noise.correlation_samples,
         "parameters_identified": calibration.parameters_identified,
         "directions_lost": list(calibration.directions_lost),
-        "doubtful_runs": doubtful_runs(calibration),
+        "directions_regularised": list(calibration.directions_regularised),
+        "parameters_prescribed": [f"{source}.{name}" for source, name in calibration.prescribed],
+        "outliers": [_outlier(outlier) for outlier in outliers],
+        "scatter": [_scatter(check) for check in check_scatter(seats_of(calibration))],
+        "observability": _visibility(visibility(calibration)),
         "sources": [_term(calibration, term) for term in calibration.layout.terms if _is_machines(term)],
         "measurement_effects": [
             _term(calibration, term) for term in calibration.layout.terms if not _is_machines(term)
         ],
     }
-
-
-def fine_noise_mm(calibration: Calibration) -> float:
-    """Noise of one reading from what lies above the smooth harmonics, which no misfit of the model reaches [mm]."""
-    square, count = 0.0, 0.0
-    for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
-        rough = residual - smooth(residual, np.radians(observation.raw.phi_deg))
-        square += float(rough @ rough)
-        count += max(len(rough) - (2 * LOW + 1), 1)
-    return float(np.sqrt(square / count))
-
-
-def doubtful_runs(calibration: Calibration) -> list[dict[str, Any]]:
-    """Runs that leave far more than the others do, worst first: another circle's samples, a ball that moved.
-
-    A model that lacks physics leaves more everywhere; one run that stands out by four times does not belong.
-    """
-    rms = np.array([1e3 * float(np.sqrt(np.mean(residual**2))) for residual in calibration.residual_mm])
-    usual = float(np.median(rms))
-    limit = max(STANDS_OUT * usual, LEAST_DOUBT_UM)
-    found = [
-        {"test": o.test, "direction": str(o.raw.circle.direction), "repeat": o.repeat, "residual_um": float(left)}
-        for o, left in zip(calibration.observations, rms, strict=True)
-        if left > limit
-    ]
-    return sorted(found, key=lambda run: -run["residual_um"])
 
 
 def identified_model(
@@ -107,6 +88,40 @@ def _term(calibration: Calibration, term: Term) -> dict[str, Any]:
     }
     shared = {"shared": term.shared} if term.shared else {}
     return {"name": term.source.name, **shared, "parameters": parameters}
+
+
+def _outlier(outlier: Outlier) -> dict[str, Any]:
+    shift = None if outlier.shift_um is None else list(outlier.shift_um)
+    return {
+        "kind": str(outlier.kind),
+        "test": outlier.test,
+        "runs": outlier.run,
+        "size_um": outlier.size_um,
+        "shift_um": shift,
+        "text": outlier.text,
+    }
+
+
+def _scatter(check: ScatterCheck) -> dict[str, Any]:
+    told = check.fits is not None
+    return {
+        "stated_um": check.stated_um,
+        "found_um": check.found_um if told else None,
+        "interval_um": [check.low_um, check.high_um] if told else None,
+        "mountings": check.mountings,
+        "fits": check.fits,
+    }
+
+
+def _visibility(seen: Visibility) -> dict[str, Any]:
+    return {
+        "singular_values_mm": seen.singular.tolist(),
+        "condition": seen.condition,
+        "indices": asdict(seen.indices),
+        "weak_directions": [asdict(weak) for weak in seen.weak],
+        "correlations": [asdict(correlation) for correlation in seen.correlations],
+        "leverage": seen.leverage,
+    }
 
 
 def _run(run: RunFigures) -> dict[str, Any]:

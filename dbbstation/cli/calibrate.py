@@ -16,6 +16,18 @@ if TYPE_CHECKING:
 @click.option(
     "--sources", metavar="A,B,...", help="Error sources to fit, in place of strut-reference-length,base-joints."
 )
+@click.option(
+    "--method",
+    type=click.Choice(["jig", "conv-a", "conv-b"]),
+    default="jig",
+    show_default=True,
+    help="How the places of the balls are known: from a CMM sheet; not at all; from micrometer readings of set-up errors.",
+)
+@click.option(
+    "--prescribe",
+    metavar="SOURCE.PARAMETER,...",
+    help="Parameters to hold at nominal in place of the directions that the tests lose, as many as are lost.",
+)
 @click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
 @click.option("--force", is_flag=True, help="Overwrite the model file.")
@@ -24,6 +36,8 @@ def calibrate(
     sessions: tuple[Path, ...],
     *,
     sources: str | None,
+    method: str,
+    prescribe: str | None,
     exclude: tuple[str, ...],
     out: Path | None,
     force: bool,
@@ -33,16 +47,23 @@ def calibrate(
 
     Fits 24 kinematic parameters, reference lengths of the struts and places of the base joints, with the scatter of
     mountings, CMM and bar as random effects. Directions that the tests cannot see are named and held at nominal.
+    Balls and runs that do not belong are named and kept from pulling the fit.
+
+    With --method conv-a or conv-b the balls were put up under the spindle (or are taken to be): six directions are
+    lost, and six parameters are held at nominal instead, chosen by the program or named with --prescribe.
 
     \b
     Examples:
       dbbstation calibrate 2026-11-20-hexapod-7
       dbbstation calibrate 2026-11-20-hexapod-7 --out model.yaml
       dbbstation calibrate monday tuesday --exclude h --json
+      dbbstation calibrate standard-test --method conv-a
     """
     from dbbstation.calibration.evaluation import evaluate
     from dbbstation.calibration.fit import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
     from dbbstation.calibration.fit import calibrate as fit
+    from dbbstation.calibration.methods import Method, as_known
+    from dbbstation.calibration.outliers import calibrate_robust
     from dbbstation.calibration.summary import calibration_summary, identified_model
     from dbbstation.cli.output import print_json, say
     from dbbstation.errors import ModelError
@@ -63,16 +84,15 @@ def calibrate(
     recorded = load_sessions(sessions, exclude)
     for warning in recorded.warnings:
         say(f"note: {warning}")
-    calibration = fit(recorded.machine, recorded.observations, fitted)
-    summary = calibration_summary(calibration, evaluate(calibration.model, recorded.observations))
+    known = as_known(Method(method), recorded.machine, recorded.observations)
+    held = _prescribed(prescribe, method)
+    calibration, outliers = calibrate_robust(lambda runs: fit(recorded.machine, runs, fitted, prescribe=held), known)
+    summary = {"method": method, **calibration_summary(calibration, evaluate(calibration.model, known), outliers)}
     if out is not None:
         kept = {key: value for key, value in summary.items() if key not in ELSEWHERE_IN_MODEL}
         write_model(out, identified_model(calibration, kept, recorded.sessions), force=force)
-    for run in summary["doubtful_runs"]:
-        say(
-            f"doubtful: test {run['test']} {run['direction']} {run['repeat']} leaves {run['residual_um']:.1f} µm rms, far "
-            "more than the others; another circle's samples or a ball that moved? Leave it out with --exclude"
-        )
+    for outlier in summary["outliers"]:
+        say(f"does not belong, kept from pulling the fit: {outlier['text']}")
     if as_json:
         print_json(summary)
     else:
@@ -86,6 +106,14 @@ MORE_THAN_NOISE = 1.2
 
 ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost"})
 """Parts of the summary that the model file holds in places of their own."""
+
+
+def _prescribed(names: str | None, method: str) -> list[tuple[str, str]] | None:
+    """Parameters named, or nobody's choice: the directions themselves on a jig, the program's choice otherwise."""
+    if names is None:
+        return None if method == "jig" else []
+    parts = [name.strip().partition(".") for name in names.split(",") if name.strip()]
+    return [(source, parameter) for source, _, parameter in parts]
 
 
 def _print(summary: Mapping[str, Any]) -> None:
@@ -104,11 +132,34 @@ def _print(summary: Mapping[str, Any]) -> None:
     print_table(["source", "parameter", "value", "", "std", "unit"], rows)
     click.echo()
     click.echo(f"{summary['parameters_identified']} parameters identified")
+    held = "" if summary["parameters_prescribed"] else ", held at nominal"
     for text in summary["directions_lost"]:
-        click.echo(f"not visible to these tests, held at nominal: {text}")
+        click.echo(f"not visible to these tests{held}: {text}")
+    if summary["parameters_prescribed"]:
+        click.echo(f"held at nominal instead: {', '.join(summary['parameters_prescribed'])}")
+    for text in summary["directions_regularised"]:
+        click.echo(f"not visible to these tests, known by the machine file's joint tolerance only: {text}")
+    for weak in summary["observability"]["weak_directions"][:1]:
+        click.echo(f"least visible, to {weak['uncertainty_um']:.1f} µm: {weak['text']}")
+    for check in summary["scatter"]:
+        _print_scatter(check)
     click.echo(f"nominal machine leaves   {summary['nominal_rms_um']:8.2f} µm rms")
     click.echo(f"model leaves             {summary['residual_rms_um']:8.2f} µm rms")
     click.echo(f"... within each mounting {summary['residual_within_mounting_rms_um']:8.2f} µm rms")
     click.echo(f"noise of one reading     {summary['noise_um']:8.2f} µm")
     if summary["residual_within_mounting_rms_um"] > MORE_THAN_NOISE * summary["noise_um"]:
         click.echo("more is left than noise: `dbbstation diagnose` says which physics may be missing")
+
+
+def _print_scatter(check: Mapping[str, Any]) -> None:
+    stated = f"balls stated to stand within {check['stated_um']:.2f} µm per axis"
+    if check["fits"] is None:
+        click.echo(f"{stated}: these tests cannot tell")
+        return
+    low, high = check["interval_um"]
+    fits = (
+        "as stated"
+        if check["fits"]
+        else "NOT as stated: correct holders and balls in the plan, or look for what scatters them"
+    )
+    click.echo(f"{stated} scatter by {check['found_um']:.2f} ({low:.2f} to {high:.2f}) µm, {fits}")

@@ -1,0 +1,334 @@
+"""Runs and balls that do not belong: found one at a time, named, and kept from pulling the fit.
+
+What is found is freed, not weighted: a ball that stands where it should not may stand anywhere, a run that is no
+circle of this machine is left out. The rest is fitted as before, so that one solver serves and the intervals of
+what remains are those of sound data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import chdtri
+
+from dbbstation.calibration.noise_level import fine_noise_mm
+from dbbstation.calibration.scatter import UNKNOWN_MM, Seat, seats_of
+from dbbstation.inference.square_root import solve
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.model.observation import Observation
+
+    Fit = Callable[[Sequence[Observation]], Calibration]
+    Step = tuple["Outlier", list[Observation], Calibration]
+
+STANDS_OUT = 4.0
+"""A run does not belong that leaves this many times what the usual one does ..."""
+
+LEAST_UM = 3.0
+"""... and more than a bar's noise could [µm]."""
+
+FALLS, AT_NOISE = 4.0, 4.0
+"""A test does not belong without which the others' mean square falls by the first, to less than the second in units of
+the noise. Physics that the model lacks stays in the others."""
+
+ALONE = 1.2
+"""One run of a test is to blame where leaving it out does nearly all that leaving the test out does."""
+
+SIGMAS = 5.0
+"""Of the stated scatter, or of the usual one where that is more, by which a ball must be off its place."""
+
+SAME_SIGMAS = 3.0
+"""Two puttings-up of a ball that differ by less stand at the same wrong place."""
+
+MOST = 8
+"""Outliers that are looked for; more are no outliers but another machine or plan."""
+
+
+class Kind(StrEnum):
+    """What does not belong."""
+
+    RUN = "run"
+    WRONG_PLACE = "wrong-place"
+    MOVED = "moved"
+    MOUNTING = "mounting"
+    BALL = "ball"
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """One thing that does not belong.
+
+    Attributes:
+        kind: what it is.
+        test: name of the test.
+        run: label of the run, or of the runs of one putting-up.
+        size_um: how far off: rms of a run, distance of a ball from its place [µm].
+        shift_um: where a ball stands, machine axes; None for a run [µm].
+        text: what it looks like, in words.
+    """
+
+    kind: Kind
+    test: str
+    run: str
+    size_um: float
+    shift_um: tuple[float, float, float] | None
+    text: str
+
+
+def calibrate_robust(fit: Fit, observations: Sequence[Observation]) -> tuple[Calibration, tuple[Outlier, ...]]:
+    """Fit, and fit again without what does not belong.
+
+    Args:
+        fit: calibrates runs.
+        observations: all runs.
+
+    Returns:
+        The last fit, and what was found, in the order in which it stood out.
+
+    Raises:
+        CalibrationError: as `fit` does.
+    """
+    runs, found = list(observations), list[Outlier]()
+    calibration = fit(runs)
+    while len(found) < MOST:
+        step = _next(fit, calibration, runs)
+        if step is None:
+            break
+        outlier, runs, calibration = step
+        found.append(outlier)
+    return calibration, tuple(found)
+
+
+def _next(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
+    """Return what stands out most, the runs without its pull, and their fit; None where nothing does."""
+    strange = _strange_test(calibration) or _strange_run(calibration)
+    if strange:
+        return _without(fit, runs, strange)
+    moved = _moved_between(calibration)
+    if moved is not None:
+        step = _moved(fit, runs, moved)
+        if step is not None:
+            return step
+    return _off_its_place(fit, calibration, runs)
+
+
+# --- runs that are no circle of this machine ---
+
+
+def _strange_test(calibration: Calibration) -> list[int]:
+    """Indices of the runs of a test without which all others fall into place; empty where there is none.
+
+    Both directions filed under the wrong test bend the whole fit and hardly stand out of it.
+    """
+    if _rms_um(np.concatenate(calibration.residual_mm)) < LEAST_UM:
+        return []
+    noise = max(fine_noise_mm(calibration), 1e-3 * LEAST_UM / STANDS_OUT)
+    known, held = calibration.layout.known, calibration.solution.held
+    tests: dict[tuple[str, str], list[int]] = {}
+    for k, run in enumerate(calibration.observations):
+        tests.setdefault((run.setup.session, run.test), []).append(k)
+
+    def misfit(left_out: Sequence[int]) -> float:
+        blocks = [block for k, block in enumerate(calibration.blocks) if k not in left_out]
+        return solve(blocks, known, noise, held).chi2 / sum(block.count for block in blocks)
+
+    without = {name: misfit(own) for name, own in tests.items()}
+    best = min(without, key=without.__getitem__)
+    falls = misfit([]) / without[best]
+    in_place = falls > FALLS and without[best] < AT_NOISE
+    if not (in_place or falls > STANDS_OUT**2):
+        return []
+    alone = [k for k in tests[best] if misfit([k]) < ALONE * without[best]]
+    return alone[:1] or tests[best]
+
+
+def _strange_run(calibration: Calibration) -> list[int]:
+    """Index of the run that leaves most beside a shift of its own ball, if that is far more than usual."""
+    rest = np.array([_rms_um(_without_shift(o, r)) for o, r in _left(calibration)])
+    worst = int(np.argmax(rest))
+    return [worst] if rest[worst] > max(STANDS_OUT * float(np.median(rest)), LEAST_UM) else []
+
+
+def _without(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> Step:
+    """Leave runs of one test out, and see under the fit of the others what they are."""
+    kept = [run for i, run in enumerate(runs) if i not in strange]
+    again = fit(kept)
+    run = runs[strange[0]]
+    residual = run.raw.length_mm - again.model.bar(run.motion()).length_mm
+    size = _rms_um(residual)
+    kind, look = _looks_like(again, kept, run, residual)
+    labels = ", ".join(runs[k].label for k in strange)
+    return Outlier(kind, run.test, labels, size, None, f"{labels} leaves {size:.1f} µm rms: {look}"), kept, again
+
+
+def _looks_like(
+    calibration: Calibration, others: Sequence[Observation], run: Observation, residual: NDArray[np.float64]
+) -> tuple[Kind, str]:
+    """What a run that does not belong most resembles."""
+    noise = max(STANDS_OUT * float(np.median([_rms_um(left) for _, left in _left(calibration)])), LEAST_UM)
+    best, where = np.inf, run
+    for other in others:
+        if other.raw.circle == run.raw.circle or other.raw.circle.bar_mm != run.raw.circle.bar_mm:
+            continue
+        there = replace(other, raw=replace(run.raw, circle=other.raw.circle), commanded=None)
+        left = run.raw.length_mm - calibration.model.bar(there.motion()).length_mm
+        rest = _rms_um(_without_shift(there, left))
+        if rest < best:
+            best, where = rest, other
+    if best < noise:
+        what = f"it is what test {where.test} {where.raw.circle.direction} should read, to {best:.1f} µm"
+        if where.test == run.test:
+            return Kind.WRONG_PLACE, f"{what}; was the other direction run?"
+        return Kind.WRONG_PLACE, f"{what}; the ball stood in that bore, or the run was filed under the wrong test"
+    step, at = _step(residual)
+    if _rms_um(_without_step(residual, at)) < 0.5 * _rms_um(residual - residual.mean()):
+        return (
+            Kind.RUN,
+            f"the reading steps by {1e3 * step:.1f} µm at {run.raw.theta_deg[at]:.0f}°; bar or holder was bumped",
+        )
+    return Kind.RUN, "no circle of this machine and no step; a bump, a loose ball, or another machine's run?"
+
+
+def _step(residual: NDArray[np.float64]) -> tuple[float, int]:
+    """Largest difference of means before and after a sample, and that sample; ends of a twentieth are not looked at."""
+    count = len(residual)
+    at = np.arange(count // 20 + 1, count - count // 20)
+    total = np.cumsum(residual)
+    difference = (total[-1] - total[at - 1]) / (count - at) - total[at - 1] / at
+    weight = np.sqrt(at * (count - at))
+    k = int(np.argmax(np.abs(difference) * weight))
+    return float(difference[k]), int(at[k])
+
+
+def _without_step(residual: NDArray[np.float64], at: int) -> NDArray[np.float64]:
+    return np.concatenate([residual[:at] - residual[:at].mean(), residual[at:] - residual[at:].mean()])
+
+
+# --- balls that are off their place ---
+
+
+def _moved_between(calibration: Calibration) -> tuple[int, NDArray[np.float64]] | None:
+    """Run whose ball stands elsewhere than in the other runs of its putting-up, and by how much (x, y) [mm]."""
+    shifts = np.array([_shift(o, r) for o, r in _left(calibration)])
+    away = np.hypot(*shifts.T)
+    worst = int(np.argmax(away))
+    limit = max(STANDS_OUT * float(np.median(away)), 1e-3 * LEAST_UM)
+    return (worst, shifts[worst]) if away[worst] > limit else None
+
+
+def _moved(fit: Fit, runs: Sequence[Observation], moved: tuple[int, NDArray[np.float64]]) -> Step | None:
+    """Give a run a putting-up of its own; where its mounting has no other run there is nothing to be apart from."""
+    k, _ = moved
+    run = runs[k]
+    others = [o for i, o in enumerate(runs) if i != k and o.setup.mounting == run.setup.mounting]
+    if not others:
+        return None
+    own = replace(run, setup=replace(run.setup, mounting=f"{run.setup.mounting}, {run.label}"))
+    apart = [own if i == k else o for i, o in enumerate(runs)]
+    again = fit(apart)
+    seats = {seat.mounting: seat for seat in seats_of(again)}
+    shift = seats[own.setup.mounting].shift_mm - seats[others[0].setup.mounting].shift_mm
+    size = 1e3 * float(np.hypot(*shift[:2]))
+    text = (
+        f"the ball of test {run.test} moved by {_towards(shift)} between run {run.label} and {others[0].label}: "
+        "holder or cup loose, or touched"
+    )
+    return Outlier(Kind.MOVED, run.test, run.label, size, _um(shift), text), apart, again
+
+
+def _off_its_place(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
+    """Free the ball that is furthest off its place in units of what is usual."""
+    seats = [seat for seat in seats_of(calibration) if seat.freedom > 0]
+    if not seats:
+        return None
+    # By chance half of them lie beyond their median: a model that lacks physics scatters all balls.
+    usual = max(1.0, float(np.median([seat.square / float(chdtri(seat.freedom, 0.5)) for seat in seats])))
+    worst = max(seats, key=lambda seat: seat.square / seat.freedom)
+    beyond = float(chdtri(worst.freedom, _TAIL))
+    if worst.square < usual * beyond or np.hypot(*worst.shift_mm[:2]) < 1e-3 * LEAST_UM:
+        return None
+    alike = [seat for seat in seats if seat.ball == worst.ball and seat is not worst]
+    together = bool(alike) and all(_same(seat, worst) for seat in alike)
+    names = {worst.mounting} | ({seat.mounting for seat in alike} if together else set())
+    freed = [_freed(run) if run.setup.mounting in names else run for run in runs]
+    again = fit(freed)
+    shift = next(seat.shift_mm for seat in seats_of(again) if seat.mounting == worst.mounting)
+    of = [run for run in runs if run.setup.mounting in names]
+    which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {_tests(of)}"
+    where = f"the ball {which} stands {_towards(shift)} from its place"
+    if together:
+        what = f"{where}, in all {len(names)} mountings alike: its CMM row, or it is another ball or holder"
+    elif alike:
+        what = f"{where}, but not when it was put up again: badly seated"
+    else:
+        what = f"{where}: badly seated, or its CMM row is wrong; put it up again to tell"
+    size = 1e3 * float(np.hypot(*shift[:2]))
+    kind = Kind.BALL if together else Kind.MOUNTING
+    return Outlier(kind, of[0].test, ", ".join(run.label for run in of), size, _um(shift), what), freed, again
+
+
+_TAIL = 5.7e-7
+"""Chance of a normal variable beyond `SIGMAS`."""
+
+
+def _same(a: Seat, b: Seat) -> bool:
+    sigma = np.sqrt(np.diag(a.spread_mm2)[:2] + np.diag(b.spread_mm2)[:2])
+    return bool(np.all(np.abs(a.shift_mm - b.shift_mm)[:2] < SAME_SIGMAS * sigma))
+
+
+def _freed(run: Observation) -> Observation:
+    """The run about a ball that may stand anywhere, in height only where a raised bar sees it."""
+    size = np.zeros(3) + run.setup.mounting_repeatability_mm
+    seen = 3 if run.raw.circle.elevation_deg != 0.0 else 2
+    size[:seen] = UNKNOWN_MM
+    return replace(run, setup=replace(run.setup, mounting_repeatability_mm=size))
+
+
+# --- what a run leaves ---
+
+
+def _tests(runs: Sequence[Observation]) -> str:
+    return ", ".join(dict.fromkeys(run.test for run in runs))
+
+
+def _left(calibration: Calibration) -> list[tuple[Observation, NDArray[np.float64]]]:
+    return list(zip(calibration.observations, calibration.residual_mm, strict=True))
+
+
+def _shift(observation: Observation, residual: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Shift of the ball that would explain a residual best, in X and Y, shape (2,) [mm]."""
+    return -np.asarray(np.linalg.lstsq(_harmonics(observation), residual, rcond=None)[0][:2], dtype=np.float64)
+
+
+def _without_shift(observation: Observation, residual: NDArray[np.float64]) -> NDArray[np.float64]:
+    columns = _harmonics(observation)[:, :2]
+    return residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]
+
+
+def _harmonics(observation: Observation) -> NDArray[np.float64]:
+    theta = np.radians(observation.raw.theta_deg)
+    flat = np.cos(np.radians(observation.raw.circle.elevation_deg))
+    return np.column_stack([flat * np.cos(theta), flat * np.sin(theta), np.ones(len(theta))])
+
+
+def _rms_um(residual: NDArray[np.float64]) -> float:
+    return 1e3 * float(np.sqrt(np.mean(residual**2)))
+
+
+def _um(shift_mm: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = (1e3 * shift_mm).tolist()
+    return x, y, z
+
+
+def _towards(shift_mm: NDArray[np.float64]) -> str:
+    """Length and direction of a shift in the plane, such as `31 µm towards 270°`."""
+    angle = np.degrees(np.arctan2(shift_mm[1], shift_mm[0])) % 360.0
+    return f"{1e3 * float(np.hypot(*shift_mm[:2])):.1f} µm towards {angle:.0f}°"

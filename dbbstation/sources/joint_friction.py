@@ -53,11 +53,11 @@ class JointFriction(LinearSource):
         "stretch under that.",
         shows="Small steps of some tenths of a µm where a strut's joint reverses its swing, which is where the strut "
         "lies farthest to one side, not where it is longest or shortest. Clockwise and counter-clockwise runs differ.",
-        confirm="Unhook a strut from the platform and measure with a spring balance at its end what it takes to swing "
-        "it in either direction.",
+        confirm="Prop the platform up, take one strut off it, and measure with a spring balance at the strut's end what "
+        "it takes to swing it in either direction.",
         cure="Lubricate the joints, or lower the preload of their bearings.",
         equation="J^T T = [sum f, sum (R P) x f], f = M (z_1 dq_1/dp + z_2 dq_2/dp), z nearly minus the sign of dq/dt; "
-        "actual minus driven length = c(L) T",
+        "actual minus driven length = c(L) T; one axis of each joint is taken to be level and square to its strut",
         origin="Coulomb's friction about both axes of a universal joint, virtual work, and the equilibrium of the "
         "platform as in [GRAV eq 1, 6, 7]",
     )

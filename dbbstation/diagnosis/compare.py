@@ -15,7 +15,7 @@ from scipy.stats import f as f_distribution
 from scipy.stats import ncx2
 
 from dbbstation.diagnosis.compare_families import families
-from dbbstation.diagnosis.compare_noise import Chance, Weighting, chance_of, first_columns
+from dbbstation.diagnosis.compare_noise import Chance, Weighting, chance_of, first_columns, lowest_columns
 from dbbstation.diagnosis.compare_organised import Halves, Organised, halves, organise
 from dbbstation.diagnosis.compare_pairs import Matching, match
 from dbbstation.errors import TraceError
@@ -188,7 +188,10 @@ def _run(pair: Pair, chance: Chance, r: int) -> RunDifference:
     row, noise = chance.coefficients[r], chance.noise[r]
     count = len(pair.a_mm)
     weighting = Weighting.of(chance.low, chance.noise[r : r + 1], chance.stated[r : r + 1])
-    square = float(np.sum(weighting.whitened(row[None, :, None]) ** 2))
+    white = weighting.whitened(row[None, :, None])[:, 0] ** 2
+    # Changes of a machine are mostly in the lowest harmonics, where the others' noise should not drown them.
+    looks = [white, white[lowest_columns(chance.low)]]
+    chances = [float(f_distribution.sf(float(one.mean()), len(one), chance.run_freedom)) for one in looks]
     columns = basis(np.radians(pair.theta_deg), chance.low) / np.sqrt(count)
     shape = row.copy()
     zero, cosine, sine = first_columns(chance.low)
@@ -206,8 +209,8 @@ def _run(pair: Pair, chance: Chance, r: int) -> RunDifference:
         radial_mm=float(row[zero] / np.sqrt(count)),
         radial_sigma_mm=float(np.sqrt(variance[zero] / count)),
         circularity_mm=float(np.ptp(columns @ shape)),
-        ratio=float(np.sqrt(square / len(row))),
-        probability=float(f_distribution.sf(square / len(row), len(row), chance.run_freedom)),
+        ratio=float(np.sqrt(white.mean())),
+        probability=_least(chances),
     )
 
 

@@ -262,7 +262,7 @@ def _predicted(
     terms = [term for term in layout.terms if term.acts_on(motion)]
     jacobian = np.hstack(
         [np.zeros((len(observation.raw), 0))]
-        + [reading.by_parameters(term.source.derivative(motion, layout.machine, x[term.columns])) for term in terms]
+        + [reading.by_source(term.source, layout.machine, x[term.columns]) for term in terms]
     )
     return np.concatenate([np.r_[term.columns] for term in terms]), jacobian, reading.length_mm
 

@@ -105,9 +105,7 @@ def _circle_rows(
     motion = Motion(circle.poses(circle.theta_deg(phi_deg)), is_path=True, setup=setup_of(test))
     reading = MachineModel(machine).bar(motion)
     zero = {source.name: np.zeros(len(source.parameters(machine))) for source in sources}
-    return np.hstack(
-        [reading.by_parameters(source.derivative(motion, machine, zero[source.name])) for source in sources]
-    )
+    return np.hstack([reading.by_source(source, machine, zero[source.name]) for source in sources])
 
 
 def _without_centre(rows: NDArray[np.float64], theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:

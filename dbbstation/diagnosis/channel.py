@@ -112,10 +112,7 @@ def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Chan
     blocks = []
     for motion, reading, residual in zip(motions, readings, left, strict=True):
         terms = [term for term in layout.terms if term.acts_on(motion)]
-        pieces = [
-            reading.by_parameters(term.source.derivative(motion, machine, calibration.x[term.columns]))
-            for term in terms
-        ]
+        pieces = [reading.by_source(term.source, machine, calibration.x[term.columns]) for term in terms]
         columns = [np.r_[term.columns] for term in terms]
         for source in sources:
             for numbers, piece in _source_columns(source, motion, machine, reading, book):
@@ -154,7 +151,7 @@ def _source_columns(
         values = np.zeros(len(parameters))
         if shaped:
             values[shaped] = value
-        derivative = reading.by_parameters(source.derivative(motion, machine, values))[:, amplitudes]
+        derivative = reading.by_source(source, machine, values)[:, amplitudes]
         prior = np.array([parameters[k].plausible for k in amplitudes])
         shape = tuple(float(values[k]) for k in shaped)
         found.append((book.source(source, source.shared_by(motion), shape, prior), derivative))

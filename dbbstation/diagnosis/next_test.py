@@ -176,12 +176,12 @@ def _rows(channel: Channel, source: ErrorSource, variant: Variant, motion: Motio
     values[shaped] = variant.shape
     rows = np.zeros((len(reading.length_mm), columns))
     first = len(channel.base.prior)
-    derivative = reading.by_parameters(source.derivative(motion, channel.machine, values))
+    derivative = reading.by_source(source, channel.machine, values)
     rows[:, first : first + len(amplitudes)] = derivative[:, amplitudes]
     for term in channel.layout.terms:
         if term.acts_on(motion):
             zero = channel.layout.nominal[term.columns]
-            rows[:, term.columns] = reading.by_parameters(term.source.derivative(motion, channel.machine, zero))
+            rows[:, term.columns] = reading.by_source(term.source, channel.machine, zero)
     ball, _ = np.linalg.qr(reading.sensitivity.direction[motion.kept])
     rows -= ball @ (ball.T @ rows)
     # Few samples stand for the many that a run has.

@@ -35,11 +35,6 @@ class Frames:
     def __len__(self) -> int:
         return len(self.position_mm)
 
-    @property
-    def first(self) -> Frames:
-        """The first pose alone."""
-        return Frames(self.position_mm[:1], self.rotation[:1])
-
     @classmethod
     def from_poses(cls, poses: NDArray[np.float64], convention: Rotation) -> Frames:
         """Frames of poses `[X, Y, Z, A, B, C]`, shape (n, 6) [mm, deg]."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Hexapod, Machine
-    from dbbstation.sources.contract import Setup
+    from dbbstation.sources.contract import ErrorSource
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,8 @@ class MachineModel:
     def bar(self, motion: Motion) -> BarReading:
         """What a bar about the motion's fixed ball reads, and how that answers to every error, kept rows only.
 
-        A ball that was put up under the spindle stands at the actual tool tip of the motion's first row.
+        A ball that was put up under the spindle stands where the tool tip really was then. What a micrometer read of
+        both balls is taken into account.
         """
         setup = motion.setup
         if setup is None:
@@ -90,17 +91,21 @@ class MachineModel:
             others = replace(self, sources=tuple(f for f in self.sources if Need.READING not in f.source.needs))
             motion = replace(motion, reading_mm=others.bar(replace(motion, kept=slice(None))).length_mm)
         actual = self.actual(motion)
-        ball = _put_up_mm(actual, setup) if motion.put_up else setup.fixed_ball_mm
+        ball, tool = setup.fixed_ball_mm, actual.effect.tool_tip_mm
+        ball_response: tuple[Response, ...] = ()
+        if motion.put_up is not None:
+            standing = self.actual(motion.put_up)
+            ball = standing.tool_frames().position_mm[-1]
+            ball_response = position_responses(standing.hexapod, standing.frames)
+            if setup.set_up_errors is not None:
+                ball = ball + np.nan_to_num(setup.set_up_errors.fixed_ball_mm)
+                moving = np.nan_to_num(setup.set_up_errors.moving_ball_mm)
+                tool = moving if tool is None else tool + moving
         if actual.effect.fixed_ball_mm is not None:
             ball = ball + actual.effect.fixed_ball_mm
-        if motion.put_up:
-            # On its own ball a bar has no direction; that row is never looked at, so any will do.
-            ball = np.array(np.broadcast_to(ball, (len(motion), 3)))
-            ball[0] += 1.0
-        sensitivity = bar_sensitivity(actual.hexapod, actual.frames, ball, actual.effect.tool_tip_mm)
+        sensitivity = bar_sensitivity(actual.hexapod, actual.frames, ball, tool)
         reading = np.zeros(1) if actual.effect.reading_mm is None else actual.effect.reading_mm
         length = sensitivity.length_mm + reading
-        ball_response = position_responses(actual.first_hexapod, actual.frames.first) if motion.put_up else ()
         return BarReading(motion, length[motion.kept], sensitivity, ball_response)
 
 
@@ -111,17 +116,6 @@ class Actual:
     hexapod: Hexapod
     frames: Frames
     effect: Effect
-
-    @property
-    def first_hexapod(self) -> Hexapod:
-        """Joints at the first pose."""
-        base, platform = self.hexapod.base_joints_mm, self.hexapod.platform_joints_mm
-        one = 2  # axes of joints that do not move
-        return replace(
-            self.hexapod,
-            base_joints_mm=base if base.ndim == one else base[0],
-            platform_joints_mm=platform if platform.ndim == one else platform[0],
-        )
 
     def tool_frames(self) -> Frames:
         """Frames of the real tool tip: the platform's, shifted by what sits between platform and tip."""
@@ -140,13 +134,24 @@ class BarReading:
         motion: the run.
         length_mm: predicted reading at the rows that count, shape (n,) [mm].
         sensitivity: at all rows of the motion.
-        ball_response: how X, Y and Z of a ball that was put up under the spindle answer to the machine's errors.
+        ball_response: how X, Y and Z of a ball that was put up under the spindle answer to the machine's errors, while
+            it was put up.
     """
 
     motion: Motion
     length_mm: NDArray[np.float64]
     sensitivity: BarSensitivity
     ball_response: tuple[Response, ...] = ()
+
+    def by_source(self, source: ErrorSource, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivative of the reading by a source's parameters about their values, shape (p,): shape (n, p)."""
+        total = self.by_parameters(source.derivative(self.motion, machine, values))
+        if self.motion.put_up is None:
+            return total
+        then = source.derivative(self.motion.put_up, machine, values)
+        last = slice(len(self.motion.put_up) - 1, None)
+        moved = [np.broadcast_to(by_parameters(then, r, last), (1, total.shape[1])) for r in self.ball_response]
+        return total - self.sensitivity.direction[self.motion.kept] @ np.vstack(moved)
 
     def by_parameters(self, derivative: Effect) -> NDArray[np.float64]:
         """Derivative of the reading by p parameters, shape (n, p), from that of an effect; kept rows only."""
@@ -156,10 +161,6 @@ class BarReading:
             total = total - _contract(self.sensitivity.direction[kept], _rows(derivative.fixed_ball_mm, 1, kept), 1)
         if derivative.reading_mm is not None:
             total = total + _rows(derivative.reading_mm, 0, kept)
-        if self.ball_response:
-            moved = [by_parameters(derivative, response, slice(0, 1)) for response in self.ball_response]
-            if np.ndim(moved[0]):
-                total = total - self.sensitivity.direction[kept] @ np.vstack(moved)
         parameters = np.shape(total)[-1] if np.ndim(total) else 0
         return np.ascontiguousarray(np.broadcast_to(total, (len(self.length_mm), parameters)))
 
@@ -207,17 +208,3 @@ def actual_hexapod(nominal: Hexapod, effect: Effect) -> Hexapod:
 
 def _strut_errors(effect: Effect) -> NDArray[np.float64]:
     return np.zeros(STRUTS) if effect.strut_mm is None else effect.strut_mm
-
-
-def _put_up_mm(actual: Actual, setup: Setup) -> NDArray[np.float64]:
-    """Place of a ball that was put up at the tool tip of the first row, shape (3,) [mm]: b - R o as the bar sees it.
-
-    What a micrometer read of both balls is taken into account; the moving ball's error turns with the platform, which
-    is tilted by parts in ten thousand from what it should, so that the run may take it as constant.
-    """
-    place: NDArray[np.float64] = actual.tool_frames().position_mm[0]
-    read = setup.set_up_errors
-    if read is None:
-        return place
-    moving = actual.frames.rotation[0] @ np.nan_to_num(read.moving_ball_mm)
-    return place + np.nan_to_num(read.fixed_ball_mm) - moving

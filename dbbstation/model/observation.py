@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
     from dbbstation.trace.circle import RawCircle
 
+STANDING = 3
+"""Samples of a machine that stands still: as many as a speed is taken from."""
+
 LEAD_IN_STEP_DEG = 1.0
 """Spacing of the poses before the turn, where history is made but nothing is compared [deg]."""
 
@@ -52,7 +55,7 @@ class Observation:
     def motion(self) -> Motion:
         """The run as error sources see it: the overshoot arc that leads to the turn, then the turn's samples.
 
-        Where the ball was put up under the spindle, the pose at which that was done comes first.
+        A ball that was put up under the spindle is taken to have been put up just before the run.
         """
         raw, circle = self.raw, self.raw.circle
         lead_in = self.lead_in_deg
@@ -64,10 +67,6 @@ class Observation:
             time = self.started_s + np.concatenate(
                 [raw.t_s[0] + (lead_in - raw.phi_deg[0]) / circle.turning_deg_s, raw.t_s]
             )
-        if not self.setup.place_known:
-            before += 1
-            poses = np.vstack([[*self.setup.fixed_ball_mm, *circle.tilt_deg], poses])
-            time = None if time is None else np.concatenate([time[:1], time])
         return Motion(
             poses=poses,
             is_path=True,
@@ -76,8 +75,21 @@ class Observation:
             temperature_degc={name: _held_back(values, before) for name, values in raw.temperature_degc.items()},
             motor_current_a=None if raw.motor_current_a is None else _held_back(raw.motor_current_a, before),
             setup=self.setup,
-            put_up=not self.setup.place_known,
+            put_up=None if self.setup.place_known else self._standing(None if time is None else time[0]),
             reading_mm=_held_back(raw.length_mm, before),
+        )
+
+    def _standing(self, until_s: float | None) -> Motion:
+        """The machine standing still where the ball is put up, three samples a second apart."""
+        raw = self.raw
+        pose = np.array([*self.setup.fixed_ball_mm, *raw.circle.tilt_deg])
+        return Motion(
+            poses=np.tile(pose, (STANDING, 1)),
+            is_path=True,
+            time_s=None if until_s is None else until_s + np.arange(1.0 - STANDING, 1.0),
+            temperature_degc={name: np.repeat(values[:1], STANDING) for name, values in raw.temperature_degc.items()},
+            setup=self.setup,
+            reading_mm=np.repeat(raw.length_mm[:1], STANDING),
         )
 
 

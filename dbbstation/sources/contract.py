@@ -114,8 +114,8 @@ class Motion:
         setup: None for poses that nobody measured.
         reading_mm: what the bar showed, shape (n,) [mm]: the place of its encoder, for errors of that encoder alone;
             None where nothing was measured.
-        put_up: True where the first row, not among the kept, is the pose at which the machine stood while the fixed
-            ball was put up at its tool tip: the ball then stands there, wherever that really is.
+        put_up: the machine standing still while the fixed ball was put up at its tool tip: the ball stands where the
+            tip really was in the last row; None for a ball of known place.
     """
 
     poses: NDArray[np.float64]
@@ -126,7 +126,7 @@ class Motion:
     motor_current_a: NDArray[np.float64] | None = None
     setup: Setup | None = None
     reading_mm: NDArray[np.float64] | None = None
-    put_up: bool = False
+    put_up: Motion | None = None
 
     def __len__(self) -> int:
         return len(self.poses)

@@ -16,6 +16,8 @@ from dbbstation.files.machine_file import read_machine
 from dbbstation.files.plan_file import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.contract import Fitted
+from dbbstation.sources.registry import known_sources
 from dbbstation.studies.virtual_session import draw_session
 from dbbstation.trace.analysis import centred, figures
 from dbbstation.virtual.truth import random_kinematics
@@ -173,3 +175,31 @@ def test_a_tolerance_of_the_machine_file_stands_in_for_what_is_lost_and_is_said_
     mean = np.zeros(len(tolerant.x))
     mean[names] = 1.0 / 6.0
     assert np.sqrt(mean @ tolerant.solution.covariance @ mean) == pytest.approx(0.1 / np.sqrt(6), rel=0.1)
+
+
+@pytest.mark.parametrize("name", ["gravity", "backlash", "servo-lag", "joint-friction", "spindle-growth"])
+def test_predicted_is_what_the_virtual_machine_reads_whatever_its_errors(machine, name):
+    """The virtual machine drives to the place, stands still, and puts the ball at its own tip."""
+    source = known_sources()[name]
+    values = np.array([p.shape[len(p.shape) // 2] if p.shape else p.plausible for p in source.parameters(machine)])
+    truth = MachineModel(machine, (*random_kinematics(machine, 3), Fitted(source, values)))
+    runs = draw_session(truth, plan("conventional"), np.random.default_rng(4), 0.0, 72, micrometer_mm=0.0)
+    first = [run for run in runs if run.raw.circle.direction == "ccw"]  # the ball is put up just before these
+    left = [run.raw.length_mm - truth.bar(run.motion()).length_mm for run in first]
+    # One length error of the bar, the same everywhere. The two put the ball up some seconds apart.
+    assert np.ptp(np.concatenate(left)) < (3e-5 if name == "spindle-growth" else 1e-6)
+
+
+@pytest.mark.parametrize("name", ["base-joints", "gravity", "servo-lag", "tool-ball-offset"])
+def test_derivatives_of_a_reading_about_a_ball_put_up_under_the_spindle(machine, under_spindle, name):
+    source = known_sources()[name]
+    motion = under_spindle[2].motion()
+    count = len(source.parameters(machine))
+    zero = np.zeros(count)
+    shared = source.shared_by(motion)
+    analytic = MachineModel(machine).bar(motion).by_source(source, machine, zero)
+    for k, parameter in enumerate(source.parameters(machine)):
+        step = 0.02 * parameter.plausible * np.eye(count)[k]
+        up, down = (MachineModel(machine, (Fitted(source, s * step, shared),)).bar(motion).length_mm for s in (1, -1))
+        numeric = (up - down) / (2.0 * step[k])
+        assert analytic[:, k] == pytest.approx(numeric, abs=1e-4 * max(np.abs(numeric).max(), 1e-6))

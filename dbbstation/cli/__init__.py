@@ -28,6 +28,7 @@ COMMANDS = {
     "compensate": "Compensate any NC program with a calibrated model.",
     "diagnose": "Find the physics that a calibration leaves out.",
     "demo": "The whole job on a simulated machine, start to end.",
+    "drive": "One strut drive on its own: mass, friction, what is left out.",
     "emulate": "A virtual machine with a ball bar, on a line of its own.",
     "evaluate": "Circle by circle: what a model leaves of recordings.",
     "instruments": "Instruments that the program knows.",

@@ -13,7 +13,7 @@ import click
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.option("--schema", metavar="FORMAT", help="Print the JSON Schema of a format, such as dbb-plan/1, and stop.")
 def check(files: tuple[Path, ...], *, as_json: bool, schema: str | None) -> None:
-    r"""Validate machines, plans, jigs, models, runs (.csv, .csv.part) and session folders.
+    r"""Validate machines, plans, jigs, models, runs (.csv, .csv.part), recordings of drives and session folders.
 
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
     its runs: hashes, checksums, units, and whether the machine can travel the plan's circles.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, TravelError
+from dbbstation.files.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.jig_file import parse_jig
 from dbbstation.files.machine_file import parse_machine
 from dbbstation.files.models import parse_model
@@ -28,7 +29,7 @@ class Checked:
 
     Attributes:
         path: as given.
-        kind: its format, or `run` for a run file; empty where it could not be told.
+        kind: its format, `run` for a run file, `drive` for a recording of one drive; empty where it could not be told.
         summary: what it holds, one line; empty where it has problems.
         problems: what makes it unusable.
         warnings: what does not.
@@ -52,8 +53,11 @@ def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
             what = f"this folder is no session: there is no {SESSION_FILE} in it"
             checked.problems.append(Problem(str(path), 0, 0, what, "name a session folder or a file"))
     elif path.suffixes[-1:] == [".csv"] or path.suffixes[-2:] == [".csv", PART]:
-        checked.kind = "run"
-        _run(checked)
+        checked.kind = "drive" if looks_like_drive(path) else "run"
+        if checked.kind == "drive":
+            _drive(checked)
+        else:
+            _run(checked)
     else:
         _yaml(checked, known_sources)
     if checked.problems:
@@ -117,6 +121,17 @@ def _run(checked: Checked) -> None:
     checked.warnings += run.warnings
     seconds = run.recording.t_s[-1] - run.recording.t_s[0]
     checked.summary = f"run: {_count(len(run.recording), 'sample')} in {seconds:.1f} s"
+
+
+def _drive(checked: Checked) -> None:
+    try:
+        drive = read_drive(checked.path)
+    except InputError as error:
+        checked.problems += error.problems
+        return
+    checked.warnings += drive.warnings
+    t = drive.numbers["t_s"]
+    checked.summary = f"drive: {_count(len(t), 'sample')} in {t[-1] - t[0]:.1f} s"
 
 
 def _session(checked: Checked) -> None:

@@ -1,0 +1,135 @@
+"""`dbbstation drive`: mass and friction of one strut drive, and what a model of these leaves out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path), metavar="RECORDING.csv")
+@click.option("--force-per-ampere", type=float, metavar="N/A", help="Force of the drive at 1 A, for motor_current_a.")
+@click.option("--sources", metavar="A,B,...", help="Causes to look for, in place of all.")
+@click.option("--cutoff-hz", type=float, metavar="HZ", help="Band in which force and model are compared; else chosen.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write what was compared here, as CSV.")
+@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Draw force and friction, as SVG.")
+@click.option("--force", is_flag=True, help="Overwrite these files.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def drive(
+    recording: Path,
+    *,
+    force_per_ampere: float | None,
+    sources: str | None,
+    cutoff_hz: float | None,
+    out: Path | None,
+    figure: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    r"""Identify one strut drive from position and force, and find the physics that mass and viscous friction leave out.
+
+    The recording is a CSV file with the columns t_s, position_mm and force_n, or motor_current_a. Record strokes to and
+    fro at several speeds. The verdicts are those of diagnose: identified, ambiguous, ruled-out, not-testable.
+
+    \b
+    Examples:
+      dbbstation drive strut3.csv
+      dbbstation drive strut3.csv --force-per-ampere 410 --figure strut3.svg
+      dbbstation drive strut3.csv --sources coulomb-friction,friction-asymmetry --json
+    """
+    from dbbstation.cli.output import print_json, say
+    from dbbstation.diagnosis.drive.identify import identify
+    from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
+    from dbbstation.diagnosis.drive.summary import drive_summary
+    from dbbstation.files.atomic import refuse_existing, write_bytes, write_text
+    from dbbstation.files.drive_csv import compared_csv, read_drive
+
+    for path in (out, figure):
+        if path is not None:
+            refuse_existing(path, force=force)
+    known = known_drive_sources()
+    named = drive_sources_named([name.strip() for name in sources.split(",")] if sources else known)
+    file = read_drive(recording)
+    for warning in file.warnings:
+        say(f"note: {warning}")
+    found = identify(file.recording(force_per_ampere), named, cutoff_hz, lambda text: say(f"... {text}"))
+    summary = drive_summary(found)
+    if out is not None:
+        write_text(out, compared_csv(found.table()), force=force)
+        summary["compared"] = str(out)
+    if figure is not None:
+        from dbbstation.studies.drive_figure import drive_figure
+
+        write_bytes(figure, drive_figure(found), force=force)
+        summary["figure"] = str(figure)
+    for note in summary["notes"]:
+        say(f"note: {note}")
+    if as_json:
+        print_json(summary)
+    else:
+        _print(summary)
+
+
+def _print(summary: Mapping[str, Any]) -> None:
+    if summary["mismatch"]:
+        click.echo(
+            f"Mass and viscous friction leave {summary['misfit_rms_n']:.3g} N rms beyond noise "
+            f"(probability by chance {summary['probability']:.1g})."
+        )
+    else:
+        click.echo(f"Mass and viscous friction are enough (probability {summary['probability']:.2g}).")
+    click.echo()
+    _print_sources(summary["sources"])
+    click.echo("\nidentified:")
+    for name, number in summary["parameters"].items():
+        known = _number(number) if number["identifiable"] else "cannot be told from this recording"
+        click.echo(f"  {name}: {known}")
+    for side, values in summary["friction"].items():
+        click.echo(f"  friction {side}: " + ", ".join(f"{name} {_number(n)}" for name, n in values.items()))
+    held_back = summary["held_back"]
+    first, last = held_back["t_s"]
+    click.echo(f"\nrelative force error on {first:.2f} to {last:.2f} s, fitted without it:")
+    for step in held_back["steps"]:
+        name = f"+ {step['added']}" if step["added"] else "mass and viscous friction"
+        click.echo(f"  {name:<26} {100 * step['relative_force_error']:6.2f} %")
+    if summary["locations"]:
+        click.echo("\nwhere the misfit of mass and viscous friction is largest:")
+        _print_locations(summary["locations"])
+    click.echo("\n" + summary["unexplained"]["text"])
+    if summary["unexplained"]["significant"]:
+        click.echo(f"It is {summary['unexplained']['rms_n']:.2g} N rms; largest:")
+        _print_locations(summary["unexplained"]["locations"][:3])
+    for sentence in summary["cannot_tell"]:
+        click.echo(sentence)
+    signals = summary["signals"]
+    click.echo(f"band up to {signals['cutoff_hz']:.3g} Hz, {signals['samples_compared']} samples compared")
+
+
+def _print_locations(locations: Sequence[Mapping[str, Any]]) -> None:
+    for location in locations[:5]:
+        click.echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
+
+
+def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
+    from dbbstation.cli.output import print_table
+
+    rows = [
+        [s["name"], s["verdict"], f"{s['gain']:.0f}", f"{100 * s['concealed']:.0f} %", ", ".join(s["ambiguous_with"])]
+        for s in sources
+    ]
+    print_table(["cause", "verdict", "log evidence", "concealed", "not told from"], rows)
+    for source in sources:
+        if source["verdict"] in {"identified", "ambiguous"}:
+            click.echo()
+            for name, number in source["parameters"].items():
+                click.echo(f"{source['name']}: {name} {_number(number)}")
+            click.echo(f"  {source['text']}")
+
+
+def _number(number: Mapping[str, Any]) -> str:
+    return f"{number['value']:.4g} ± {number['uncertainty']:.2g} {number['unit']}"

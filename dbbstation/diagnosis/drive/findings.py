@@ -1,0 +1,183 @@
+"""What the diagnosis of a drive answers: verdicts, places, numbers with their uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.design import Design
+    from dbbstation.diagnosis.findings import Value, Verdict
+
+
+@dataclass(frozen=True)
+class Number:
+    """A parameter of the model.
+
+    Attributes:
+        value: with its standard uncertainty and unit.
+        identifiable: False where this recording cannot tell it; the value then means nothing by itself.
+    """
+
+    value: Value
+    identifiable: bool
+
+
+@dataclass(frozen=True)
+class DriveFinding:
+    """What is said of one cause.
+
+    Attributes:
+        name: of the cause.
+        verdict: what can be said.
+        ambiguous_with: causes that would explain the recording about as well in its place.
+        gain: difference in log evidence that it brings.
+        concealed: share of its signature's sum of squares that mass and viscous friction swallow.
+        whole_n: root mean square of its signature [N].
+        rest_n: of what the base leaves of it [N].
+        parameters: as fitted; for a cause that was not, best amplitudes, whose uncertainty says how much could hide.
+        text: one or two sentences for people.
+    """
+
+    name: str
+    verdict: Verdict
+    ambiguous_with: tuple[str, ...]
+    gain: float
+    concealed: float
+    whole_n: float
+    rest_n: float
+    parameters: dict[str, Value]
+    text: str
+
+
+@dataclass(frozen=True)
+class DriveLocation:
+    """A stretch of the recording in which a misfit stands out.
+
+    Attributes:
+        t_s: start, end [s].
+        position_mm: at start and end [mm].
+        direction: +1 towards greater positions, -1 the other way.
+        at_reversal: a reversal or stop lies in it or beside it.
+        share: of the misfit's sum of squares.
+        peak_n: greatest deviation, measured minus model [N].
+    """
+
+    t_s: tuple[float, float]
+    position_mm: tuple[float, float]
+    direction: int
+    at_reversal: bool
+    share: float
+    peak_n: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """A model on the way from the base to the last one, and how it predicts the stretch that was held back.
+
+    Attributes:
+        added: cause that this step adds; empty for the base.
+        relative_force_error: |F - F_model| / |F| on the stretch, fitted without it.
+        fitted_error: the same on what was fitted.
+        parameters: values fitted without the stretch, by name.
+    """
+
+    added: str
+    relative_force_error: float
+    fitted_error: float
+    parameters: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What is left without a name.
+
+    Attributes:
+        rms_n: beyond noise [N].
+        probability: of such a rest or a larger one by noise alone.
+        variable: what organises it; None where nothing does clearly.
+        gain: log evidence of that description.
+        text: one sentence for people.
+    """
+
+    rms_n: float
+    probability: float
+    variable: str | None
+    gain: float
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Friction against speed, all causes that hang on the speed together.
+
+    Attributes:
+        speed_m_s: shape (c,) [m/s].
+        force_n: friction and constant load at that speed [N].
+        uncertainty_n: standard uncertainty [N].
+    """
+
+    speed_m_s: NDArray[np.float64]
+    force_n: NDArray[np.float64]
+    uncertainty_n: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class DriveDiagnosis:
+    """Everything found.
+
+    Attributes:
+        design: recording and columns.
+        mismatch: the recording differs from the base model beyond noise.
+        misfit_rms_n: of the base model beyond noise [N].
+        probability: of such a misfit by chance.
+        before: parameters of the base model.
+        after: of the last model, base parameters first.
+        friction: Coulomb and viscous friction per direction, `forwards` and `backwards`; empty where not identifiable.
+        chosen: causes in the last model, in the order in which they were found.
+        base_n: force of the base model at the samples compared, shape (m,) [N].
+        model_n: of the last model [N].
+        held_back_s: start and end of the stretch that was held back [s].
+        steps: from the base to the last model.
+        locations: of the base model's misfit, largest share first.
+        findings: best first.
+        rest: what is left.
+        rest_locations: where, largest share first.
+        cannot_tell: sentences.
+        curve: friction against speed.
+    """
+
+    design: Design
+    mismatch: bool
+    misfit_rms_n: float
+    probability: float
+    before: dict[str, Number]
+    after: dict[str, Number]
+    friction: dict[str, dict[str, Value]]
+    chosen: tuple[str, ...]
+    base_n: NDArray[np.float64]
+    model_n: NDArray[np.float64]
+    held_back_s: tuple[float, float]
+    steps: tuple[Step, ...]
+    locations: tuple[DriveLocation, ...]
+    findings: tuple[DriveFinding, ...]
+    rest: Rest
+    rest_locations: tuple[DriveLocation, ...]
+    cannot_tell: tuple[str, ...]
+    curve: Curve
+
+    def table(self) -> dict[str, NDArray[np.float64]]:
+        """What was compared, sample by sample in the band, by column name with its unit."""
+        signals = self.design.signals
+        return {
+            "t_s": signals.t_s[signals.kept],
+            "position_mm": 1e3 * signals.position_m[signals.kept],
+            "speed_mm_s": 1e3 * self.design.columns[:, 1],
+            "acceleration_mm_s2": 1e3 * self.design.columns[:, 0],
+            "force_n": self.design.force_n,
+            "base_force_n": self.base_n,
+            "model_force_n": self.model_n,
+        }

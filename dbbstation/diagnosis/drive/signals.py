@@ -1,0 +1,243 @@
+"""Speed and acceleration from sampled position, and the band that force and model are compared in.
+
+The standard practice of inverse dynamic identification by least squares: position is low-passed without phase shift
+(Butterworth, forwards and backwards), differentiated by central differences, and measured force and every column of
+the model then pass one and the same second low-pass and are decimated together, so that the filter changes both sides
+alike. [Gautier, Dynamic identification of robots with power model, ICRA 1997; Janot, Vandanjon and Gautier, A generic
+instrumental variable approach for industrial robot identification, IEEE TCST 22 (2014), sec. II-C]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt, welch
+
+from dbbstation.diagnosis.drive.sampling import evenly_sampled
+from dbbstation.diagnosis.drive.stuck import stuck_samples
+from dbbstation.errors import CalibrationError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.trace.drive_recording import DriveRecording
+
+ORDER = 4
+"""Of the Butterworth filters; twice that after both passes."""
+
+POSITION_BAND = 2.0
+"""Cut-off of the position's filter over that of the comparison: it must be flat where force and model are compared."""
+
+PER_CUTOFF = 2.5
+"""Samples that are kept per period of the cut-off."""
+
+EDGE_PERIODS = 3.0
+"""Periods of the cut-off that are left out at both ends, where the filters had to invent samples."""
+
+WIDEST = 1 / 20
+"""Widest band that is chosen, of the sampling rate: the differences lose a hundredth of the acceleration there."""
+
+NOISE_SHARE = 0.03
+"""Noise of the acceleration over the acceleration itself, in the band that is chosen. Noise in it makes the mass too
+small by the square of this, a thousandth."""
+
+MOVING_SHARE = 0.005
+"""Speed, of the greatest, below which the drive counts as standing: friction has no known value there."""
+
+FEWEST = 60
+"""Samples in the band that an identification needs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """Sizes that make amplitudes comparable.
+
+    Attributes:
+        force_n: root mean square of the force [N].
+        speed_m_s: greatest speed [m/s].
+        travel_m: between the ends of the travel [m].
+        duration_s: of the recording [s].
+    """
+
+    force_n: float
+    speed_m_s: float
+    travel_m: float
+    duration_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """An evenly sampled recording with its derivatives, and the way to the samples that are compared.
+
+    Attributes:
+        t_s: shape (n,) [s].
+        position_m: low-passed [m].
+        speed_m_s: its central difference [m/s].
+        acceleration_m_s2: its second difference [m/s²].
+        force_n: as measured [N].
+        rate_hz: samples per second.
+        cutoff_hz: of the band in which force and model are compared.
+        acceleration_noise_m_s2: root mean square that the position's noise alone puts into the acceleration there.
+        kept: indices of the samples that are compared, shape (m,).
+        notes: what was done to the recording, sentences.
+    """
+
+    t_s: NDArray[np.float64]
+    position_m: NDArray[np.float64]
+    speed_m_s: NDArray[np.float64]
+    acceleration_m_s2: NDArray[np.float64]
+    force_n: NDArray[np.float64]
+    rate_hz: float
+    cutoff_hz: float
+    acceleration_noise_m_s2: float
+    kept: NDArray[np.int64]
+    notes: tuple[str, ...]
+
+    def compared(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Low-pass columns at the full rate, shape (n,) or (n, p), and keep the samples that are compared."""
+        sos = butter(ORDER, self.cutoff_hz, fs=self.rate_hz, output="sos")
+        return np.ascontiguousarray(sosfiltfilt(sos, columns, axis=0)[self.kept])
+
+    @cached_property
+    def direction(self) -> NDArray[np.float64]:
+        """Sign of the speed, shape (n,)."""
+        return np.sign(self.speed_m_s)
+
+    @cached_property
+    def reversals(self) -> NDArray[np.int64]:
+        """Samples at which the direction of travel changes; a stop without a change is none."""
+        moving = np.flatnonzero(np.abs(self.speed_m_s) > self.standing_m_s)
+        turned = np.flatnonzero(np.diff(self.direction[moving]) != 0.0)
+        return (moving[turned] + moving[turned + 1]) // 2
+
+    @cached_property
+    def since_reversal_m(self) -> NDArray[np.float64]:
+        """Travel since the last reversal, not negative, shape (n,) [m]; infinite before the first."""
+        last = np.searchsorted(self.reversals, np.arange(len(self.t_s)), side="right") - 1
+        if not len(self.reversals):
+            return np.full(len(self.t_s), np.inf)
+        travel = np.abs(self.position_m - self.position_m[self.reversals[np.maximum(last, 0)]])
+        return np.where(last >= 0, travel, np.inf)
+
+    @cached_property
+    def scale(self) -> Scale:
+        """Sizes of this recording."""
+        force = float(np.sqrt(np.mean(self.compared(self.force_n) ** 2)))
+        speed = float(np.abs(self.speed_m_s[self.kept]).max())
+        return Scale(force, speed, float(np.ptp(self.position_m)), float(self.t_s[-1] - self.t_s[0]))
+
+    @property
+    def standing_m_s(self) -> float:
+        """Speed below which the drive counts as standing [m/s]."""
+        return MOVING_SHARE * float(np.abs(self.speed_m_s).max())
+
+
+def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Signals:
+    """Prepare a recording.
+
+    Args:
+        recording: raw.
+        cutoff_hz: of the band of the comparison; chosen from the data if None.
+
+    Raises:
+        CalibrationError: it is too short, the drive does not move, the force is dead or mostly saturated, or the
+            cut-off does not suit the sampling rate.
+    """
+    even = evenly_sampled(recording)
+    notes = list(even.notes)
+    stuck, told = stuck_samples(even.force_n, even.t_s, recording.name)
+    notes += told
+    rate, position = even.rate_hz, 1e-3 * even.position_mm
+    if not np.ptp(position) > 0.0:
+        raise CalibrationError(
+            "the position does not change", where=recording.name, remedy="record the drive while it travels to and fro"
+        )
+    floor = _noise_floor(position, rate)
+    cutoff = _chosen_cutoff(position, rate, floor) if cutoff_hz is None else cutoff_hz
+    if not 0.0 < cutoff <= rate / (2.5 * POSITION_BAND):
+        raise CalibrationError(
+            f"a cut-off of {cutoff:g} Hz does not suit {rate:g} samples per second",
+            where=recording.name,
+            remedy=f"give one up to {rate / (2.5 * POSITION_BAND):.3g} Hz",
+        )
+    edge = int(np.ceil(EDGE_PERIODS * rate / cutoff))
+    if len(position) - 2 * edge < FEWEST * rate / (PER_CUTOFF * cutoff):
+        raise CalibrationError(
+            f"{len(position) / rate:.2f} s are too short for a cut-off of {cutoff:.3g} Hz",
+            where=recording.name,
+            remedy="record for longer, ten strokes to and fro at several speeds, or give a higher --cutoff-hz",
+        )
+    smooth = sosfiltfilt(butter(ORDER, POSITION_BAND * cutoff, fs=rate, output="sos"), position)
+    speed = np.gradient(smooth, 1.0 / rate)
+    acceleration = np.zeros_like(smooth)
+    acceleration[1:-1] = (smooth[2:] - 2.0 * smooth[1:-1] + smooth[:-2]) * rate**2
+    step = max(int(rate / (PER_CUTOFF * cutoff)), 1)
+    # A standing drive spoils samples as far as the filter of the comparison reaches, a stuck force, whose error knows no
+    # bounds, as far as it rings.
+    standing = np.abs(speed) <= MOVING_SHARE * np.abs(speed).max()
+    usable = ~(_widened(standing, step) | _widened(stuck, edge))
+    kept = np.arange(edge, len(position) - edge, step)
+    kept = kept[usable[kept]]
+    if len(kept) < FEWEST:
+        raise CalibrationError(
+            f"only {len(kept)} samples in the band show a moving drive",
+            where=recording.name,
+            remedy="record the drive while it travels to and fro, at several speeds",
+        )
+    return Signals(
+        t_s=even.t_s,
+        position_m=smooth,
+        speed_m_s=speed,
+        acceleration_m_s2=acceleration,
+        force_n=even.force_n,
+        rate_hz=rate,
+        cutoff_hz=cutoff,
+        acceleration_noise_m_s2=float(np.sqrt(_acceleration_noise(floor, cutoff))),
+        kept=kept,
+        notes=tuple(notes),
+    )
+
+
+def _widened(marked: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
+    """Samples no farther than `by` from a marked one, shape (n,)."""
+    count = np.concatenate([[0], np.cumsum(marked)])
+    at = np.arange(len(marked))
+    return np.asarray(count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)])
+
+
+def _noise_floor(position_m: NDArray[np.float64], rate_hz: float) -> float:
+    """Power of the position's noise per hertz [m²/Hz], from the upper quarter of its spectrum."""
+    frequency, power = _spectrum(position_m, rate_hz)
+    return float(np.median(power[frequency > 0.375 * rate_hz]))
+
+
+def _spectrum(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Frequencies [Hz] and power per hertz [m²/Hz]."""
+    frequency, power = welch(position_m, rate_hz, "hann", min(len(position_m), 4096))
+    return np.asarray(frequency), np.asarray(power)
+
+
+def _acceleration_noise(floor: float, cutoff_hz: float | NDArray[np.float64]) -> float | NDArray[np.float64]:
+    """Mean square of the second derivative of white noise below a cut-off [m²/s⁴]."""
+    return floor * (2.0 * np.pi) ** 4 * cutoff_hz**5 / 5.0
+
+
+def _chosen_cutoff(position_m: NDArray[np.float64], rate_hz: float, floor: float) -> float:
+    """Widest band in which the acceleration still stands far out of its noise [Hz].
+
+    Where it does so nowhere, as at constant speed, a band that leaves speed and force a hundred samples.
+    """
+    frequency, power = _spectrum(position_m, rate_hz)
+    tried = np.geomspace(2.0, rate_hz * WIDEST, 40)
+    signal = np.array(
+        [np.trapezoid(power * (2.0 * np.pi * frequency) ** 4 * (frequency <= f), frequency) for f in tried]
+    )
+    noise = _acceleration_noise(floor, tried)
+    good = np.flatnonzero(noise <= NOISE_SHARE**2 * np.maximum(signal - noise, 0.0))
+    if len(good):
+        return float(tried[good[-1]])
+    seconds = len(position_m) / rate_hz
+    return float(min(rate_hz * WIDEST, max(200.0 / (PER_CUTOFF * seconds), 5.0)))

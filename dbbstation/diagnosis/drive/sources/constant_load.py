@@ -1,0 +1,36 @@
+"""Cause: a load that is there in both directions of travel."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.signals import Signals
+
+
+class ConstantLoad(DriveSource):
+    """A constant force: the share of a weight along the drive, or the zero of the force channel."""
+
+    name = "constant-load"
+    varies_with = "speed"
+    texts = Texts(
+        what="A constant force adds to the drive's: the share of the platform's weight along a strut, a spring that is "
+        "long against the travel, or a wrong zero of the force or current channel.",
+        shows="Both directions of travel need a force that is shifted by the same amount, at every speed.",
+        confirm="Release the drive from its load, or tilt it, and record again; with the motor off the channel must "
+        "read zero.",
+        cure="Balance the weight, or enter it as a gravity feed-forward; zero the channel.",
+        equation="F = F_0",
+        origin="statics; offset of the drive in Janot, Vandanjon and Gautier, IEEE TCST 22 (2014)",
+    )
+
+    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+        """One amplitude."""
+        size = Parameter("load_n", "N", 0.3 * signals.scale.force_n, "force that the drive must add at every position")
+        return (Form((size,), lambda s, _: np.ones((len(s.t_s), 1))),)

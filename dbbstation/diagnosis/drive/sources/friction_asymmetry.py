@@ -1,0 +1,62 @@
+"""Cause: friction that is not the same in both directions of travel."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.signals import Signals
+
+
+class FrictionAsymmetry(DriveSource):
+    """Friction that differs by direction: in its Coulomb part by 2 A, in its viscous part by 2 B.
+
+    F = A + B |v|, beside F_c sign(v) + F_v v: forwards the friction is (F_c + A) + (F_v + B) v, backwards
+    (F_c - A) + (F_v - B) |v|. While the drive moves, A alone looks exactly like a constant load; B does not.
+    """
+
+    name = "friction-asymmetry"
+    varies_with = "speed"
+    texts = Texts(
+        what="Friction is greater in one direction of travel than in the other, in its Coulomb part, its viscous part "
+        "or both.",
+        shows="At equal speeds forwards and backwards the forces differ in size; where the viscous part differs, the "
+        "more so the faster it goes.",
+        confirm="Travel to and fro at several constant speeds, then turn the drive round on its mounting, or balance "
+        "its load: what turns with the drive is its friction, what stays is a load.",
+        cure="Look at what works on one side only: nut preload, axial bearing, wiper seals, a misaligned guide; give "
+        "the control a friction feed-forward per direction.",
+        equation="F = A + B |v|",
+        origin="Armstrong-Hélouvry, Control of Machines with Friction (1991), ch. 4; offset by asymmetrical Coulomb "
+        "friction in Janot, Gautier and Brunot, EMPS benchmark (2019)",
+    )
+
+    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+        """Coulomb part, viscous part, both."""
+        if not len(signals.reversals):
+            return ()
+        scale = signals.scale
+        dry = Parameter("coulomb_asymmetry_n", "N", 0.2 * scale.force_n, "half of forwards minus backwards")
+        wet = Parameter(
+            "viscous_asymmetry_n_s_m",
+            "N·s/m",
+            0.2 * scale.force_n / scale.speed_m_s,
+            "half of forwards minus backwards",
+        )
+        return (
+            Form((dry,), lambda s, _: np.abs(s.direction)[:, None]),
+            Form((wet,), lambda s, _: np.abs(s.speed_m_s)[:, None]),
+            Form((dry, wet), lambda s, _: np.column_stack([np.abs(s.direction), np.abs(s.speed_m_s)])),
+        )
+
+    def possible(self, values: Mapping[str, float]) -> bool:
+        """Friction takes energy out in both directions: beyond Coulomb friction it would be a load."""
+        return abs(values.get("coulomb_asymmetry_n", 0.0)) <= max(values.get("coulomb_n", 0.0), 0.0)

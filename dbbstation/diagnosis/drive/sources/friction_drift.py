@@ -1,0 +1,57 @@
+"""Cause: friction that changes while the drive warms."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.signals import Signals
+
+SHARES = (0.1, 0.3, 1.0, 10.0)
+"""Time constants that are tried, of the recording's length; the last is as good as a straight line."""
+
+
+class FrictionDrift(DriveSource):
+    """Friction that goes to a new value over time: F = (C sign(v) or V v) g(t), g = 1 - exp(-t / tau) less its mean."""
+
+    name = "friction-drift"
+    varies_with = "time by direction"
+    texts = Texts(
+        what="Friction changes during the recording: lubricant warms and thins, seals and bearings run in.",
+        shows="The force at the same place, speed and direction is not the same later on; forwards and backwards it "
+        "changes to opposite sides.",
+        confirm="Repeat one stroke for half an hour from cold and plot the mean force of each direction over time.",
+        cure="Warm the drive before measuring; a lubricant of flatter viscosity; friction feed-forward that follows "
+        "temperature.",
+        equation="F = C sign(v) g(t) or V v g(t), g = 1 - exp(-t / tau) less its mean",
+        origin="Bittencourt and Gunnarsson, Static friction in a robot joint, J. Dyn. Sys. Meas. Control 134 (2012) "
+        "051013: Coulomb and viscous friction over temperature",
+    )
+
+    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+        """Coulomb or viscous part at several time constants."""
+        scale = signals.scale
+        dry = Parameter("coulomb_change_n", "N", 0.2 * scale.force_n, "change of Coulomb friction in the end")
+        wet = Parameter(
+            "viscous_change_n_s_m", "N·s/m", 0.2 * scale.force_n / scale.speed_m_s, "change of viscous friction"
+        )
+        tau = Parameter("time_constant_s", "s", 0.3 * scale.duration_s, "after which 63 % of the change are done")
+        forms = []
+        for share in SHARES:
+            value, reach = share * scale.duration_s, 1.8
+            forms.append(Form((dry,), lambda s, t: (s.direction * _growth(s, t))[:, None], tau, value, reach))
+            forms.append(Form((wet,), lambda s, t: (s.speed_m_s * _growth(s, t))[:, None], tau, value, reach))
+        return tuple(forms)
+
+
+def _growth(signals: Signals, time_constant_s: float) -> NDArray[np.float64]:
+    """Share of the change that is done, normed to 1 at the end of the recording, less its mean, shape (n,)."""
+    since = signals.t_s - signals.t_s[0]
+    done = -np.expm1(-since / time_constant_s)
+    return np.asarray(done / done[-1] - np.mean(done / done[-1]))

@@ -1,0 +1,48 @@
+"""Cause: friction that depends on the place."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.signals import Signals
+
+
+class PositionFriction(DriveSource):
+    """Coulomb friction that changes along the travel: F = sign(v) (p_1 s + p_2 s²), s from -1 to 1 over the travel."""
+
+    name = "position-friction"
+    varies_with = "position by direction"
+    texts = Texts(
+        what="Friction changes along the travel: the screw's pitch diameter, the alignment of the guide or the "
+        "tension of a cover is not the same everywhere.",
+        shows="The gap between the forces forwards and backwards opens or closes along the travel.",
+        confirm="Travel slowly at constant speed over the whole stroke and back; plot half the difference of the "
+        "forces over position.",
+        cure="Align screw and guide; check the screw for wear where it is used most.",
+        equation="F = sign(v) (p_1 s + p_2 s²), s = -1 ... 1 over the travel",
+        origin="Armstrong-Hélouvry, Control of Machines with Friction (1991), ch. 4: position-dependent friction",
+    )
+
+    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+        """Linear, and linear with square."""
+        size = 0.2 * signals.scale.force_n
+        slope = Parameter("slope_n", "N", size, "friction at the upper end of the travel less that in the middle")
+        bow = Parameter("bow_n", "N", size, "friction at both ends of the travel less that in the middle")
+        return (
+            Form((slope,), lambda s, _: _columns(s)[:, :1]),
+            Form((bow,), lambda s, _: _columns(s)[:, 1:]),
+            Form((slope, bow), lambda s, _: _columns(s)),
+        )
+
+
+def _columns(signals: Signals) -> NDArray[np.float64]:
+    low, high = signals.position_m.min(), signals.position_m.max()
+    place = (2.0 * signals.position_m - low - high) / (high - low)
+    return signals.direction[:, None] * np.column_stack([place, place**2])

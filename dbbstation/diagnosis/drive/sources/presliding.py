@@ -1,0 +1,59 @@
+"""Cause: friction that builds up over a short travel after a reversal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.signals import Signals
+
+SHARES = (0.0005, 0.002, 0.008, 0.03)
+"""Lengths of the build-up that are tried, of the travel."""
+
+
+class Presliding(DriveSource):
+    """After a reversal friction passes from one sign to the other over a travel: F = -2 F_p sign(v) exp(-d / d_0).
+
+    Beside Coulomb friction of the same size F_p this is the model of Dahl, F = F_c sign(v) (1 - 2 exp(-d / d_0)), with
+    d the travel since the reversal.
+    """
+
+    name = "presliding"
+    varies_with = "travel since reversal"
+    texts = Texts(
+        what="Contacts, balls and seals yield elastically before they slide: after a reversal friction turns round "
+        "over a short travel, not at once.",
+        shows="After every reversal the force approaches its new level along the travel, at slow and at fast reversals "
+        "over the same travel.",
+        confirm="Reverse slowly at one place with strokes of 0.05 to 1 mm and plot force over position: loops that are "
+        "rounded at their corners.",
+        cure="A stiffer support of seals and bearings; in the control a reversal compensation that depends on travel.",
+        equation="F = -2 F_p sign(v) exp(-d / d_0), d the travel since the reversal",
+        origin="Dahl, A solid friction model, Aerospace Corporation TOR-158 (1968); Armstrong-Hélouvry, Dupont and "
+        "Canudas de Wit, Automatica 30 (1994) 1083",
+    )
+
+    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+        """One amplitude at several lengths."""
+        if not len(signals.reversals):
+            return ()
+        scale = signals.scale
+        size = Parameter("presliding_n", "N", 0.2 * scale.force_n, "friction still to turn round at reversal")
+        length = Parameter("length_mm", "mm", 1e3 * 0.01 * scale.travel_m, "travel after which 37 % are left of it")
+        return tuple(Form((size,), _columns, length, 1e3 * share * scale.travel_m, 2.0) for share in SHARES)
+
+    def possible(self, values: Mapping[str, float]) -> bool:
+        """Friction follows the reversal late, not early."""
+        return values["presliding_n"] > 0.0
+
+
+def _columns(signals: Signals, length_mm: float) -> NDArray[np.float64]:
+    return (-2.0 * signals.direction * np.exp(-1e3 * signals.since_reversal_m / length_mm))[:, None]

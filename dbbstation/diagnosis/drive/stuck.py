@@ -1,0 +1,61 @@
+"""Force channels that do not follow: dead ones, and ones that ran against the end of their range."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import CalibrationError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+TOGETHER = 5
+"""Equal samples in a row, at the greatest or least value, that count as saturated."""
+
+DEAD_SHARE = 0.1
+"""Share of a recording in one row of equal samples that counts as dead."""
+
+MOST_STUCK = 0.3
+"""Share of stuck samples beyond which the rest proves nothing."""
+
+
+def stuck_samples(
+    force_n: NDArray[np.float64], t_s: NDArray[np.float64], name: str
+) -> tuple[NDArray[np.bool_], list[str]]:
+    """Samples in which the force channel did not follow, shape (n,), and sentences about them.
+
+    Raises:
+        CalibrationError: the force does not change at all, or is stuck for most of the recording.
+    """
+    if not np.ptp(force_n) > 0.0:
+        raise CalibrationError(
+            f"the force is {force_n[0]:g} N in every sample: the channel is dead",
+            where=name,
+            remedy="check the wire and the scale of the force or current channel",
+        )
+    changes = np.flatnonzero(np.diff(force_n) != 0.0) + 1
+    starts, stops = np.r_[0, changes], np.r_[changes, len(force_n)]
+    lengths, values = stops - starts, force_n[starts]
+    extreme = (values == force_n.max()) | (values == force_n.min())
+    saturated = extreme & (lengths >= TOGETHER)
+    dead = (lengths >= DEAD_SHARE * len(force_n)) & ~saturated
+    notes = []
+    for rows, what in ((saturated, "saturated: it stands at its extreme"), (dead, "dead: it does not change")):
+        for at in np.flatnonzero(rows)[:_MOST_NOTES]:
+            first, last = t_s[starts[at]], t_s[stops[at] - 1]
+            notes.append(f"the force is {what}, {values[at]:g} N, from {first:.3f} to {last:.3f} s; this is not used")
+        if np.count_nonzero(rows) > _MOST_NOTES:
+            notes.append(f"and {np.count_nonzero(rows) - _MOST_NOTES} more such stretches")
+    stuck = np.repeat(saturated | dead, lengths)
+    if stuck.mean() > MOST_STUCK:
+        raise CalibrationError(
+            f"the force channel is stuck in {100 * stuck.mean():.0f} % of the samples",
+            where=name,
+            remedy="check the range and the wire of the channel, then record again; " + notes[0],
+        )
+    return stuck, notes
+
+
+_MOST_NOTES = 3

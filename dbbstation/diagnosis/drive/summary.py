@@ -1,0 +1,142 @@
+"""The diagnosis of a drive as plain numbers: what `--json` prints."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.judge import SIGNIFICANT
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.diagnosis.drive.findings import (
+        DriveDiagnosis,
+        DriveFinding,
+        DriveLocation,
+        Number,
+        Step,
+    )
+    from dbbstation.diagnosis.findings import Value
+
+
+def drive_summary(diagnosis: DriveDiagnosis) -> dict[str, Any]:
+    """Everything a diagnosis of a drive says."""
+    design, rest = diagnosis.design, diagnosis.rest
+    signals = design.signals
+    named = [f for f in diagnosis.findings if f.name in diagnosis.chosen]
+    variable = next((design.sources[f.name].varies_with for f in named), rest.variable or "")
+    return {
+        "mismatch": diagnosis.mismatch,
+        "probability": diagnosis.probability,
+        "noise_n": design.noise.sigma,
+        "noise_correlation_samples": design.noise.correlation_samples,
+        "misfit_rms_n": diagnosis.misfit_rms_n,
+        "residual_rms_n": {
+            "before": float(np.sqrt(np.mean((design.force_n - diagnosis.base_n) ** 2))),
+            "after": float(np.sqrt(np.mean((design.force_n - diagnosis.model_n) ** 2))),
+        },
+        "held_back": {
+            "t_s": list(diagnosis.held_back_s),
+            "relative_force_error": {
+                "before": diagnosis.steps[0].relative_force_error,
+                "after": diagnosis.steps[-1].relative_force_error,
+            },
+            "steps": [_step(step) for step in diagnosis.steps],
+        },
+        "parameters": {name: _number(number) for name, number in diagnosis.after.items()},
+        "parameter_shift": [
+            {
+                "parameter": name,
+                "before": before.value.value,
+                "after": diagnosis.after[name].value.value,
+                "shift": before.value.value - diagnosis.after[name].value.value,
+                "uncertainty": diagnosis.after[name].value.uncertainty,
+                "unit": before.value.unit,
+            }
+            for name, before in diagnosis.before.items()
+            if diagnosis.chosen and before.identifiable
+        ],
+        "friction": {side: _values(values) for side, values in diagnosis.friction.items()},
+        "locations": [_location(location, variable) for location in diagnosis.locations],
+        "sources": [_source(finding) for finding in diagnosis.findings],
+        "unexplained": {
+            "rms_n": rest.rms_n,
+            "probability": rest.probability,
+            "significant": rest.probability < SIGNIFICANT,
+            "variable": rest.variable,
+            "text": rest.text,
+            "locations": [_location(location, rest.variable or "") for location in diagnosis.rest_locations],
+        },
+        "cannot_tell": list(diagnosis.cannot_tell),
+        "signals": {
+            "samples": len(signals.t_s),
+            "samples_compared": len(signals.kept),
+            "rate_hz": signals.rate_hz,
+            "cutoff_hz": signals.cutoff_hz,
+            "t_s": [float(signals.t_s[0]), float(signals.t_s[-1])],
+            "reversals": len(signals.reversals),
+            "greatest_speed_mm_s": 1e3 * signals.scale.speed_m_s,
+            "force_rms_n": signals.scale.force_n,
+        },
+        "notes": list(signals.notes),
+    }
+
+
+def _number(number: Number) -> dict[str, Any]:
+    known = math.isfinite(number.value.uncertainty)
+    return {
+        "value": number.value.value if known else None,
+        "uncertainty": number.value.uncertainty if known else None,
+        "unit": number.value.unit,
+        "identifiable": number.identifiable,
+    }
+
+
+def _values(values: Mapping[str, Value]) -> dict[str, Any]:
+    return {name: {"value": v.value, "uncertainty": v.uncertainty, "unit": v.unit} for name, v in values.items()}
+
+
+def _step(step: Step) -> dict[str, Any]:
+    return {
+        "added": step.added or None,
+        "relative_force_error": step.relative_force_error,
+        "fitted_error": step.fitted_error,
+        "parameters": step.parameters,
+    }
+
+
+def _location(location: DriveLocation, variable: str) -> dict[str, Any]:
+    way = "forwards" if location.direction > 0 else "backwards"
+    where = ", at a reversal or stop" if location.at_reversal else ""
+    text = (
+        f"{location.t_s[0]:.2f} to {location.t_s[1]:.2f} s, {location.position_mm[0]:.1f} to "
+        f"{location.position_mm[1]:.1f} mm {way}{where}: up to {location.peak_n:+.3g} N"
+        f"{f', by {variable}' if variable else ''}"
+    )
+    return {
+        "t_s": list(location.t_s),
+        "position_mm": list(location.position_mm),
+        "direction": way,
+        "at_reversal": location.at_reversal,
+        "variable": variable or None,
+        "share": location.share,
+        "peak_n": location.peak_n,
+        "text": text,
+    }
+
+
+def _source(finding: DriveFinding) -> dict[str, Any]:
+    return {
+        "name": finding.name,
+        "verdict": str(finding.verdict),
+        "ambiguous_with": list(finding.ambiguous_with),
+        "concealed": finding.concealed,
+        "signature_rms_n": finding.whole_n,
+        "unconcealed_rms_n": finding.rest_n,
+        "gain": finding.gain,
+        "parameters": _values(finding.parameters),
+        "text": finding.text,
+    }

@@ -1,0 +1,205 @@
+"""Recordings of one drive: CSV with `t_s,position_mm` and `force_n` or `motor_current_a`, `#` lines are comments."""
+
+from __future__ import annotations
+
+import difflib
+import io
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.trace.drive_recording import DriveRecording
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+TIME, POSITION, FORCE, CURRENT = "t_s", "position_mm", "force_n", "motor_current_a"
+REQUIRED = (TIME, POSITION)
+
+LARGEST = {TIME: 1e6, POSITION: 1e5, FORCE: 1e7, CURRENT: 1e4}
+"""Greatest plausible size of each column, in its unit."""
+
+MOST_FAULTS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class DriveFile:
+    """A recording of a drive as its file has it.
+
+    Attributes:
+        file: as named in messages.
+        line: number of the line that names the columns.
+        numbers: columns that this program knows, by name, each of shape (n,), in the unit of the name.
+        others: texts of further columns by name.
+        warnings: what was found that does not spoil the recording.
+    """
+
+    file: str
+    line: int
+    numbers: dict[str, NDArray[np.float64]]
+    others: dict[str, tuple[str, ...]]
+    warnings: tuple[Problem, ...]
+
+    def recording(self, force_per_ampere_n: float | None = None) -> DriveRecording:
+        """Return the recording; the force is the column's, or the current's times a factor.
+
+        Args:
+            force_per_ampere_n: force of the drive at 1 A, positive towards greater positions [N/A].
+
+        Raises:
+            InputError: there is no force, and no factor for the current.
+        """
+        force = self.numbers.get(FORCE)
+        if force is None or (force_per_ampere_n is not None and CURRENT in self.numbers):
+            if force_per_ampere_n is None or CURRENT not in self.numbers:
+                what = f"there is `{CURRENT}` and no `{FORCE}`" if force is None else f"there is no `{CURRENT}`"
+                remedy = "say with --force-per-ampere how many newtons an ampere is: 2 pi torque constant / lead"
+                raise InputError([Problem(self.file, self.line, 0, what, remedy if force is None else "")])
+            force = force_per_ampere_n * self.numbers[CURRENT]
+        return DriveRecording(self.file, self.numbers[TIME], self.numbers[POSITION], force)
+
+
+def looks_like_drive(path: Path) -> bool:
+    """Whether the first line that is no comment names a position and no bar length: what runs have."""
+    try:
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            head = next((line for line in file if line.strip() and not line.lstrip().startswith("#")), "")
+    except OSError:
+        return False
+    names = {name.strip() for name in head.split(",")}
+    return POSITION in names and "length_mm" not in names
+
+
+def read_drive(path: Path) -> DriveFile:
+    """Read a recording of a drive.
+
+    Raises:
+        InputError: every missing column, and lines that cannot be used, with their number.
+    """
+    faults: list[Problem] = []
+    data = read_bytes(path, faults)
+    text = None if data is None else decode(data, str(path), faults)
+    if text is None:
+        raise InputError(faults)
+    return parse_drive(text, str(path))
+
+
+def parse_drive(text: str, file: str) -> DriveFile:
+    """Parse the text of a recording.
+
+    Raises:
+        InputError: as `read_drive`.
+    """
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        what, remedy = "there is no line that names the columns", f"begin with `{TIME},{POSITION},{FORCE}`"
+        raise InputError([Problem(file, 0, 0, what, remedy)])
+    header, head = lines[0]
+    names = [name.strip() for name in head.split(",")]
+    faults: list[Problem] = []
+    _check_names(names, file, header, faults)
+    rows = lines[1:]
+    if not rows and not faults:
+        faults.append(Problem(file, header, 0, "there are no samples below this line"))
+    if faults:
+        raise InputError(faults)
+    warnings: list[Problem] = []
+    if not text.endswith("\n") and rows[-1][1].count(",") != len(names) - 1:
+        warnings.append(Problem(file, rows[-1][0], 0, "the last line was cut off; it is left out"))
+        rows = rows[:-1]
+    known = [name for name in names if name in LARGEST]
+    others = [name for name in names if name not in LARGEST]
+    warnings += [
+        Problem(file, header, 0, f"the column `{name}` is not known; it is kept and not used") for name in others
+    ]
+    numbers = _numbers(rows, names, known, file, faults)
+    if not faults:
+        _check_values(numbers, [number for number, _ in rows], file, faults)
+    if faults:
+        raise InputError(faults[:MOST_FAULTS])
+    kept = {name: tuple(line.split(",")[names.index(name)].strip() for _, line in rows) for name in others}
+    return DriveFile(file, header, numbers, kept, tuple(warnings))
+
+
+def _check_names(names: list[str], file: str, line: int, faults: list[Problem]) -> None:
+    shown = f"columns here: {', '.join(names)}"
+    if any(";" in name or "\t" in name for name in names):
+        shown = "commas stand between columns, the decimal sign is a dot"
+    unknown = [name for name in names if name not in LARGEST]
+    for missing in (name for name in REQUIRED if name not in names):
+        near = difflib.get_close_matches(missing, unknown, n=1, cutoff=0.5)
+        remedy = f"is it `{near[0]}`?" if near else shown
+        faults.append(Problem(file, line, 0, f"the column `{missing}` is missing", remedy))
+    if FORCE not in names and CURRENT not in names:
+        faults.append(Problem(file, line, 0, f"neither `{FORCE}` nor `{CURRENT}` is there", shown))
+    faults.extend(
+        Problem(file, line, 0, f"the column `{name}` stands here more than once", "remove one")
+        for name in sorted({name for name in names if names.count(name) > 1})
+    )
+
+
+def _numbers(
+    rows: list[tuple[int, str]], names: list[str], known: list[str], file: str, faults: list[Problem]
+) -> dict[str, NDArray[np.float64]]:
+    """Known columns, shape (n,) each; whole by NumPy, line by line only to name what is wrong."""
+    text = io.StringIO("\n".join(line for _, line in rows))
+    places = [names.index(name) for name in known]
+    try:
+        table = np.loadtxt(text, delimiter=",", comments=None, usecols=places, ndmin=2)
+    except ValueError:
+        table = np.full((0, len(known)), np.nan)
+    whole = len(table) == len(rows) and bool(np.isfinite(table).all())
+    if not whole or any(line.count(",") != len(names) - 1 for _, line in rows):
+        _name_faults(rows, names, known, file, faults)
+    return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(known)}
+
+
+def _name_faults(
+    rows: list[tuple[int, str]], names: list[str], known: list[str], file: str, faults: list[Problem]
+) -> None:
+    for number, line in rows:
+        cells = line.split(",")
+        if len(cells) != len(names):
+            what = f"{len(cells)} values in {len(names)} columns"
+            remedy = "compare the line with the header; the decimal sign is a dot, a comma ends a value"
+            faults.append(Problem(file, number, 0, what, remedy))
+            continue
+        for name in known:
+            cell = cells[names.index(name)].strip()
+            try:
+                good = math.isfinite(float(cell))
+            except ValueError:
+                good = False
+            if not good:
+                what = f"{name} is `{cell}`, not a finite number"
+                faults.append(Problem(file, number, 0, what, "correct or remove the line"))
+
+
+def _check_values(numbers: dict[str, NDArray[np.float64]], lines: list[int], file: str, faults: list[Problem]) -> None:
+    t = numbers[TIME]
+    for index in np.flatnonzero(np.diff(t) <= 0.0)[:MOST_FAULTS] + 1:
+        how = "runs backwards" if t[index] < t[index - 1] else "stands still"
+        what = f"time {how} here: t_s {t[index]:g} after {t[index - 1]:g}"
+        faults.append(Problem(file, lines[index], 0, what, "the file was reordered, or two recordings were joined"))
+    for name, values in numbers.items():
+        for index in np.flatnonzero(np.abs(values) > LARGEST[name])[:1]:
+            what = f"{name} is {values[index]:g}, sizes up to {LARGEST[name]:g} are plausible"
+            faults.append(Problem(file, lines[index], 0, what, "check the unit, it is the end of the column's name"))
+
+
+def compared_csv(columns: dict[str, NDArray[np.float64]]) -> str:
+    """Columns of one length as CSV text, six significant digits."""
+    out = io.StringIO()
+    out.write(",".join(columns) + "\n")
+    np.savetxt(out, np.column_stack(list(columns.values())), fmt="%.6g", delimiter=",")
+    return out.getvalue()

@@ -1,0 +1,30 @@
+"""A raw recording of one drive: where it was, and which force drove it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class DriveRecording:
+    """Samples of one drive, in time order.
+
+    Attributes:
+        name: of the recording, for messages.
+        t_s: time, rising, shape (n,) [s].
+        position_mm: along the drive's axis, shape (n,) [mm].
+        force_n: that drives it, positive towards greater positions, shape (n,) [N].
+    """
+
+    name: str
+    t_s: NDArray[np.float64]
+    position_mm: NDArray[np.float64]
+    force_n: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.t_s)

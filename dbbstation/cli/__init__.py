@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-import importlib
 import os
 import sys
 from typing import TYPE_CHECKING
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation import __version__
+from dbbstation.cli.lazy import LazyGroup
 from dbbstation.errors import StationError
 
 if TYPE_CHECKING:
@@ -45,40 +44,12 @@ COMMANDS = {
 """Name and one line of help of every command; each is a module of this folder with a command of its name."""
 
 
-class LazyGroup(click.Group):
-    """Loads a command's module only when that command is asked for, so that `--help` stays quick."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
-        """Return the names of all commands."""
-        return sorted(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        """Import the command's module."""
-        if cmd_name not in COMMANDS:
-            return None
-        module = importlib.import_module(f"dbbstation.cli.{cmd_name}")
-        command: click.Command = getattr(module, cmd_name)
-        # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.
-        command.help = (command.help or "").replace(r"\b", "\b")
-        return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command, or name those that are spelled nearly like it."""
-        name = args[0]
-        near = difflib.get_close_matches(name, COMMANDS, n=3)
-        if name not in COMMANDS and not name.startswith("-") and near:
-            ctx.fail(f"No such command {name!r}; did you mean {' or '.join(near)}?")
-        return super().resolve_command(ctx, args)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """List the commands from the table above, without importing them."""
-        with formatter.section("Commands"):
-            formatter.write_dl(sorted(COMMANDS.items()))
-
-
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(
+    cls=LazyGroup,
+    table=COMMANDS,
+    package="dbbstation.cli",
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
 @click.version_option(__version__, prog_name="dbbstation")
 @click.option(_DEBUG, is_flag=True, help="Show the traceback of an error; may stand anywhere on the line.")
 def cli(*, debug: bool) -> None:

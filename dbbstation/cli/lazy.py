@@ -1,0 +1,57 @@
+"""Groups of commands of which only the one that is called is imported, so that `--help` stays quick."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class LazyGroup(click.Group):
+    """Loads a command's module only when that command is asked for.
+
+    Args:
+        table: name and one line of help of every command.
+        package: where each is a module with a command of its name, hyphens as underscores.
+        more: as `click.Group` takes it.
+    """
+
+    def __init__(self, *, table: Mapping[str, str], package: str, **more: Any) -> None:  # noqa: ANN401
+        super().__init__(**more)
+        self._table = table
+        self._package = package
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Return the names of all commands."""
+        return sorted(self._table)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import the command's module."""
+        if cmd_name not in self._table:
+            return None
+        name = cmd_name.replace("-", "_")
+        module = importlib.import_module(f"{self._package}.{name}")
+        command: click.Command = getattr(module, name)
+        # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.
+        command.help = (command.help or "").replace(r"\b", "\b")
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command, or name those that are spelled nearly like it."""
+        name = args[0]
+        near = difflib.get_close_matches(name, self._table, n=3)
+        if name not in self._table and not name.startswith("-") and near:
+            ctx.fail(f"No such command {name!r}; did you mean {' or '.join(near)}?")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands from the table, without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(sorted(self._table.items()))

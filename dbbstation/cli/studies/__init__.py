@@ -1,0 +1,1 @@
+"""`dbbstation study NAME`: one module per experiment."""

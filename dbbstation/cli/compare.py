@@ -151,17 +151,20 @@ def _print_organised(summary: Mapping[str, Any]) -> None:
             f"\nthe same in both directions {halves['same_um']:.2f} µm rms, opposite {halves['opposite_um']:.2f} µm rms "
             f"(by chance {chance_text(halves['opposite_probability'])})"
         )
-    click.echo("\norganised by, best first; the share is of what lies beyond noise and mountings")
+    click.echo(
+        "\norganised by, best first; share of what is beyond chance, each undulation by its own chance, and of plain µm²"
+    )
     rows = [
         [
             one["variable"] + ("" if one["strut"] is None else f", strut {one['strut']}"),
             f"{100 * one['share']:.0f} %",
+            f"{100 * one['share_of_um2']:.0f} %",
             one["freedom"],
             chance_text(one["probability"]),
         ]
         for one in summary["organised"]
-        if one["share"] > SMALLEST_SHARE
+        if max(one["share"], one["share_of_um2"]) > SMALLEST_SHARE
     ]
-    print_table(["variable", "share", "freedom", "by chance"], rows)
+    print_table(["variable", "share", "of µm²", "freedom", "by chance"], rows)
     click.echo(f"\nin short: {summary['organised_text']}")
     click.echo(f"No cause is named here: `dbbstation diagnose {summary['b']}` looks for one in a session.")

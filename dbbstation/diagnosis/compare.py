@@ -93,7 +93,7 @@ class Comparison:
         probability: of sessions that differ so much or more by chance alone.
         different: runs that differ, beyond chance, by index.
         rms_mm: of all smooth differences [mm].
-        beyond_mm: of these without the best guess of what is stated, beyond noise [mm].
+        beyond_mm: of these, beyond noise and what is stated [mm].
         noise_mm: root mean square that noise leaves in the smooth differences [mm].
         smallest_mm: smooth difference of one run that would have been found nine times in ten, root mean square [mm].
         halves: what both directions share, and what changes its sign; None where no test was run in both.

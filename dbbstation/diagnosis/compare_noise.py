@@ -205,9 +205,12 @@ class Weighting:
         return found.reshape(-1, values.shape[2])
 
     def beyond(self, values: NDArray[np.float64]) -> float:
-        """Sum of squares of values, shape (r, k), without the best guess of what is stated, beyond noise; not negative.
+        """Sum of squares of values, shape (r, k), beyond noise and what is stated; not negative.
 
-        With V the whole covariance and D that of the noise, D V^-1 values is what the best guess leaves.
+        Two bounds from below, of which the greater counts. What the best guess of balls, bars and angles leaves, less
+        noise: with V the whole covariance and D that of the noise, this is D V^-1 values; the guess takes even a ball
+        that moved by a hundred times what is stated. And everything less what noise and balls put there on average,
+        which is nothing where they happened to sit better.
         """
         left = values / self.deviation**2
         lowest = lowest_columns(self.low)
@@ -215,4 +218,7 @@ class Weighting:
         white = solve_triangular(self.root, block, lower=True)
         left[:, lowest] = solve_triangular(self.root, white, lower=True, trans="T").reshape(len(values), -1)
         variance = self.deviation**2
-        return max(float(np.sum((variance * left) ** 2) - np.sum(variance**2 * self.precision)), 0.0)
+        unguessed = float(np.sum((variance * left) ** 2) - np.sum(variance**2 * self.precision))
+        usual = variance.copy()
+        usual[:, lowest] = np.sum(self.root**2, axis=1).reshape(len(values), -1)
+        return max(unguessed, float(np.sum(values**2) - np.sum(usual)), 0.0)

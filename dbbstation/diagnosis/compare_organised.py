@@ -33,6 +33,9 @@ ONLY_NOISE = 0.1
 NEIGHBOURS = 5
 """A harmonic of which a family leaves nothing to judge by is judged by those up to so many away."""
 
+MOST_COLUMNS = 2
+"""Columns per test that a variable may have: a curve with more of them fits whatever few circles do."""
+
 RANK = 1e-8
 
 
@@ -43,7 +46,9 @@ class Organised:
     Attributes:
         variable: as printed.
         strut: 1 to 6; None where it is not one strut's.
-        share: of the sum of squares beyond noise, less what as many columns explain by chance; 0 to 1.
+        share: of the sum of squares beyond chance, every harmonic by the measure of its own chance, less what as many
+            columns explain by chance; 0 to 1.
+        plain_share: the same of the sum of squares as it is, in mm²: balls that sit anew count in full.
         columns: freedom that the variable has.
         probability: of explaining as much by chance, times the number of variables tried.
         worth: information criterion, less is better [Schwarz 1978].
@@ -54,6 +59,7 @@ class Organised:
     variable: str
     strut: int | None
     share: float
+    plain_share: float
     columns: int
     probability: float
     worth: float
@@ -115,8 +121,10 @@ def organise(
     held = np.concatenate([np.zeros((*chance.coefficients.shape, 0)), *(one.family.columns for one in taken)], axis=2)
     tried = [family for family in every if all(family.name != one.family.name for one in taken)]
     least = Weighting.of(chance.low, turned.noise, turned.stated)
+    places = {(pair.a[0].setup.mounting, pair.b[0].setup.mounting) for pair in pairs}
+    most = MOST_COLUMNS * max(len(places), len({pair.test for pair in pairs}))
     found = [_explained(family, held, turned, least, chance, len(tried)) for family in tried]
-    return sorted((one for one in found if one is not None), key=lambda one: one.worth)
+    return sorted((one for one in found if one is not None and one.columns <= most), key=lambda one: one.worth)
 
 
 def halves(pairs: Sequence[Pair], chance: Chance) -> Halves | None:
@@ -186,6 +194,7 @@ def _explained(
         variable=family.variable,
         strut=family.strut,
         share=share,
+        plain_share=_plain_share(columns, turned, variance + scatter, skip),
         columns=fit.rank,
         probability=min(1.0, probability * tried),
         worth=worth,
@@ -302,6 +311,16 @@ def _share_and_worth(
     left = total - float(np.sum((both.T @ target) ** 2))
     worth = len(target) * float(np.log(max(left, 1e-300))) + both.shape[1] * float(np.log(len(target)))
     return float(np.clip(share, 0.0, 1.0)), worth
+
+
+def _plain_share(columns: NDArray[np.float64], turned: _Turned, variance: NDArray[np.float64], skip: int) -> float:
+    """Share of the sum of squares beyond noise that columns explain in least squares without weights."""
+    flat, values = columns.reshape(-1, columns.shape[2]), turned.values.ravel()
+    held, both = _span(flat[:, :skip]), _span(flat)
+    own = float(np.sum((both.T @ values) ** 2) - np.sum((held.T @ values) ** 2))
+    chance = float((np.sum(both**2, axis=1) - np.sum(held**2, axis=1)) @ variance.ravel())
+    whole = float(values @ values) - float(turned.noise.sum())
+    return float(np.clip((own - chance) / max(whole, 1e-300), 0.0, 1.0))
 
 
 def _amplitudes(family: Family, fit: _Fit, skip: int) -> tuple[tuple[str, float, float, str], ...]:

@@ -72,9 +72,9 @@ def by_angle_um(run: RunDifference) -> NDArray[np.float64]:
 
 
 def best_of_each(organised: Sequence[Organised]) -> list[Organised]:
-    """Best form of every variable: one strut of six, or all of them."""
+    """Best form of every variable, one strut of six or all of them; those beyond chance first."""
     best: dict[str, Organised] = {}
-    for one in organised:
+    for one in sorted(organised, key=lambda one: (one.probability >= SIGNIFICANT, one.worth)):
         best.setdefault(one.variable, one)
     return list(best.values())
 
@@ -148,6 +148,7 @@ def _organised(one: Organised) -> dict[str, Any]:
         "variable": one.variable,
         "strut": one.strut,
         "share": one.share,
+        "share_of_um2": one.plain_share,
         "freedom": one.columns,
         "probability": one.probability,
         "beyond_chance": one.probability < SIGNIFICANT,

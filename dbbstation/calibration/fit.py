@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.calibration.currents import current_blocks, current_channel, current_start
 from dbbstation.calibration.directions import in_words
 from dbbstation.calibration.layout import Layout, lay_out
+from dbbstation.calibration.motor_findings import MotorFindings, motor_findings
 from dbbstation.calibration.nodes import Nodes, nodes_of, smooth
 from dbbstation.calibration.prescription import Name, names_of, prescribed
 from dbbstation.errors import CalibrationError
@@ -64,11 +66,13 @@ class Calibration:
         observations: the runs that went in.
         machine_residual_mm: per run, what the machine's own sources leave [mm].
         residual_mm: per run, what is left after the measurement's effects too [mm].
-        blocks: what the runs say of the columns, about the values found.
+        blocks: what the runs say of the columns, about the values found: one for the circle of each run, then those of
+            motor currents.
         directions_lost: what the recordings could not see, in words.
         directions_regularised: what they could not see and the machine file's tolerances stand in for, in words.
         prescribed: parameters that were held at nominal in place of the lost directions; empty where the directions
             themselves were.
+        currents: what the motor currents say; None where the fit does without them.
     """
 
     layout: Layout
@@ -82,11 +86,17 @@ class Calibration:
     directions_lost: tuple[str, ...]
     directions_regularised: tuple[str, ...]
     prescribed: tuple[Name, ...]
+    currents: MotorFindings | None = None
 
     @property
     def model(self) -> MachineModel:
         """Machine model with everything that was fitted."""
         return self.layout.model(self.x)
+
+    @property
+    def circle_blocks(self) -> tuple[Block, ...]:
+        """What the circles say of the columns, one block for each run."""
+        return self.blocks[: len(self.observations)]
 
     @property
     def parameters_identified(self) -> int:
@@ -133,10 +143,12 @@ def calibrate(
     layout = lay_out(machine, default_sources() if sources is None else sources, observations)
     if start:
         layout = _near(layout, start)
-    x = _start_values(layout, start or {})
+    channel = current_channel(layout, observations)
+    x = _start_values(layout, {**current_start(layout, channel), **(start or {})})
     noise = Noise(FIRST_NOISE_MM, 1.0)
     runs = looked_at(observations, layout.needs)
     nominal, _ = linearise(layout, runs, x)
+    nominal += current_blocks(layout, channel, x)
     blocks, before, share = nominal, np.zeros_like(x), 1.0
     lost, held = np.zeros((0, 0)), None
     for _ in range(MOST_STEPS):
@@ -156,6 +168,7 @@ def calibrate(
         if change < 1.0:
             break
         blocks, left = linearise(layout, runs, x)
+        blocks += current_blocks(layout, channel, x)
         noise = noise_of(left, solution.freedom_used)
     else:
         raise CalibrationError(
@@ -174,6 +187,7 @@ def calibrate(
         directions_lost=in_words(layout, lost),
         directions_regularised=in_words(layout, unseen(nominal, layout, noise)),
         prescribed=() if prescribe is None else names_of(layout, held),
+        currents=motor_findings(layout, channel, x, solution, blocks, nominal, noise),
     )
 
 
@@ -261,8 +275,7 @@ def _predicted(
     reading = model.bar(motion)
     terms = [term for term in layout.terms if term.acts_on(motion)]
     jacobian = np.hstack(
-        [np.zeros((len(observation.raw), 0))]
-        + [reading.by_source(term.source, layout.machine, x[term.columns]) for term in terms]
+        [np.zeros((len(observation.raw), 0))] + [reading.by_fitted(model, term.fitted(x)) for term in terms]
     )
     return np.concatenate([np.r_[term.columns] for term in terms]), jacobian, reading.length_mm
 
@@ -287,7 +300,7 @@ SMALLEST_NOISE_MM = 1e-7
 
 def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple[NDArray[np.float64], ...]:
     """Measured minus predicted length of every run, shape (n,) each [mm]."""
-    needs = frozenset[Need]().union(*(fitted.source.needs for fitted in model.sources))
+    needs = frozenset[Need]().union(*(f.source.needs for f in model.sources if not f.source.of_currents))
     return _residuals(model, looked_at(observations, needs))
 
 
@@ -331,5 +344,5 @@ def _check_enough(observations: Sequence[Observation]) -> None:
 
 
 def machine_sources(sources: Sequence[ErrorSource]) -> tuple[ErrorSource, ...]:
-    """Those that belong to the machine."""
-    return tuple(source for source in sources if source.belongs_to is Owner.MACHINE)
+    """Those that belong to the machine and show in circles."""
+    return tuple(source for source in sources if source.belongs_to is Owner.MACHINE and not source.of_currents)

@@ -38,8 +38,12 @@ class Term:
     columns: slice
 
     def acts_on(self, motion: Motion) -> bool:
-        """Whether a run takes its values from this set."""
-        return self.source.shared_by(motion) == self.shared
+        """Whether a run's reading takes its values from this set."""
+        return self.source.shared_by(motion) == self.shared and not self.source.of_currents
+
+    def fitted(self, x: NDArray[np.float64]) -> Fitted:
+        """Return the source with its values among those of all columns, shape (k,)."""
+        return Fitted(self.source, x[self.columns], self.shared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +75,14 @@ class Layout:
 
     @property
     def needs(self) -> frozenset[Need]:
-        """What all sources together must be given."""
-        return frozenset[Need]().union(*(term.source.needs for term in self.terms))
+        """What all sources of the bar's reading together must be given."""
+        return frozenset[Need]().union(*(term.source.needs for term in self.terms if not term.source.of_currents))
 
     def model(self, x: NDArray[np.float64]) -> MachineModel:
         """Machine model with the values of all columns, shape (k,)."""
         return MachineModel(
             self.machine,
-            tuple(Fitted(term.source, x[term.columns], term.shared) for term in self.terms),
+            tuple(term.fitted(x) for term in self.terms),
         )
 
 
@@ -98,7 +102,8 @@ def lay_out(machine: Machine, sources: Sequence[ErrorSource], observations: Sequ
     motions = [observation.motion() for observation in observations]
     for source in sources:
         parameters = source.parameters(machine)
-        for shared, motion in {source.shared_by(motion): motion for motion in motions}.items():
+        given = [motion for motion in motions if not source.of_currents or motion.motor_current_a is not None]
+        for shared, motion in {source.shared_by(motion): motion for motion in given or motions}.items():
             source.require(motion)
             stated = source.stated_mm(motion)
             if stated is not None and not np.any(stated > 0.0):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.calibration.currents_summary import currents_summary
 from dbbstation.calibration.evaluation import Evaluation, RunFigures, rms_um
 from dbbstation.calibration.noise_level import fine_noise_mm
 from dbbstation.calibration.scatter import check_scatter, seats_of
@@ -55,6 +56,7 @@ def calibration_summary(
         "measurement_effects": [
             _term(calibration, term) for term in calibration.layout.terms if not _is_machines(term)
         ],
+        **currents_summary(calibration),
     }
 
 

@@ -59,9 +59,12 @@ class Correlation:
     value: float
 
 
+ROUNDING = 1e-12
+
+
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """What the runs see of the machine's parameters.
+    """What the circles see of the machine's parameters.
 
     Attributes:
         singular: of the readings' sensitivity to parameters in units of their usual size, falling, without those
@@ -90,7 +93,7 @@ def visibility(calibration: Calibration) -> Visibility:
     place = np.full(len(known.random), -1)
     place[fitted] = np.arange(len(fitted))
     rows = [np.zeros((0, len(fitted)))]
-    for block in calibration.blocks:
+    for block in calibration.circle_blocks:
         own = place[block.columns] >= 0
         wide = np.zeros((len(block.target), len(fitted)))
         wide[:, place[block.columns[own]]] = block.triangle[:, own]
@@ -98,7 +101,8 @@ def visibility(calibration: Calibration) -> Visibility:
     whole = np.vstack(rows)
     free = _without(calibration.solution.held, len(fitted))
     singular = np.asarray(np.linalg.svd(whole @ free.T, compute_uv=False), dtype=np.float64)
-    readings = sum(block.count for block in calibration.blocks)
+    singular = singular[singular > ROUNDING * singular[0]]  # circles see nothing of what moves currents only
+    readings = sum(block.count for block in calibration.circle_blocks)
     return Visibility(
         singular=singular,
         condition=float(singular[0] / singular[-1]),
@@ -159,7 +163,7 @@ def _leverage(calibration: Calibration, fitted: NDArray[np.int64]) -> dict[str, 
     """
     known, noise = calibration.layout.known, calibration.noise.effective
     tests: dict[str, list[Block]] = {}
-    for observation, block in zip(calibration.observations, calibration.blocks, strict=True):
+    for observation, block in zip(calibration.observations, calibration.circle_blocks, strict=True):
         tests.setdefault(observation.test, []).append(block)
     touched = {test: np.unique(np.concatenate([block.columns for block in blocks])) for test, blocks in tests.items()}
     times = np.bincount(np.concatenate(list(touched.values())), minlength=len(known.random))

@@ -58,6 +58,10 @@ def calibrate(
       dbbstation calibrate 2026-11-20-hexapod-7 --out model.yaml
       dbbstation calibrate monday tuesday --exclude h --json
       dbbstation calibrate standard-test --method conv-a
+      dbbstation calibrate monday --sources strut-reference-length,base-joints,gravity,cog-shift,drive-friction
+
+    With drive-friction among the sources, recorded motor currents count as well: gains and friction of the drives, and
+    with cog-shift the centre of gravity.
     """
     from dbbstation.calibration.evaluation import evaluate
     from dbbstation.calibration.fit import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
@@ -78,7 +82,7 @@ def calibrate(
     fitted = sources_named(dict.fromkeys(chosen + MEASUREMENT_SOURCES))
     if not machine_sources(fitted):
         raise ModelError(
-            "none of the error sources named belongs to the machine: there is nothing to calibrate",
+            "none of the error sources named belongs to the machine and shows in circles: there is nothing to calibrate",
             remedy=f"name one such as {KINEMATIC_SOURCES[0]}, or leave --sources out",
         )
     recorded = load_sessions(sessions, exclude)
@@ -104,6 +108,12 @@ def calibrate(
 MORE_THAN_NOISE = 1.2
 """Residual over noise above which something smooth must be left."""
 
+IN_A_TABLE_OF_THEIR_OWN = frozenset({"drive-friction"})
+"""Sources with a row for each motor in place of one for each parameter."""
+
+IN_MM = frozenset({"cog-shift"})
+"""Sources whose lengths are no deviations of the tool."""
+
 ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost"})
 """Parts of the summary that the model file holds in places of their own."""
 
@@ -118,18 +128,11 @@ def _prescribed(names: str | None, method: str) -> list[tuple[str, str]] | None:
 
 def _print(summary: Mapping[str, Any]) -> None:
     from dbbstation.cli.figures import print_runs
-    from dbbstation.cli.output import print_table
+    from dbbstation.cli.motors import print_currents
 
     print_runs(summary)
     click.echo()
-    rows = []
-    for source in summary["sources"]:
-        for name, number in source["parameters"].items():
-            value, uncertainty, unit = number["value"], number["uncertainty"], number["unit"]
-            if unit == "mm":
-                value, uncertainty, unit = 1e3 * value, 1e3 * uncertainty, "µm"
-            rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), value, "±", uncertainty, unit])
-    print_table(["source", "parameter", "value", "", "std", "unit"], rows)
+    _print_parameters(summary)
     click.echo()
     click.echo(f"{summary['parameters_identified']} parameters identified")
     held = "" if summary["parameters_prescribed"] else ", held at nominal"
@@ -147,8 +150,24 @@ def _print(summary: Mapping[str, Any]) -> None:
     click.echo(f"model leaves             {summary['residual_rms_um']:8.2f} µm rms")
     click.echo(f"... within each mounting {summary['residual_within_mounting_rms_um']:8.2f} µm rms")
     click.echo(f"noise of one reading     {summary['noise_um']:8.2f} µm")
+    print_currents(summary)
     if summary["residual_within_mounting_rms_um"] > MORE_THAN_NOISE * summary["noise_um"]:
         click.echo("more is left than noise: `dbbstation diagnose` says which physics may be missing")
+
+
+def _print_parameters(summary: Mapping[str, Any]) -> None:
+    from dbbstation.cli.output import print_table
+
+    rows = []
+    for source in summary["sources"]:
+        if source["name"] in IN_A_TABLE_OF_THEIR_OWN:
+            continue
+        for name, number in source["parameters"].items():
+            value, uncertainty, unit = number["value"], number["uncertainty"], number["unit"]
+            if unit == "mm" and source["name"] not in IN_MM:
+                value, uncertainty, unit = 1e3 * value, 1e3 * uncertainty, "µm"
+            rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), value, "±", uncertainty, unit])
+    print_table(["source", "parameter", "value", "", "std", "unit"], rows)
 
 
 def _print_scatter(check: Mapping[str, Any]) -> None:

@@ -127,6 +127,9 @@ def usable_sources(
                 source.require(motion)
         except ModelError as error:
             lacking[source.name] = error.what
+            continue
+        if source.of_currents:
+            lacking[source.name] = f"{source.name} shows in motor currents only: fit it with `calibrate --sources`"
         else:
             usable.append(source)
     return usable, lacking

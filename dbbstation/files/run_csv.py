@@ -175,7 +175,8 @@ def _check_values(lines: Lines, numbers: dict[str, NDArray[np.float64]], faults:
 
 
 def _recording(lines: Lines, numbers: dict[str, NDArray[np.float64]]) -> Recording:
-    currents = [numbers[name] for name in columns.CURRENTS if name in numbers]
+    none = np.full(len(numbers[columns.TIME]), np.nan)
+    currents = [numbers.get(name, none) for name in columns.CURRENTS]
     usable = None
     if columns.STATUS in lines.columns:
         said = lines.texts(columns.STATUS)
@@ -186,7 +187,7 @@ def _recording(lines: Lines, numbers: dict[str, NDArray[np.float64]]) -> Recordi
         length_mm=numbers[columns.LENGTH],
         theta_deg=numbers.get(columns.THETA),
         temperature_degc={sensor: numbers[name] for name, sensor in columns.TEMPERATURES.items() if name in numbers},
-        motor_current_a=np.column_stack(currents) if len(currents) == len(columns.CURRENTS) else None,
+        motor_current_a=np.column_stack(currents) if any(name in numbers for name in columns.CURRENTS) else None,
         usable=usable,
     )
 

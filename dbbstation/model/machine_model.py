@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,8 @@ from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, Fitted, Motion, Need, Owner
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Hexapod, Machine
@@ -44,17 +47,43 @@ class MachineModel:
         return replace(self, sources=tuple(f for f in self.sources if f.source.belongs_to is Owner.MACHINE))
 
     def effect(self, motion: Motion) -> Effect:
-        """All sources together.
+        """All sources together, but for those of motor currents, which change nothing else.
 
         Raises:
             ModelError: a source needs what the motion does not give.
         """
         total = Effect()
-        for fitted in self.sources:
-            if fitted.shared == fitted.source.shared_by(motion):
-                fitted.source.require(motion)
-                total += fitted.source.effect(motion, self.machine, fitted.values)
+        for fitted in self.acting(motion):
+            fitted.source.require(motion)
+            total += fitted.source.effect(motion, self.as_found, fitted.values)
         return total
+
+    def acting(self, motion: Motion) -> tuple[Fitted, ...]:
+        """Sources that move the machine or the reading along a motion."""
+        return tuple(f for f in self.sources if f.shared == f.source.shared_by(motion) and not f.source.of_currents)
+
+    @cached_property
+    def as_found(self) -> Machine:
+        """The machine file with the compliance that a source found in place of its own: struts have one compliance."""
+        found = [f.source.found_compliance(self.machine, f.values) for f in self.sources]
+        return next((replace(self.machine, compliance=one) for one in found if one is not None), self.machine)
+
+    def derivative(self, motion: Motion, fitted: Fitted) -> Effect:
+        """Derivative of `effect` by the parameters of one of the sources, shape (..., p).
+
+        Where that is the struts' compliance, the stretch that other sources count with it is in proportion to it.
+
+        Raises:
+            ModelError: the source needs what the motion does not give.
+        """
+        own = fitted.source.derivative(motion, self.as_found, fitted.values)
+        if fitted.source.found_compliance(self.machine, fitted.values) is None:
+            return own
+        stretch = Effect()
+        for other in self.acting(motion):
+            if other.source.loads_struts and other.values.any():
+                stretch += other.source.effect(motion, self.as_found, other.values)
+        return own if stretch.strut_mm is None else own + Effect(strut_mm=stretch.strut_mm[:, :, None] / fitted.values)
 
     def driven_mm(self, frames: Frames) -> NDArray[np.float64]:
         """Strut lengths that the controller drives to for commanded poses, shape (n, 6) [mm]."""
@@ -145,10 +174,17 @@ class BarReading:
 
     def by_source(self, source: ErrorSource, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivative of the reading by a source's parameters about their values, shape (p,): shape (n, p)."""
-        total = self.by_parameters(source.derivative(self.motion, machine, values))
+        return self._by(lambda motion: source.derivative(motion, machine, values))
+
+    def by_fitted(self, model: MachineModel, fitted: Fitted) -> NDArray[np.float64]:
+        """Derivative by the parameters of a source of a model, with what it changes through others, shape (n, p)."""
+        return self._by(lambda motion: model.derivative(motion, fitted))
+
+    def _by(self, derivative: Callable[[Motion], Effect]) -> NDArray[np.float64]:
+        total = self.by_parameters(derivative(self.motion))
         if self.motion.put_up is None:
             return total
-        then = source.derivative(self.motion.put_up, machine, values)
+        then = derivative(self.motion.put_up)
         last = slice(len(self.motion.put_up) - 1, None)
         moved = [np.broadcast_to(by_parameters(then, r, last), (1, total.shape[1])) for r in self.ball_response]
         return total - self.sensitivity.direction[self.motion.kept] @ np.vstack(moved)

@@ -8,9 +8,9 @@ import numpy as np
 
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
-from dbbstation.machine.statics import base_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
+from dbbstation.machine.statics import base_loads
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
-from dbbstation.sources.weights import MM_PER_N, platform_masses
+from dbbstation.sources.weights import MM_PER_N, platform_masses, stated_tensions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -57,12 +57,8 @@ class BaseCompliance(LinearSource):
             ModelError: the machine file has no masses.
             KinematicsError: a pose where the struts cannot hold the platform.
         """
-        masses = platform_masses(self.name, machine)
         frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
         struts = inverse(machine.hexapod, frames)
-        load = platform_weight(frames, masses)
-        if machine.strut_masses is not None:
-            load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))
-        force = base_loads(struts, strut_tensions(struts, load), machine.strut_masses)
+        force = base_loads(struts, stated_tensions(self.name, machine, frames, struts), machine.strut_masses)
         horizontal, vertical = np.diag([1.0, 1.0, 0.0]), np.diag([0.0, 0.0, 1.0])
         return Effect(base_joint_mm=MM_PER_N * np.stack([force @ horizontal, force @ vertical], axis=-1))

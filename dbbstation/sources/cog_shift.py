@@ -22,12 +22,13 @@ class CogShift(LinearSource):
     """The platform's weight acts beside the point that the machine file states: a moment d x W more [GRAV 3.2].
 
     The shift d is fixed in the platform's frame. [GRAV] has its part along the axis alone and finds it from motor
-    currents, which show the moment itself; circles show it multiplied by the struts' compliance, for which the
-    machine file's value stands here.
+    currents, which show the moment itself; circles show it multiplied by the struts' compliance: the one that the
+    source gravity of the same model has, else the machine file's.
     """
 
     name = "cog-shift"
     belongs_to = Owner.MACHINE
+    loads_struts = True
     texts = Texts(
         what="The platform's centre of gravity is not where the machine file has it: another spindle, tool, hose or "
         "motor than the drawing's.",
@@ -64,9 +65,10 @@ class CogShift(LinearSource):
         weight = platform_masses(self.name, machine).platform_kg * GRAVITY_M_S2 * DOWN
         frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
         struts = inverse(machine.hexapod, frames)
-        by_axis = []
+        stretch, tensions = [], []
         for axis in range(3):
             moment = np.cross(frames.rotation[:, :, axis], weight)
             tension = strut_tensions(struts, Load(np.zeros_like(moment), moment))
-            by_axis.append(stretch_mm(struts, strut_compliance(machine), tension))
-        return Effect(strut_mm=np.stack(by_axis, axis=-1))
+            stretch.append(stretch_mm(struts, strut_compliance(machine), tension))
+            tensions.append(tension)
+        return Effect(strut_mm=np.stack(stretch, axis=-1), load_n=np.stack(tensions, axis=-1))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.machine.geometry import Machine
+    from dbbstation.machine.geometry import Compliance, Machine
     from dbbstation.plan.plan import Plate
 
 
@@ -110,7 +110,10 @@ class Motion:
         time_s: since the session's first sample, shape (n,) [s]; None where unknown.
         temperature_degc: logged temperatures by column name without its unit (`bar`, `jig`, `machine`,
             `strut1` ...), each of shape (n,) [degC].
-        motor_current_a: logged motor currents, shape (n, 6) [A]; None where not logged.
+        motor_current_a: logged motor currents, shape (n, 6) [A], NaN for a motor that was not logged; None where
+            none was.
+        load_n: axial forces that the motors hold, positive where the platform pulls, shape (n, 6) [N]; None: those of
+            the machine file's weights at the commanded poses.
         setup: None for poses that nobody measured.
         reading_mm: what the bar showed, shape (n,) [mm]: the place of its encoder, for errors of that encoder alone;
             None where nothing was measured.
@@ -124,6 +127,7 @@ class Motion:
     time_s: NDArray[np.float64] | None = None
     temperature_degc: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     motor_current_a: NDArray[np.float64] | None = None
+    load_n: NDArray[np.float64] | None = None
     setup: Setup | None = None
     reading_mm: NDArray[np.float64] | None = None
     put_up: Motion | None = None
@@ -197,6 +201,8 @@ class Effect:
         tool_tip_mm: shift of tool tip and tool ball against the platform, platform frame, (3,) or (n, 3) [mm].
         fixed_ball_mm: actual minus known centre of the fixed ball, machine frame, (3,) or (n, 3) [mm].
         reading_mm: added to the bar's reading, shape () or (n,) [mm].
+        load_n: added to the axial forces that the motors hold, positive where the platform pulls, shape (6,) or
+            (n, 6) [N].
         current_a: added to the motor currents, shape (6,) or (n, 6) [A].
     """
 
@@ -206,6 +212,7 @@ class Effect:
     tool_tip_mm: NDArray[np.float64] | None = None
     fixed_ball_mm: NDArray[np.float64] | None = None
     reading_mm: NDArray[np.float64] | None = None
+    load_n: NDArray[np.float64] | None = None
     current_a: NDArray[np.float64] | None = None
 
     def __add__(self, other: Effect) -> Effect:
@@ -237,6 +244,10 @@ class ErrorSource(ABC):
     needs: ClassVar[frozenset[Need]] = frozenset({Need.POSE})
     varies_with: ClassVar[str] = ""
     """Variable that organises its misfit, as printed beside a place; empty where there is no single one."""
+    loads_struts: ClassVar[bool] = False
+    """True for a weight: it has a `load_n`, and its `strut_mm` is counted with the compliance of the machine given."""
+    weighs_struts: ClassVar[bool] = False
+    """True where its `load_n` is that of the strut weights, which the machine file may state as well."""
     texts: ClassVar[Texts]
 
     @abstractmethod
@@ -268,6 +279,24 @@ class ErrorSource(ABC):
 
         A stated size makes the set a random effect of the fit.
         """
+        return None
+
+    @property
+    def of_currents(self) -> bool:
+        """Whether it says what currents the motors draw, and changes nothing else."""
+        return Need.CURRENT in self.needs
+
+    def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:  # noqa: ARG002
+        """Return the compliance of the struts that these values say; None for a source that says nothing of it."""
+        return None
+
+    def current_per_load(
+        self,
+        motion: Motion,  # noqa: ARG002
+        machine: Machine,  # noqa: ARG002
+        values: NDArray[np.float64],  # noqa: ARG002
+    ) -> NDArray[np.float64] | None:
+        """Derivative of `current_a` by the load of that motor, shape (n, 6) [A/N]; None: no current hangs on a load."""
         return None
 
     def require(self, motion: Motion) -> None:

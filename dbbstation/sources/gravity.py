@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dbbstation.machine.geometry import Machine
+    from dbbstation.machine.geometry import Compliance, Machine
 
 
 class Gravity(LinearSource):
@@ -69,3 +69,9 @@ class Gravity(LinearSource):
         tension = strut_tensions(struts, platform_weight(frames, masses))
         unit = replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N)
         return Effect(strut_mm=stretch_mm(struts, unit, tension)[:, :, None])
+
+    def found_compliance(self, machine: Machine, values: NDArray[np.float64]) -> Compliance | None:
+        """Return the fitted compliance; none while it is zero, where a fit begins."""
+        if values[0] == 0.0:
+            return None
+        return replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N * float(values[0]))

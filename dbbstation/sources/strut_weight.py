@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.machine.geometry import StrutMasses
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
-from dbbstation.machine.statics import stretch_mm, strut_tensions, transverse_load, transverse_pull
+from dbbstation.machine.statics import motor_loads, stretch_mm, strut_tensions, transverse_load, transverse_pull
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.weights import for_such_struts, strut_compliance
 
@@ -28,12 +28,15 @@ class StrutWeight(LinearSource):
 
     A strut's weight is carried by both its joints; what the platform carries of it changes the forces in all six
     struts. The weights of strut, motor and screw are parameters, all six struts alike; the lengths that say where
-    they act stand in the machine file, and a part whose length is not known there is not asked for. Proportional to
-    the struts' compliance, for which the machine file's value stands here.
+    they act stand in the machine file, and a part whose length is not known there is not asked for. The stretch is
+    proportional to the struts' compliance: the one that the source gravity of the same model has, else the machine
+    file's. The motors hold what moves with the strut as well.
     """
 
     name = "strut-weight"
     belongs_to = Owner.MACHINE
+    loads_struts = True
+    weighs_struts = True
     texts = Texts(
         what="Struts, screws and motors weigh something themselves: they load the platform and stretch under their own "
         "weight.",
@@ -76,13 +79,14 @@ class StrutWeight(LinearSource):
         frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
         struts = inverse(machine.hexapod, frames)
         lengths = replace(machine.strut_masses or USUAL, strut_kg=0.0, motor_kg=0.0, screw_kg=0.0)
-        by_part = []
+        stretch, loads = [], []
         for part in _parts(machine):
             kilogram = replace(lengths, **{f"{part}_kg": 1.0})
             load = transverse_load(struts, transverse_pull(struts, kilogram))
             tension = strut_tensions(struts, load)
-            by_part.append(stretch_mm(struts, strut_compliance(machine), tension, kilogram))
-        return Effect(strut_mm=np.stack(by_part, axis=-1))
+            stretch.append(stretch_mm(struts, strut_compliance(machine), tension, kilogram))
+            loads.append(motor_loads(struts, tension, kilogram))
+        return Effect(strut_mm=np.stack(stretch, axis=-1), load_n=np.stack(loads, axis=-1))
 
 
 def _parts(machine: Machine) -> tuple[str, ...]:

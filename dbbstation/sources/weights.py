@@ -6,9 +6,16 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import Compliance
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
 
 if TYPE_CHECKING:
-    from dbbstation.machine.geometry import Machine, Masses
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Hexapod, Machine, Masses
+    from dbbstation.machine.kinematics import Struts
+    from dbbstation.machine.rotation import Frames
 
 MM_PER_N = 1e-6
 """One µm/kN in mm/N."""
@@ -23,8 +30,9 @@ def strut_compliance(machine: Machine) -> Compliance:
 
 
 def for_such_struts(machine: Machine) -> str:
-    """Say which compliance a parameter was counted with that circles show only multiplied by it."""
-    return f"counted with struts of {strut_compliance(machine).at_1000mm_mm_per_n / MM_PER_N:.3g} µm/kN at 1000 mm"
+    """Say which compliance a parameter is counted with that circles show only multiplied by it."""
+    usual = f"{strut_compliance(machine).at_1000mm_mm_per_n / MM_PER_N:.3g} µm/kN at 1000 mm"
+    return f"counted with the compliance of gravity, or {usual} without it"
 
 
 def platform_masses(source: str, machine: Machine) -> Masses:
@@ -41,3 +49,39 @@ def platform_masses(source: str, machine: Machine) -> Masses:
             "or leave this source out",
         )
     return machine.masses
+
+
+def stated_tensions(source: str, machine: Machine, frames: Frames, struts: Struts) -> NDArray[np.float64]:
+    """Tensions of the struts under the weights that the machine file states, at platform joints, shape (n, 6) [N].
+
+    Args:
+        source: who asks, for the message.
+        machine: with masses, and with strut masses where these count.
+        frames: of the platform.
+        struts: at these frames.
+
+    Raises:
+        ModelError: the machine file has no masses.
+        KinematicsError: a pose where the struts cannot hold the platform.
+    """
+    load = platform_weight(frames, platform_masses(source, machine))
+    if machine.strut_masses is not None:
+        load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))
+    return strut_tensions(struts, load)
+
+
+def stated_loads(source: str, machine: Machine, frames: Frames, hexapod: Hexapod) -> NDArray[np.float64]:
+    """What the motors hold under the weights that the machine file states, shape (n, 6) [N].
+
+    Args:
+        source: who asks, for the message.
+        machine: with masses, and with strut masses where these count.
+        frames: of the platform.
+        hexapod: joints, nominal or actual.
+
+    Raises:
+        ModelError: the machine file has no masses.
+        KinematicsError: a pose where the struts cannot hold the platform.
+    """
+    struts = inverse(hexapod, frames)
+    return motor_loads(struts, stated_tensions(source, machine, frames, struts), machine.strut_masses)

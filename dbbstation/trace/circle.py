@@ -26,7 +26,7 @@ class RawCircle:
         phi_deg: progress along the turn, 0 up to 360 [deg].
         length_mm: distance between the ball centres [mm].
         temperature_degc: by sensor [degC].
-        motor_current_a: shape (n, 6) [A], None where not logged.
+        motor_current_a: shape (n, 6), NaN for a motor that was not logged [A]; None where none was.
     """
 
     name: str

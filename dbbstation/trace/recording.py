@@ -23,7 +23,7 @@ class Recording:
         theta_deg: commanded angle from +X towards +Y [deg]; present where the rows are already cut to the
             circle, None where the circle has to be found in the trace.
         temperature_degc: by sensor (`bar`, `jig`, `machine`, `strut1` ... `strut6`) [degC].
-        motor_current_a: shape (n, 6) [A]; None where not all six were logged.
+        motor_current_a: shape (n, 6), NaN for a motor that was not logged [A]; None where none was.
         usable: False for samples that the instrument itself called bad; they stay in the recording.
     """
 

@@ -60,9 +60,11 @@ def test_every_column() -> None:
     assert recording.usable.tolist() == [False, True]
 
 
-def test_five_of_six_currents_are_no_currents() -> None:
-    names = ",".join(f"motor{i}_current_a" for i in range(1, 6))
-    assert parse(f"t_s,length_mm,{names}\n0,150,1,2,3,4,5\n").recording.motor_current_a is None
+def test_a_motor_that_was_not_logged_leaves_the_others_their_currents() -> None:
+    names = ",".join(f"motor{i}_current_a" for i in (1, 2, 3, 4, 6))
+    current = parse(f"t_s,length_mm,{names}\n0,150,1,2,3,4,6\n").recording.motor_current_a
+    assert np.array_equal(current, [[1, 2, 3, 4, np.nan, 6]], equal_nan=True)
+    assert parse("t_s,length_mm\n0,150\n").recording.motor_current_a is None
 
 
 def test_unknown_columns_are_kept_and_named() -> None:

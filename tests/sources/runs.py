@@ -124,7 +124,15 @@ def random_run(rng, count=300) -> Motion:
     setup = Setup("session", "mounting", "ball", "bar", np.array([10.0, 20.0, -1150.0]), 1e-3, 1e-3, 5e-4, plate=PLATE)
     time_s = np.sort(rng.uniform(0, 5000, count))
     reading = 150.0 + 0.05 * np.sin(6 * np.pi * s[:, 0])
-    return Motion(poses, is_path=True, kept=slice(20, None), time_s=time_s, setup=setup, reading_mm=reading)
+    return Motion(
+        poses,
+        is_path=True,
+        kept=slice(20, None),
+        time_s=time_s,
+        setup=setup,
+        reading_mm=reading,
+        motor_current_a=np.zeros((count, 6)),
+    )
 
 
 def concealed(machine: Machine, runs: list[Motion], derivative) -> tuple[NDArray, NDArray, int]:

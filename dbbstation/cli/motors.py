@@ -1,0 +1,64 @@
+"""The tables of motor currents."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dbbstation.cli.output import print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+NOT_TOLD = "-"
+MA_PER_A = 1e3
+
+
+def print_currents(summary: Mapping[str, Any]) -> None:
+    """Print drives, centre of gravity by channel and notes, where a calibration used motor currents."""
+    currents = summary.get("motor_currents")
+    if currents is None:
+        return
+    click.echo()
+    click.echo(
+        f"motor currents, with the platform's weight of {currents['weight_taken_as_known_n']:.0f} N taken as known"
+    )
+    titles = ["motor", "N/A", "±", "friction N", "±", "per speed N s/mm", "±", "per load N/kN", "±", "asymmetry N", "±"]
+    kinds = (
+        ("force_per_current", 2),
+        ("coulomb_n", 1),
+        ("viscous_ns_mm", 2),
+        ("load_share_n_kn", 1),
+        ("asymmetry_n", 1),
+    )
+    rows = []
+    for motor in currents["motors"]:
+        noise = [NOT_TOLD if motor[k] is None else f"{MA_PER_A * motor[k]:.1f}" for k in ("residual_a", "noise_a")]
+        numbers = [text for kind, digits in kinds for text in _with_uncertainty(motor[kind], digits)]
+        rows.append([motor["motor"], *numbers, *noise])
+    print_table([*titles, "residual mA", "noise mA"], rows)
+    if any(motor["torque_per_current"] is not None for motor in currents["motors"]):
+        torques = ", ".join(_with_uncertainty(motor["torque_per_current"], 4)[0] for motor in currents["motors"])
+        click.echo(f"torque at the screws per current, 1 to 6: {torques} Nm/A")
+    elif any(motor["force_per_current"] is not None for motor in currents["motors"]):
+        click.echo("torques are not told: the machine file has no screw_lead_mm; forces do not need it")
+    if currents["centre_of_gravity"]:
+        click.echo()
+        channels = {"circles": "circles alone", "currents": "currents alone", "both": "both"}
+        titles = [column for title in channels.values() for column in (title, "±")]
+        shifts = [
+            [name.removesuffix("_mm"), *(text for channel in channels for text in _with_uncertainty(by[channel], 3))]
+            for name, by in currents["centre_of_gravity"].items()
+        ]
+        click.echo("centre of gravity, actual minus machine file, platform axes [mm]")
+        print_table(["", *titles], shifts)
+    for note in currents["notes"]:
+        click.echo(f"note: {note}")
+
+
+def _with_uncertainty(number: Mapping[str, Any] | None, digits: int) -> tuple[str, str]:
+    """Return value and uncertainty as text, the uncertainty with two digits."""
+    if number is None:
+        return NOT_TOLD, NOT_TOLD
+    return f"{number['value']:.{digits}f}", f"{number['uncertainty']:.2g}"

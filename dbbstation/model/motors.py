@@ -1,0 +1,91 @@
+"""What the motors of the struts hold along a motion, and which currents they draw for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.contract import Effect, Fitted, Motion
+from dbbstation.sources.weights import stated_loads
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import MachineModel
+
+
+@dataclass(frozen=True, eq=False)
+class MotorCurrents:
+    """Predicted currents of one run.
+
+    Attributes:
+        model: that predicts.
+        driven: the run as commanded, with the loads of the motors.
+        placed: the run at the poses where the machine really is.
+        actual: machine with the joints that it really has.
+        current_a: at the rows that count, shape (n, 6) [A].
+    """
+
+    model: MachineModel
+    driven: Motion
+    placed: Motion
+    actual: Machine
+    current_a: NDArray[np.float64]
+
+    def by_parameters(self, fitted: Fitted) -> NDArray[np.float64] | None:
+        """Derivative of the currents by the parameters of one of the model's sources, shape (n, 6, p); kept rows only.
+
+        None for a source that neither loads the struts nor speaks of currents. That errors of the joints move the
+        platform, and so change the loads by parts in a thousand, is in the prediction and not in its derivative.
+        """
+        kept = self.driven.kept
+        if fitted.source.of_currents:
+            own = fitted.source.derivative(self.driven, self.model.as_found, fitted.values).current_a
+            return None if own is None else own[kept]
+        if not fitted.source.loads_struts:
+            return None
+        by_load = fitted.source.derivative(self.placed, self.actual, fitted.values).load_n
+        if by_load is None:
+            return None
+        total = np.zeros_like(by_load)
+        for drive in drives(self.model):
+            per_load = drive.source.current_per_load(self.driven, self.model.as_found, drive.values)
+            total += 0.0 if per_load is None else per_load[:, :, None] * by_load
+        return total[kept]
+
+
+def motor_currents(model: MachineModel, motion: Motion) -> MotorCurrents:
+    """Predict the currents of a run from the loads at the poses where the machine really is.
+
+    Strut masses of the machine file do not count where a source has the struts' weights as its parameters.
+
+    Raises:
+        KinematicsError: a pose that the actual machine cannot take, or where its struts cannot hold the platform.
+        ModelError: a source needs what the motion does not give; the machine file has no masses.
+    """
+    there = model.actual(motion)
+    actual = replace(model.as_found, hexapod=there.hexapod)
+    placed = replace(motion, poses=there.frames.to_poses(model.machine.hexapod.rotation))
+    weighing = any(f.source.weighs_struts for f in model.sources)
+    stated = replace(actual, strut_masses=None) if weighing else actual
+    total = Effect(
+        load_n=stated_loads("drive-friction", stated, there.frames, there.hexapod),
+        current_a=np.zeros(STRUTS),
+    )
+    for fitted in model.acting(motion):
+        if fitted.source.loads_struts:
+            total += Effect(load_n=fitted.source.effect(placed, actual, fitted.values).load_n)
+    driven = replace(motion, load_n=total.load_n)
+    for drive in drives(model):
+        total += drive.source.effect(driven, model.as_found, drive.values)
+    current = np.broadcast_to(np.asarray(total.current_a), (len(motion), STRUTS))
+    return MotorCurrents(model, driven, placed, actual, current[motion.kept])
+
+
+def drives(model: MachineModel) -> tuple[Fitted, ...]:
+    """Sources of motor currents."""
+    return tuple(f for f in model.sources if f.source.of_currents)

@@ -79,7 +79,7 @@ def _print(summary: Mapping[str, Any]) -> None:
     if summary["mismatch"]:
         click.echo(
             f"Mass and viscous friction leave {summary['misfit_rms_n']:.3g} N rms beyond noise "
-            f"(probability by chance {summary['probability']:.1g})."
+            f"(probability by chance {max(summary['probability'], 1e-99):.1g})."
         )
     else:
         click.echo(f"Mass and viscous friction are enough (probability {summary['probability']:.2g}).")
@@ -132,4 +132,4 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _number(number: Mapping[str, Any]) -> str:
-    return f"{number['value']:.4g} ± {number['uncertainty']:.2g} {number['unit']}"
+    return f"{number['value']:#.4g} ± {number['uncertainty']:.2g} {number['unit']}"

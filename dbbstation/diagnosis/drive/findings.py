@@ -137,7 +137,7 @@ class DriveDiagnosis:
         before: parameters of the base model.
         after: of the last model, base parameters first.
         friction: Coulomb and viscous friction per direction, `forwards` and `backwards`; empty where not identifiable.
-        chosen: causes in the last model, in the order in which they were found.
+        chosen: causes in the last model, those first that explain most beside the others.
         base_n: force of the base model at the samples compared, shape (m,) [N].
         model_n: of the last model [N].
         held_back_s: start and end of the stretch that was held back [s].

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.design import BASE, design_of
-from dbbstation.diagnosis.drive.findings import Curve, DriveDiagnosis, DriveFinding, Number, Step
+from dbbstation.diagnosis.drive.findings import Curve, DriveDiagnosis, DriveFinding, Number, Rest, Step
 from dbbstation.diagnosis.drive.fit import DriveFit, Term, base_values, fit, term_of, with_method
 from dbbstation.diagnosis.drive.judge import SIGNIFICANT, by_chance, doubtful, judge, overruled, rest_of
 from dbbstation.diagnosis.drive.limits import Limits, limits_of, mass_is_known, told
@@ -16,7 +16,7 @@ from dbbstation.diagnosis.drive.locate import locate
 from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.diagnosis.findings import Value, Verdict
 from dbbstation.errors import CalibrationError
-from dbbstation.inference.race import Choice, Race, select
+from dbbstation.inference.race import Choice, Race, select, worth_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -80,16 +80,22 @@ def identify(
     withdrawn = overruled(race, unnamed, chosen)
     if withdrawn:
         chosen = [choice for choice in chosen if choice.candidate.name not in withdrawn]
-        after = fit(design, [term_of(design, c.candidate, c.variant) for c in chosen]) if chosen else before
+        after = _joint(design, chosen, before)
         findings = judge(design, race, chosen, after)
         findings = tuple(_withdrawn(f) if f.name in withdrawn else f for f in findings)
     rest = rest_of(design, after)
+    suspects = doubtful(race, unnamed, chosen, rest)
+    if suspects:
+        # What may only make up for another law must not pull the values of what stands.
+        findings = tuple(_doubted(f, rest.variable or "") if f.name in suspects else f for f in findings)
+        chosen = [choice for choice in chosen if choice.candidate.name not in suspects]
+        after = _joint(design, chosen, before)
+        rest = rest_of(design, after)
+    findings = tuple(_with_caution(design, finding, rest) for finding in findings)
     progress("half the band")
     narrow = _in_half_the_band(recording, design)
     before, after = (with_method(one, None if narrow is None else fit(narrow, one.terms)) for one in (before, after))
     findings = tuple(_as_fitted(finding, after) for finding in findings)
-    suspects = doubtful(race, unnamed, chosen, rest)
-    findings = tuple(_doubted(f, rest.variable or "") if f.name in suspects else f for f in findings)
     probability, misfit_n = by_chance(design, before.square, before.columns.shape[1])
     held_back = signals.t_s[signals.kept] > np.quantile(signals.t_s[signals.kept], 1.0 - HELD_BACK)
     mismatch = probability < SIGNIFICANT or bool(chosen)
@@ -133,18 +139,28 @@ def _refuse_wrong_sign(before: DriveFit, name: str) -> None:
 
 
 def _chosen(design: Design, race: Race, named: Sequence[Candidate], before: DriveFit) -> tuple[list[Choice], DriveFit]:
-    """Select causes, fit them exactly, and drop those that do not stand out of their uncertainty, or cannot be."""
+    """Select causes, fit them exactly, drop those that do not stand out of their uncertainty, or cannot be.
+
+    What explains most beside the others comes first.
+    """
     dropped: set[str] = set()
     while True:
         chosen = select(race, [c for c in named if c.name not in dropped], THRESHOLD, MOST_SOURCES)
         if not chosen:
             return [], before
-        after = fit(design, [term_of(design, choice.candidate, choice.variant) for choice in chosen])
+        worth = [worth_of(race, chosen, one) for one in chosen]
+        chosen = [chosen[k] for k in np.argsort(worth)[::-1]]
+        after = _joint(design, chosen, before)
         out = {term.name: _stands_out(design, after, term) for term in after.terms}
         weakest = min(out, key=out.__getitem__)
         if out[weakest] > STANDS_OUT_SIGMA:
             return chosen, after
         dropped.add(weakest)
+
+
+def _joint(design: Design, chosen: Sequence[Choice], before: DriveFit) -> DriveFit:
+    """Base and chosen causes fitted together, exactly."""
+    return fit(design, [term_of(design, c.candidate, c.variant) for c in chosen]) if chosen else before
 
 
 def _stands_out(design: Design, fitted: DriveFit, term: Term) -> float:
@@ -175,8 +191,15 @@ def _withdrawn(finding: DriveFinding) -> DriveFinding:
     return replace(finding, verdict=Verdict.RULED_OUT, ambiguous_with=(), text=text)
 
 
+def _with_caution(design: Design, finding: DriveFinding, rest: Rest) -> DriveFinding:
+    """Say of a name that stands where what is left follows the same variable."""
+    if finding.verdict is not Verdict.IDENTIFIED or design.sources[finding.name].varies_with != rest.variable:
+        return finding
+    return replace(finding, text=f"{finding.text} What is left follows {rest.variable} too: its law is not quite this.")
+
+
 def _doubted(finding: DriveFinding, variable: str) -> DriveFinding:
-    text = f"What is left without a name follows {variable} and is of its size: it may only make up for another law."
+    text = f"What is left without a name follows {variable} and is of its size: it may only make up for another law, and is not in the model."
     return replace(finding, verdict=Verdict.AMBIGUOUS, text=text)
 
 

@@ -96,6 +96,7 @@ def test_a_misfit_is_stated_before_and_after_with_its_places():
         (Truth(coulomb=20.0, load=lambda _t, x, _v: 3.0 * cos(2 * pi * x / 0.005)), "cogging", {"period_mm": 5.0, "cosine_n": 3.0}),
         (Truth(coulomb=20.0, sliding=lambda _t, x, _v, _d: 50.0 * (x - 0.1)), "position-friction", {"slope_n": 5.0}),
         (Truth(coulomb=20.0, sliding=lambda _t, _x, v, _d: 8.0 * exp(-abs(v) / 0.006)), "stribeck-friction", {"static_excess_n": 8.0, "stribeck_speed_m_s": 0.006}),
+        (Truth(coulomb=20.0, sliding=lambda _t, _x, v, _d: 800.0 * v * v), "power-law-friction", {"power": 2.0}),
         (Truth(coulomb=20.0, sliding=lambda _t, _x, _v, d: -40.0 * exp(-d / 0.0006)), "presliding", {"presliding_n": 20.0, "length_mm": 0.6}),
         (Truth(coulomb=20.0, sliding=lambda t, _x, _v, _d: -6.0 * (1 - exp(-t / 7.0))), "friction-drift", {"coulomb_change_n": -6.0 * (1 - exp(-24.0 / 7.0)), "time_constant_s": 7.0}),
     ],
@@ -158,6 +159,16 @@ def test_a_name_stands_beside_something_without_one():
     assert verdicts(summary)["coulomb-friction"] == "identified"
     assert holds(value(summary, "coulomb-friction", "coulomb_n"), 20.0)
     assert summary["unexplained"]["variable"] == "time"
+
+
+def test_a_law_that_no_name_has_is_told_beside_the_nearest():
+    """Friction with the root of the speed, which Coulomb and viscous friction imitate to nine tenths."""
+    summary = answered(Truth(sliding=lambda _t, _x, v, _d: 60.0 * abs(v) ** 0.5))
+    assert summary["unexplained"]["significant"]
+    assert summary["unexplained"]["variable"] == "speed"
+    assert {name for name, verdict in verdicts(summary).items() if verdict == "identified"} == {"coulomb-friction"}
+    text = next(s["text"] for s in summary["sources"] if s["name"] == "coulomb-friction")
+    assert text.endswith("What is left follows speed too: its law is not quite this.")
 
 
 def test_intervals_cover_the_truth_about_as_often_as_they_say():

@@ -87,7 +87,7 @@ def test_saturated_samples_are_left_out_and_told():
     assert abs(mass["value"] - 80.0) < 3.0 * mass["uncertainty"]
     # The accelerations are gone with the saturated samples: the mass is hardly known.
     assert mass["uncertainty"] > 3.0
-    with pytest.raises(CalibrationError, match="stuck in .* % of the samples"):
+    with pytest.raises(CalibrationError, match=r"stuck in .* % of the samples"):
         answered(t, position, np.clip(force, -20.0, 20.0))
 
 

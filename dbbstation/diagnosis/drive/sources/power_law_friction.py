@@ -1,0 +1,54 @@
+"""Cause: friction that grows faster than the speed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.signals import Signals
+
+POWERS = (1.5, 2.0, 3.0)
+"""Powers that are tried. Below 1, a few speeds cannot tell a power from Coulomb with viscous friction: that is left to
+unnamed shapes."""
+
+REACH = 1.2
+
+
+class PowerLawFriction(DriveSource):
+    """Beside the viscous friction that is proportional to speed: F = F_p sign(v) (|v| / v_max)^a."""
+
+    name = "power-law-friction"
+    varies_with = "speed"
+    texts = Texts(
+        what="Friction grows faster than the speed: oil is churned, air or coolant is displaced, a cover flutters.",
+        shows="Force against constant speed bends away from the axis of speed, for both directions alike.",
+        confirm="Travel at five or more constant speeds up to the rapid; plot mean force against speed, cold and warm.",
+        cure="Another lubricant or less of it; open the way for what is displaced; enter the curve as a feed-forward.",
+        equation="F = F_p sign(v) (|v| / v_max)^a, a = 1.5 ... 3, v_max the greatest speed of the recording",
+        origin="Olsson, Åström, Canudas de Wit, Gäfvert and Lischinsky, Friction models and friction compensation, "
+        "European Journal of Control 4 (1998) 176, sec. 2",
+    )
+
+    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+        """One amplitude at several powers."""
+        scale = signals.scale
+        size = Parameter("at_greatest_speed_n", "N", 0.2 * scale.force_n, "friction at the greatest speed")
+        power = Parameter("power", "1", 1.0, "exponent of the speed")
+        top = scale.speed_m_s
+
+        def columns(one: Signals, exponent: float) -> NDArray[np.float64]:
+            return (one.direction * (np.abs(one.speed_m_s) / top) ** exponent)[:, None]
+
+        return tuple(Form((size,), columns, power, value, REACH) for value in POWERS)
+
+    def possible(self, values: Mapping[str, float]) -> bool:
+        """Friction takes energy out, and grows."""
+        return values["at_greatest_speed_n"] > 0.0

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from dbbstation.calibration.evaluation import evaluate
@@ -261,6 +262,26 @@ def test_currents_with_the_other_sign_are_doubted(small):
     _, recorded = small
     calibration = calibrate(recorded.machine, spoilt(recorded, lambda _, current: -current), sources())
     assert sum("is its sign turned round?" in note for note in calibration.currents.notes) == 6
+
+
+def test_noise_that_remembers_counts_for_less(small, fitted, rng):
+    """A first-order process of 0.9 from sample to sample on motor 1: one independent reading in nineteen."""
+    _, recorded = small
+
+    def disturbed(_, current):
+        pushes = rng.standard_normal(len(current)) * 0.1 * np.sqrt(1 - 0.9**2)
+        current[:, 0] += lfilter([1.0], [1.0, -0.9], pushes)
+        return current
+
+    calibration = calibrate(recorded.machine, spoilt(recorded, disturbed), sources())
+    noise = calibration.currents.noise
+    assert noise[0].sigma == pytest.approx(0.1, rel=0.15)
+    # (1 + 0.9) / (1 - 0.9), less the white 20 mA and what is left out about reversals.
+    assert 10.0 < noise[0].correlation_samples < 25.0
+    assert all(other.correlation_samples < 2.0 for other in noise[1:])
+    gain, uncertainty = value(calibration, "motor_1_gain_a_kn")
+    assert abs(gain - 1000.0 / GAIN_N_A[0]) < 5 * uncertainty
+    assert uncertainty > 10 * value(fitted, "motor_1_gain_a_kn")[1]
 
 
 def test_some_runs_without_currents_count_with_their_circles(small):

@@ -76,6 +76,7 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
     if not observations:
         places = ", ".join(str(session.folder) for session in sessions)
         raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
+    observations = _with_shared_balls(observations, sessions)
     hashes = {session.name: session.sha256 for session in sessions}
     return Recorded(sessions[0].machine, tuple(observations), hashes, tuple(warnings))
 
@@ -103,6 +104,19 @@ def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str
         "centre deviations there, and rms values with them, show how it was put up, less what a micrometer read of that"
     )
     return [f"{what}: {shows}, and not how far the machine is off; circularity counts"]
+
+
+def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[SessionFolder]) -> list[Observation]:
+    """Give a ball that two sessions have from one CMM sheet one name, so that it has one error in both of them."""
+    names: dict[tuple[object, ...], str] = {}
+    of = {session.name: session for session in sessions}
+    shared = []
+    for observation in observations:
+        ball = of[observation.setup.session].plan.tests[observation.test].ball
+        sheet = (ball.name, ball.bore, ball.holder, ball.centre_mm, ball.uncertainty_mm)
+        name = names.setdefault(sheet, observation.setup.ball)
+        shared.append(replace(observation, setup=replace(observation.setup, ball=name)))
+    return shared
 
 
 def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:
@@ -136,6 +150,10 @@ def _check_one_machine(sessions: Sequence[SessionFolder]) -> None:
             and a.hexapod.rotation == b.hexapod.rotation
             and np.array_equal(a.reference_length_error_mm, b.reference_length_error_mm)
         )
+        serials = first.serial_number, other.serial_number
+        if all(serials) and serials[0] != serials[1]:
+            what = f"it is of machine {serials[1]}, {first.folder} of machine {serials[0]}"
+            raise InputError([Problem(str(other.folder), 0, 0, what, "fit the sessions of one machine together")])
         if not same:
             what = f"its nominal machine ({b.name}) is not that of {first.folder} ({a.name})"
             remedy = "fit sessions together only where the control had the same joints and reference lengths"

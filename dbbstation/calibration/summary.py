@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.currents_summary import currents_summary
 from dbbstation.calibration.evaluation import Evaluation, RunFigures, rms_um
+from dbbstation.calibration.gaps import gaps
 from dbbstation.calibration.noise_level import fine_noise_mm
 from dbbstation.calibration.scatter import check_scatter, seats_of
 from dbbstation.calibration.visibility import visibility
@@ -47,6 +48,7 @@ def calibration_summary(
         "noise_correlation_samples": calibration.noise.correlation_samples,
         "parameters_identified": calibration.parameters_identified,
         "directions_lost": list(calibration.directions_lost),
+        "gaps": list(gaps(calibration)),
         "directions_regularised": list(calibration.directions_regularised),
         "parameters_prescribed": [f"{source}.{name}" for source, name in calibration.prescribed],
         "outliers": [_outlier(outlier) for outlier in outliers],

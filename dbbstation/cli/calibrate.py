@@ -114,6 +114,9 @@ IN_A_TABLE_OF_THEIR_OWN = frozenset({"drive-friction"})
 IN_MM = frozenset({"cog-shift"})
 """Sources whose lengths are no deviations of the tool."""
 
+NOT_THIS_MACHINE = 10.0
+"""Residual over noise above which the machine file itself is in doubt."""
+
 ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost"})
 """Parts of the summary that the model file holds in places of their own."""
 
@@ -142,6 +145,8 @@ def _print(summary: Mapping[str, Any]) -> None:
         click.echo(f"held at nominal instead: {', '.join(summary['parameters_prescribed'])}")
     for text in summary["directions_regularised"]:
         click.echo(f"not visible to these tests, known by the machine file's joint tolerance only: {text}")
+    for text in summary["gaps"]:
+        click.echo(f"  {text}")
     for weak in summary["observability"]["weak_directions"][:1]:
         click.echo(f"least visible, to {weak['uncertainty_um']:.1f} µm: {weak['text']}")
     for check in summary["scatter"]:
@@ -153,6 +158,11 @@ def _print(summary: Mapping[str, Any]) -> None:
     print_currents(summary)
     if summary["residual_within_mounting_rms_um"] > MORE_THAN_NOISE * summary["noise_um"]:
         click.echo("more is left than noise: `dbbstation diagnose` says which physics may be missing")
+    if summary["residual_within_mounting_rms_um"] > NOT_THIS_MACHINE * summary["noise_um"]:
+        click.echo(
+            "... much more: check also that the machine file is this machine's, its joints in the order of the struts "
+            "and the rotation convention that of the control"
+        )
 
 
 def _print_parameters(summary: Mapping[str, Any]) -> None:
@@ -179,6 +189,6 @@ def _print_scatter(check: Mapping[str, Any]) -> None:
     fits = (
         "as stated"
         if check["fits"]
-        else "NOT as stated: correct holders and balls in the plan, or look for what scatters them"
+        else "NOT as stated: another plate or CMM sheet, loose holders, or a wrong convention of tilts in the machine file?"
     )
     click.echo(f"{stated} scatter by {check['found_um']:.2f} ({low:.2f} to {high:.2f}) µm, {fits}")

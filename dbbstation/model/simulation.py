@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,8 @@ from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from dbbstation.model.machine_model import MachineModel
@@ -27,15 +29,22 @@ class SimulatedCircle:
         t_s: time since the first sample [s].
         theta_deg: angle from +X towards +Y [deg].
         length_mm: predicted reading [mm].
+        commanded: poses of the lead-in and the turn, shape (m + n, 6) [mm, deg].
     """
 
     t_s: NDArray[np.float64]
     theta_deg: NDArray[np.float64]
     length_mm: NDArray[np.float64]
+    commanded: NDArray[np.float64]
 
 
 def simulate_circle(
-    model: MachineModel, circle: Circle, setup: Setup, samples: int, started_s: float | None = None
+    model: MachineModel,
+    circle: Circle,
+    setup: Setup,
+    samples: int,
+    started_s: float | None = None,
+    command: Callable[[Motion], NDArray[np.float64]] | None = None,
 ) -> SimulatedCircle:
     """Predict the reading along one turn, with the overshoot arc before it as history.
 
@@ -45,6 +54,7 @@ def simulate_circle(
         setup: ball and bar.
         samples: equally spaced over the turn.
         started_s: start of the turn after that of the session [s]; None where the model needs no time.
+        command: from the wanted motion to the poses that are commanded instead, shape (n, 6); the same by default.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
@@ -60,5 +70,7 @@ def simulate_circle(
         time_s=None if started_s is None else started_s + phi / circle.turning_deg_s,
         setup=setup,
     )
+    if command is not None:
+        motion = replace(motion, poses=command(motion))
     theta = np.mod(circle.theta_deg(turn), FULL_TURN_DEG)
-    return SimulatedCircle(turn / circle.turning_deg_s, theta, model.bar(motion).length_mm)
+    return SimulatedCircle(turn / circle.turning_deg_s, theta, model.bar(motion).length_mm, motion.poses)

@@ -17,8 +17,12 @@ from dbbstation.trace.circle import RawCircle
 from dbbstation.virtual.under_spindle import SET_UP_MM, SetUp, put_up
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
     from dbbstation.plan.plan import Plan, PlannedTest
-    from dbbstation.sources.contract import Setup
+    from dbbstation.sources.contract import Motion, Setup
 
 BAR_UNCERTAINTY_MM = 0.0005
 SPACING_S = 200.0
@@ -32,6 +36,7 @@ def draw_session(
     noise_mm: float,
     samples: int = 720,
     micrometer_mm: float | None = None,
+    command: Callable[[Motion], NDArray[np.float64]] | None = None,
 ) -> list[Observation]:
     """Record a plan once on the machine `truth`, every ball put up anew for each test.
 
@@ -46,6 +51,7 @@ def draw_session(
         samples: per turn.
         micrometer_mm: uncertainty of its readings, one standard deviation [mm]: balls that the plan puts up under the
             spindle come with their set-up errors as read; None: nobody measured them.
+        command: from the wanted motion to the poses that are commanded instead, as a compensation does.
     """
     known = known_sources()
     bar = Fitted(known["bar-offset"], rng.normal(0.0, BAR_UNCERTAINTY_MM, 1), "study")
@@ -69,11 +75,12 @@ def draw_session(
         for direction in test.directions:
             circle = test.run(direction)
             started_s = len(observations) * SPACING_S
-            turn = simulate_circle(actual, circle, setup, samples, started_s)
+            turn = simulate_circle(actual, circle, setup, samples, started_s, command)
             length = turn.length_mm + rng.normal(0.0, noise_mm, samples)
             phi = np.linspace(0.0, 360.0, samples, endpoint=False, dtype=np.float64)
             raw = RawCircle(f"{test.name} {direction}", circle, turn.t_s, phi, length)
-            observations.append(Observation(test.name, 1, raw, setup, started_s))
+            poses = None if command is None else turn.commanded
+            observations.append(Observation(test.name, 1, raw, setup, started_s, poses))
     return observations
 
 

@@ -1,0 +1,30 @@
+"""The study of stated intervals, small; its whole size is a command whose last figures stand in docs/measured.md."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbbstation.files.plan_file import read_plan
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.studies.coverage import coverage, wilson
+
+
+@pytest.mark.parametrize(("name", "level"), [("table2-elevated", False), ("table2", True)])
+def test_intervals_hold_the_truth_as_often_as_they_say(reference, name, level):
+    plan = read_plan(shipped_folder("protocols") / "plans" / f"{name}.yaml")
+    told = []
+    found = coverage(reference, plan, range(1000, 1040), told.append, level=level)
+    assert told == list(range(1, 41))
+    numbers = found.numbers()
+    assert len(numbers["parameters"]) == 24
+    # Parameters of one machine are correlated, so that 40 machines are worth some 200 independent ones: 95 ± 3 %.
+    assert 0.92 < numbers["parameters_pooled"] < 0.98
+    assert 0.90 < numbers["positions_pooled"] < 0.99
+    # Neither too long: the errors' own scatter is that stated.
+    assert np.sqrt(np.mean(found.parameters**2)) == pytest.approx(1.0, abs=0.12)
+
+
+def test_wilsons_interval_as_tabulated():
+    """For 9 of 10: 0.596 to 0.982 [Brown, Cai and DasGupta, Statistical Science 16 (2001) 101]."""
+    assert wilson(0.9, 10) == pytest.approx((0.596, 0.982), abs=1e-3)

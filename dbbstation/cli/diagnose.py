@@ -46,27 +46,19 @@ def diagnose(
     from dbbstation.calibration.summary import calibration_summary, identified_model
     from dbbstation.cli.calibrate import ELSEWHERE_IN_MODEL
     from dbbstation.cli.output import print_json, say
-    from dbbstation.diagnosis.diagnose import diagnose as examine
-    from dbbstation.diagnosis.diagnose import usable_sources
-    from dbbstation.diagnosis.summary import diagnosis_summary
+    from dbbstation.diagnosed import diagnose_sessions
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.models import write_model
-    from dbbstation.recorded import load_sessions
-    from dbbstation.sources.registry import sources_named
 
     if out is not None:
         refuse_existing(out, force=force)
-    named = sources_named([name.strip() for name in sources.split(",")] if sources else SOURCES)
-    recorded = load_sessions(sessions, exclude)
-    for warning in recorded.warnings:
-        say(f"note: {warning}")
-    usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
-    found = examine(recorded.machine, recorded.observations, usable, lambda text: say(f"... {text}"))
-    summary = diagnosis_summary(found, lacking)
+    candidates = [name.strip() for name in sources.split(",")] if sources else SOURCES
+    diagnosed = diagnose_sessions(sessions, candidates, exclude, say)
+    found, summary = diagnosed.diagnosis, diagnosed.summary()
     if out is not None:
         calibrated = calibration_summary(found.after, evaluate(found.after.model, found.after.observations))
         kept = {key: value for key, value in calibrated.items() if key not in ELSEWHERE_IN_MODEL}
-        write_model(out, identified_model(found.after, kept, recorded.sessions), force=force)
+        write_model(out, identified_model(found.after, kept, diagnosed.recorded.sessions), force=force)
     if as_json:
         print_json(summary)
     else:

@@ -1,0 +1,60 @@
+"""The diagnosis of recorded sessions, from their files to what is said of them: one way in for command and studies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.diagnosis.diagnose import diagnose, usable_sources
+from dbbstation.diagnosis.summary import diagnosis_summary
+from dbbstation.recorded import Recorded, load_sessions
+from dbbstation.sources.registry import sources_named
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.diagnosis.findings import Diagnosis
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """Recorded sessions with their diagnosis.
+
+    Attributes:
+        recorded: the sessions.
+        diagnosis: what was found in them.
+        lacking: why further candidates could not be looked at, by name.
+    """
+
+    recorded: Recorded
+    diagnosis: Diagnosis
+    lacking: Mapping[str, str]
+
+    def summary(self) -> dict[str, Any]:
+        """Everything that is said, as plain numbers."""
+        return diagnosis_summary(self.diagnosis, self.lacking)
+
+
+def diagnose_sessions(
+    paths: Sequence[Path], candidates: Sequence[str], exclude: Sequence[str], say: Callable[[str], None]
+) -> Diagnosed:
+    """Read sessions of one machine and find what a kinematic calibration of them leaves out.
+
+    Args:
+        paths: session folders or session files.
+        candidates: names of the error sources to look for.
+        exclude: names of tests to leave out.
+        say: told what was noticed in the files and what is being done.
+
+    Raises:
+        InputError: faults of files and traces, or a name that no source has.
+        CalibrationError: the kinematic model cannot be fitted.
+    """
+    named = sources_named(candidates)
+    recorded = load_sessions(paths, exclude)
+    for warning in recorded.warnings:
+        say(f"note: {warning}")
+    usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
+    found = diagnose(recorded.machine, recorded.observations, usable, lambda text: say(f"... {text}"))
+    return Diagnosed(recorded, found, lacking)

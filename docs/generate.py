@@ -13,16 +13,24 @@ import click
 
 import dbbstation
 from dbbstation.cli import COMMANDS, cli
+from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.sources.registry import known_sources
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from dbbstation.diagnosis.drive.contract import Texts as DriveTexts
+    from dbbstation.sources.contract import Texts
+
 NOT_PUBLIC = {"cli", "tui", "studies", "__main__"}
 """Top-level modules that nobody imports: commands, screens, experiments."""
 
 _UNWRAPPED = "\b"
+
+_DRIVE_SOURCES_HEAD = """\
+Every cause of force that `dbbstation drive` looks for, from its own texts in `dbbstation/diagnosis/drive/sources/`. The
+names are what `drive --sources` takes."""
 
 _SOURCES_HEAD = """\
 Every cause that a model can contain, from its own texts in `dbbstation/sources/`. The names are what
@@ -34,6 +42,7 @@ def write_pages(folder: Path) -> None:
     pages = {f"commands/{name}.md": text for name, text in _commands()}
     pages |= {f"api/{name}.rst": text for name, text in _packages()}
     pages["sources.md"] = _sources()
+    pages["drive-sources.md"] = _drive_sources()
     for name, text in pages.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -131,22 +140,31 @@ def _headed(title: str, line: str) -> str:
 def _sources() -> str:
     lines = ["# Error sources", "", _SOURCES_HEAD, ""]
     for name, source in known_sources().items():
-        texts = source.texts
         needs = ", ".join(sorted(source.needs))
-        lines += [
-            f"## {name}",
-            "",
-            texts.what,
-            "",
-            f"- Belongs to the {source.belongs_to}; needs {needs}.",
-            f"- Shows: {texts.shows}",
-            f"- Confirm: {texts.confirm}",
-            f"- Cure: {texts.cure}",
-            f"- Equation: {_plain(texts.equation)}",
-            f"- From: {_plain(texts.origin)}",
-            "",
-        ]
+        lines += [*_texts(name, source.texts, f"Belongs to the {source.belongs_to}; needs {needs}."), ""]
     return "\n".join(lines)
+
+
+def _drive_sources() -> str:
+    lines = ["# Causes of force in a drive", "", _DRIVE_SOURCES_HEAD, ""]
+    for name, source in known_drive_sources().items():
+        lines += [*_texts(name, source.texts, f"Its misfit follows {source.varies_with}."), ""]
+    return "\n".join(lines)
+
+
+def _texts(name: str, texts: Texts | DriveTexts, facts: str) -> list[str]:
+    return [
+        f"## {name}",
+        "",
+        texts.what,
+        "",
+        f"- {facts}",
+        f"- Shows: {texts.shows}",
+        f"- Confirm: {texts.confirm}",
+        f"- Cure: {texts.cure}",
+        f"- Equation: {_plain(texts.equation)}",
+        f"- From: {_plain(texts.origin)}",
+    ]
 
 
 def _plain(text: str) -> str:

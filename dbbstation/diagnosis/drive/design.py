@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.shapes import PLAUSIBLE_SHARE, shapes
+from dbbstation.diagnosis.drive.signals import derivatives
 from dbbstation.inference.noise import Noise, noise_of
 from dbbstation.inference.race import Candidate, Race, Variant
 from dbbstation.inference.square_root import Columns, compress
@@ -94,7 +95,9 @@ class Design:
 def design_of(signals: Signals, sources: Sequence[DriveSource]) -> Design:
     """Make all columns of a recording and read its noise."""
     force = signals.compared(signals.force_n)
-    base = signals.compared(np.column_stack([signals.acceleration_m_s2, signals.speed_m_s]))
+    # Of the position as measured: these columns are linear in it and have not passed its filter yet.
+    speed, acceleration = derivatives(signals.measured_m, signals.rate_hz)
+    base = signals.compared(np.column_stack([acceleration, speed]))
     families = [(shape.variable, signals.compared(shape.columns)) for shape in shapes(signals)]
     smooth = np.hstack([base, *(columns for _, columns in families)])
     residual, _ = _left(smooth, force)

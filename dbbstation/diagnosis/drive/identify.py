@@ -264,7 +264,13 @@ def _curve(design: Design, fitted: DriveFit) -> Curve:
     speed = speed[(speed >= low) & (speed <= high)]
     still = np.zeros_like(speed)
     pretended = replace(
-        design.signals, t_s=still, position_m=still, speed_m_s=speed, acceleration_m_s2=still, force_n=still
+        design.signals,
+        t_s=still,
+        measured_m=still,
+        position_m=still,
+        speed_m_s=speed,
+        acceleration_m_s2=still,
+        force_n=still,
     )
     columns = np.zeros((len(speed), len(fitted.values)))
     columns[:, BASE.index("viscous_n_s_m")] = speed

@@ -2,8 +2,8 @@
 
 The standard practice of inverse dynamic identification by least squares: position is low-passed without phase shift
 (Butterworth, forwards and backwards), differentiated by central differences, and measured force and every column of
-the model then pass one and the same second low-pass and are decimated together, so that the filter changes both sides
-alike. [Gautier, Dynamic identification of robots with power model, ICRA 1997; Janot, Vandanjon and Gautier, A generic
+the model then pass one and the same second low-pass and are decimated together. Here the force passes the position's
+low-pass too: all filters then change both sides alike, and starts and stops that reach beyond the band do no harm. [Gautier, Dynamic identification of robots with power model, ICRA 1997; Janot, Vandanjon and Gautier, A generic
 instrumental variable approach for industrial robot identification, IEEE TCST 22 (2014), sec. II-C]
 """
 
@@ -74,6 +74,7 @@ class Signals:
 
     Attributes:
         t_s: shape (n,) [s].
+        measured_m: position as measured [m].
         position_m: low-passed [m].
         speed_m_s: its central difference [m/s].
         acceleration_m_s2: its second difference [m/s²].
@@ -86,6 +87,7 @@ class Signals:
     """
 
     t_s: NDArray[np.float64]
+    measured_m: NDArray[np.float64]
     position_m: NDArray[np.float64]
     speed_m_s: NDArray[np.float64]
     acceleration_m_s2: NDArray[np.float64]
@@ -97,8 +99,9 @@ class Signals:
     notes: tuple[str, ...]
 
     def compared(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Low-pass columns at the full rate, shape (n,) or (n, p), and keep the samples that are compared."""
-        sos = butter(ORDER, self.cutoff_hz, fs=self.rate_hz, output="sos")
+        """Pass columns at the full rate, shape (n,) or (n, p), through both low-passes; keep the samples compared."""
+        bands = (self.cutoff_hz, POSITION_BAND * self.cutoff_hz)
+        sos = np.vstack([butter(ORDER, band, fs=self.rate_hz, output="sos") for band in bands])
         return np.ascontiguousarray(sosfiltfilt(sos, columns, axis=0)[self.kept])
 
     @cached_property
@@ -171,13 +174,12 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
             remedy="record for longer, ten strokes to and fro at several speeds, or give a higher --cutoff-hz",
         )
     smooth = sosfiltfilt(butter(ORDER, POSITION_BAND * cutoff, fs=rate, output="sos"), position)
-    speed = np.gradient(smooth, 1.0 / rate)
-    acceleration = np.zeros_like(smooth)
-    acceleration[1:-1] = (smooth[2:] - 2.0 * smooth[1:-1] + smooth[:-2]) * rate**2
+    speed, acceleration = derivatives(smooth, rate)
     step = max(int(rate / (PER_CUTOFF * cutoff)), 1)
     # A standing drive spoils samples as far as the filter of the comparison reaches, a stuck force, whose error knows no
     # bounds, as far as it rings.
     standing = np.abs(speed) <= MOVING_SHARE * np.abs(speed).max()
+    standing[1:] |= speed[1:] * speed[:-1] < 0.0  # a quick reversal passes through standstill between two samples
     usable = ~(_widened(standing, step) | _widened(stuck, edge))
     kept = np.arange(edge, len(position) - edge, step)
     kept = kept[usable[kept]]
@@ -189,6 +191,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
         )
     return Signals(
         t_s=even.t_s,
+        measured_m=position,
         position_m=smooth,
         speed_m_s=speed,
         acceleration_m_s2=acceleration,
@@ -199,6 +202,13 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
         kept=kept,
         notes=tuple(notes),
     )
+
+
+def derivatives(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Speed [m/s] and acceleration [m/s²] by central differences, shape (n,) each; the latter zero at both ends."""
+    acceleration = np.zeros_like(position_m)
+    acceleration[1:-1] = (position_m[2:] - 2.0 * position_m[1:-1] + position_m[:-2]) * rate_hz**2
+    return np.gradient(position_m, 1.0 / rate_hz), acceleration
 
 
 def _widened(marked: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:

@@ -18,6 +18,10 @@ RECOGNISED = 0.02
 """Share of a known pattern that may lie outside the lost directions for it to count as lost."""
 
 
+SHOWS_IN_CIRCLES = 0.1
+"""Part of a direction outside the drives' parameters from which it says something of circles."""
+
+
 @dataclass(frozen=True, eq=False)
 class Pattern:
     """A way in which a machine can be wrong as a whole, by source and parameter order."""
@@ -81,6 +85,23 @@ def in_words(layout: Layout, held: NDArray[np.float64]) -> tuple[str, ...]:
             remaining = _orthonormal(remaining - np.outer(inside, inside @ remaining))[: len(remaining) - 1]
     texts += [_largest_parts(row, names) for row in remaining]
     return tuple(texts)
+
+
+def of_circles(layout: Layout, held: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions without their parts in sources of motor currents, and none that lie in these alone, shape (g, f).
+
+    Where the tool goes does not hang on them; what is open of the drives is said of each motor.
+
+    Args:
+        layout: columns of the fit.
+        held: orthonormal rows, fitted columns only, in units of the columns' scales, shape (h, f).
+    """
+    fitted = np.flatnonzero(~layout.known.random)
+    drives = [np.r_[term.columns] for term in layout.terms if term.source.of_currents]
+    if not drives or len(held) == 0:
+        return held
+    _, share, rows = np.linalg.svd(np.where(np.isin(fitted, np.concatenate(drives)), 0.0, held), full_matrices=False)
+    return rows[share > SHOWS_IN_CIRCLES]
 
 
 def _as_columns(pattern: Pattern, names: list[tuple[str, str, str]]) -> NDArray[np.float64] | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.currents import current_blocks, current_channel, current_start
-from dbbstation.calibration.directions import in_words
+from dbbstation.calibration.directions import in_words, of_circles
 from dbbstation.calibration.layout import Layout, lay_out
 from dbbstation.calibration.motor_findings import MotorFindings, motor_findings
 from dbbstation.calibration.nodes import Nodes, nodes_of, smooth
@@ -184,7 +184,7 @@ def calibrate(
         machine_residual_mm=_residuals(layout.model(x).of_the_machine(), runs),
         residual_mm=_residuals(layout.model(x), runs),
         blocks=tuple(blocks),
-        directions_lost=in_words(layout, lost),
+        directions_lost=in_words(layout, of_circles(layout, lost)),
         directions_regularised=in_words(layout, unseen(nominal, layout, noise)),
         prescribed=() if prescribe is None else names_of(layout, held),
         currents=motor_findings(layout, channel, x, solution, blocks, nominal, noise),

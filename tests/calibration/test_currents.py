@@ -201,6 +201,8 @@ def test_one_motor_without_a_current_leaves_five_that_count(small, change, motor
         for kind in ("gain_a_kn", "coulomb_n", "viscous_ns_mm", "load_share_n_kn", "asymmetry_n")
     }
     assert calibration.currents.noise[motor - 1] is None
+    # What is open of a drive is no direction in which the tool could be off.
+    assert not any("drive-friction" in text for text in calibration.directions_lost)
     summary = calibration_summary(calibration, evaluate(calibration.model, recorded.observations))["motor_currents"]
     assert summary["motors"][motor - 1]["gain_a_kn"] is None
     json.dumps(summary, allow_nan=False)

@@ -65,18 +65,20 @@ def record(
     begun: datetime = BEGUN,
     reprogram: Reprogram | None = None,
     programs: Mapping[str, Program] | None = None,
+    breaks_s: Mapping[str, float] | None = None,
 ) -> Truth:
     """Simulates a session and writes its folder, `dbb-session/1`.
 
     `mechanisms` is what is wrong with the machine, `setup` what is wrong with balls and bar (the usual errors if left
     out). With `angles` the recordings carry `theta_deg` and are cut to the circle; without `mounting_numbers` the runs
     of a test share one mounting, as the format says of sessions that count none. A compensated session needs both: what
-    is commanded instead (`reprogram`), and the `programs` that say so, by test and direction as in "a-cw".
+    is commanded instead (`reprogram`), and the `programs` that say so, by test and direction as in "a-cw". `breaks_s` are
+    pauses before tests, by name.
     """
     plan = plan or table_ii_plan(seed)
     machine = rounded(machine or reference_machine())
     noise = noise or Noise()
-    scene = Scene(machine, plan, _slots(plan, timing or Timing(), mounting_numbers=mounting_numbers))
+    scene = scene_of(plan, machine, timing, breaks_s, mounting_numbers=mounting_numbers)
     decided = _decided(seed, scene, [*mechanisms, *(usual_setup() if setup is None else setup)])
     (folder / "runs").mkdir(parents=True)
     runs: list[TrueRun] = []
@@ -116,9 +118,7 @@ def true_runs(
 
     Mechanisms with anything random in them must have been decided before.
     """
-    scene = Scene(
-        rounded(machine or reference_machine()), plan, _slots(plan, timing or Timing(), mounting_numbers=True)
-    )
+    scene = scene_of(plan, machine, timing)
     return [simulate_run(scene, slot, mechanisms, rate_hz)[0] for slot in scene.slots]
 
 
@@ -148,19 +148,34 @@ def simulate_run(
     return TrueRun(slot, time_s, theta_deg, in_circle, outcome.length_mm), outcome
 
 
-def _slots(plan: Plan, timing: Timing, *, mounting_numbers: bool) -> tuple[Slot, ...]:
+def scene_of(
+    plan: Plan,
+    machine: Machine | None = None,
+    timing: Timing | None = None,
+    breaks_s: Mapping[str, float] | None = None,
+    *,
+    mounting_numbers: bool = True,
+) -> Scene:
+    """What is fixed before a session begins: the machine as its file prints it, and when each run begins."""
+    slots = _slots(plan, timing or Timing(), breaks_s or {}, mounting_numbers=mounting_numbers)
+    return Scene(rounded(machine or reference_machine()), plan, slots)
+
+
+def _slots(plan: Plan, timing: Timing, breaks_s: Mapping[str, float], *, mounting_numbers: bool) -> tuple[Slot, ...]:
     """The runs in order. Every test, and every repetition at the end, puts its ball up anew."""
     slots: list[Slot] = []
     repeats: dict[str, int] = {}
     mountings: dict[str, int] = {}
     for test in [*plan.tests, *(plan.test(name) for name in plan.repeat_at_end)]:
         repeats[test.name] = repeats.get(test.name, 0) + 1
+        waited_s = breaks_s.get(test.name, 0.0) if repeats[test.name] == 1 else 0.0
         if mounting_numbers or test.name not in mountings:
             mountings[test.name] = max(mountings.values(), default=0) + 1
         for direction in plan.path_of(test).directions:
             path = RunPath(plan, test, direction, timing)
             # Runs begin at whole spacings; a slow or long circle pushes those after it back.
-            start_s = SPACING_S * float(np.ceil(slots[-1].end_s / SPACING_S)) if slots else 0.0
+            start_s = SPACING_S * float(np.ceil(slots[-1].end_s / SPACING_S)) + waited_s if slots else 0.0
+            waited_s = 0.0
             slots.append(Slot(test, direction, repeats[test.name], mountings[test.name], start_s, path))
     return tuple(slots)
 

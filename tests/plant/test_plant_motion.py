@@ -170,6 +170,16 @@ def test_warming_by_runs_alone_follows_the_differential_equation() -> None:
     np.testing.assert_allclose(excess_k, solution.y[0], atol=0.01)
 
 
+def test_a_machine_left_off_cools_as_newton_says() -> None:
+    times_s = np.array([0.0, 600.0, 1200.0])  # heat is counted by whole seconds
+    motion = Motion(Scene(reference_machine(), EMPTY, ()), times_s, np.zeros((3, 6)))
+    cooling = Warming(rise_k=0.0, time_constant_s=600.0, start_k=4.0)
+    np.testing.assert_allclose(cooling.excess_k(motion), 4.0 * np.exp([0.0, -1.0, -2.0]), rtol=2e-3)
+    paused = Warming(rise_k=3.0, time_constant_s=600.0, off_s=((600.0, 1200.0),))
+    warm_k = 3.0 * (1.0 - np.exp(-1.0))
+    np.testing.assert_allclose(paused.excess_k(motion), [0.0, warm_k, warm_k * np.exp(-1.0)], rtol=2e-3)
+
+
 def test_grown_parts_keep_to_their_expansion() -> None:
     slow = Warming(rise_k=2.0, time_constant_s=1.0, head_start_s=60.0)
     times_s = np.array([30.0, 35.0])
@@ -224,3 +234,10 @@ def test_noise_has_the_sizes_asked_for() -> None:
     noise_um = 1000.0 * Noise(0.3, 0.4, correlation=0.6).drawn_mm(np.random.default_rng(1), 200_000)
     assert noise_um.std() == pytest.approx(0.5, rel=0.01)
     assert np.mean(noise_um[1:] * noise_um[:-1]) == pytest.approx(0.6 * 0.16, rel=0.05)
+
+
+def test_coloured_noise_is_as_loud_to_a_mean_as_white_noise_of_its_slow_size() -> None:
+    noise = Noise(0.3, 0.4, correlation=0.6, second_um=0.2, second_correlation=0.95)
+    noise_um = 1000.0 * noise.drawn_mm(np.random.default_rng(2), 2_000_000)
+    means_um = noise_um.reshape(-1, 2000).mean(axis=1)
+    assert means_um.std() * np.sqrt(2000) == pytest.approx(noise.slow_um, rel=0.1)

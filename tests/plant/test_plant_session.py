@@ -28,6 +28,14 @@ from tests.plant.mechanisms.currents import DriveCurrents
 from tests.plant.mechanisms.gravity import CentreOfGravityShift, Gravity
 from tests.plant.mechanisms.joints import JointFriction, JointRunout, UjointScrew
 from tests.plant.mechanisms.kinematics import Kinematics, RandomKinematics
+from tests.plant.mechanisms.oddities import (
+    BentCover,
+    CreepingSpindle,
+    CyclingChiller,
+    RockingTable,
+    SpringyDrive,
+    WindingCable,
+)
 from tests.plant.mechanisms.outsiders import (
     BuildingSway,
     DentedScrew,
@@ -95,6 +103,12 @@ EVERYTHING: tuple[Mechanism, ...] = (
     HoseDrag(),
     DentedScrew(),
     BuildingSway(),
+    BentCover(),
+    SpringyDrive(),
+    CreepingSpindle(),
+    RockingTable(),
+    CyclingChiller(),
+    WindingCable(),
 )
 
 
@@ -264,7 +278,7 @@ def test_the_answer_stays_outside_the_session(tmp_path: FilePath) -> None:
     names = [mechanism["name"] for mechanism in answer["mechanisms"]]
     assert {"backlash", "gravity", "soft-floor", "mounting"} <= set(names)
     unlisted = [mechanism["name"] for mechanism in answer["mechanisms"] if not mechanism["listed"]]
-    assert len(unlisted) == 6
+    assert len(unlisted) == 12
     told = (tmp_path / "s/session.yaml").read_text() + (tmp_path / "s/plan.yaml").read_text()
     assert not [name for name in names if name in told and name != "mounting"]
 
@@ -345,6 +359,11 @@ def test_a_compensated_program_changes_what_is_commanded(tmp_path: FilePath) -> 
     assert (tmp_path / "s/programs/a-cw.ngc").read_text() == "G1 X1\n"
     for test in ("a", "h"):
         np.testing.assert_allclose(truth.noise_free_lengths(test, "ccw")[1], 150.0, atol=1e-6)
+
+
+def test_a_break_is_a_pause_before_a_test(tmp_path: FilePath) -> None:
+    truth = record(tmp_path / "s", seed=5, plan=SHORT, rate_hz=1.0, breaks_s={"h": 1000.0})
+    assert [slot.start_s for slot in truth.scene.slots] == [0.0, 200.0, 1400.0, 1600.0]
 
 
 def test_a_slow_circle_pushes_the_next_run_back(tmp_path: FilePath) -> None:

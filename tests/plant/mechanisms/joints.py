@@ -1,4 +1,4 @@
-"""Base joints that rub, or whose centre is not a point."""
+"""Joints that rub, or whose centre is not a point."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tests.plant.mechanisms.play_operator import follower
 if TYPE_CHECKING:
     from tests.plant.arrays import FloatArray
     from tests.plant.machine import Machine
+    from tests.plant.mechanisms.screw import Six
     from tests.plant.run import Motion
 
 HOME = np.array([[0.0, 0.0, -1008.0, 0.0, 0.0, 0.0]])
@@ -51,12 +52,14 @@ class JointFriction(Mechanism):
     moment_n_mm: float = 2.0e4
     wind_up_urad: float = 100.0
     compliance_mm_n: float = 9.68e-6
+    shares: Six = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+    """Of the moment, joint by joint."""
 
     def lengthening_mm(self, motion: Motion, platform: Platform) -> FloatArray:
         """Stretch `(n, 6)` under the sideways forces."""
         commanded = commanded_platform(motion.machine, motion.commanded)
         angle_rad = joint_angles_rad(motion.machine, commanded.direction)
-        share = np.stack([self._wound(angle_rad[:, strut]) for strut in range(6)], axis=1)
+        share = np.stack([self.shares[strut] * self._wound(angle_rad[:, strut]) for strut in range(6)], axis=1)
         # A turn about an axis moves the strut's end along axis × direction; friction pushes the other way.
         ways = [np.cross(axis, platform.direction) for axis in joint_axes(motion.machine)]
         force_n = (
@@ -106,16 +109,30 @@ def _zeros_63() -> FloatArray:
 
 @dataclass(frozen=True)
 class JointRunout(Mechanism):
-    """The strut's axis misses the base joint's first axis by `(6, 3)` [µm], and goes round with it."""
+    """The strut's axis misses the joint's first axis by `(6, 3)` [µm], and goes round with it.
+
+    At the platform the first axis is fixed in the platform, in the direction that the base joint's has at home.
+    """
 
     name: ClassVar[str] = "joint-runout"
 
     eccentricity_um: FloatArray = field(default_factory=_zeros_63)
+    platform_eccentricity_um: FloatArray = field(default_factory=_zeros_63)
 
     def base_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray:
-        """The eccentricity turned about the first axis `(n, 6, 3)`, less what it is at home (Rodrigues)."""
-        first, _ = joint_axes(motion.machine)
-        turn_rad = joint_angles_rad(motion.machine, platform.direction)[:, :, :1]
-        e_mm = np.asarray(self.eccentricity_um) / 1000.0
-        inside = first * np.einsum("ij,ij->i", first, e_mm)[:, None]
-        return (np.cos(turn_rad) - 1.0) * (e_mm - inside) + np.sin(turn_rad) * np.cross(first, e_mm)
+        """The eccentricity turned about the first axis `(n, 6, 3)`, less what it is at home."""
+        return _orbit_mm(motion.machine, platform.direction, np.asarray(self.eccentricity_um) / 1000.0)
+
+    def joint_shift_mm(self, motion: Motion, platform: Platform) -> FloatArray:
+        """The same at the platform, by the strut's direction as the platform sees it `(n, 6, 3)`."""
+        return _orbit_mm(
+            motion.machine, platform.direction @ platform.rotation, np.asarray(self.platform_eccentricity_um) / 1000.0
+        )
+
+
+def _orbit_mm(machine: Machine, direction: FloatArray, e_mm: FloatArray) -> FloatArray:
+    """Change `(n, 6, 3)` of an arm `(6, 3)` that turns about the first axes with struts along `(n, 6, 3)` (Rodrigues)."""
+    first, _ = joint_axes(machine)
+    turn_rad = joint_angles_rad(machine, direction)[:, :, :1]
+    inside = first * np.einsum("ij,ij->i", first, e_mm)[:, None]
+    return (np.cos(turn_rad) - 1.0) * (e_mm - inside) + np.sin(turn_rad) * np.cross(first, e_mm)

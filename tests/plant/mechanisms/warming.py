@@ -24,7 +24,9 @@ class Warming:
     """A warm-up: final rise [K], time constants [s] of one or two stages, and the heat between runs.
 
     `idle_share` is the heat while no run is on, relative to a run; with 1 the machine warms as a step response.
-    `head_start_s` is how long it had been warming when the first run began.
+    `head_start_s` is how long it had been warming when the first run began, `start_k` what was left of an earlier warmth
+    then or, with a head start, at the start of that. No heat comes during `off_s`, from and to in session time: a break
+    with the drives switched off, or a machine that only cools.
     """
 
     rise_k: float
@@ -32,6 +34,8 @@ class Warming:
     second_time_constant_s: float | None = None
     idle_share: float = 1.0
     head_start_s: float = 0.0
+    start_k: float = 0.0
+    off_s: tuple[tuple[float, float], ...] = ()
 
     def excess_k(self, motion: Motion) -> FloatArray:
         """Temperature `(n,)` above the cold machine [K] at the instants of a motion."""
@@ -46,10 +50,13 @@ class Warming:
         middles_s = times_s - GRID_S / 2
         for slot in scene.slots:
             heat[(middles_s >= slot.start_s) & (middles_s < slot.end_s)] = 1.0
+        for from_s, to_s in self.off_s:
+            heat[(middles_s >= from_s) & (middles_s < to_s)] = 0.0
         excess_k = self.rise_k * _followed_steps(heat, self.time_constant_s)
         if self.second_time_constant_s is not None:
             excess_k = _followed_ramps(excess_k, self.second_time_constant_s)
-        return times_s, excess_k
+        slowest_s = max(self.time_constant_s, self.second_time_constant_s or 0.0)
+        return times_s, excess_k + self.start_k * np.exp(-(times_s - times_s[0]) / slowest_s)
 
 
 def _followed_steps(values: FloatArray, time_constant_s: float) -> FloatArray:

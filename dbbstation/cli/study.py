@@ -7,6 +7,7 @@ from dbbstation.cli.lazy import LazyGroup
 STUDIES = {
     "concealed-gravity": "Gravity hidden in a kinematic calibration: found, named, modelled.",
     "coverage": "Do the stated 95 % intervals hold the truth?",
+    "gravity": "Gravity identified after the kinematics, as in the paper, and with them.",
     "table-iii": "The paper's three ways to calibrate, on many random machines.",
 }
 """Name and one line of help of every study; each is a module of `cli.studies` with a command of its name."""

@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.calibration.fit import default_sources
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
 from dbbstation.diagnosis.summary import diagnosis_summary
 from dbbstation.recorded import Recorded, load_sessions
-from dbbstation.sources.registry import sources_named
+from dbbstation.sources.registry import known_sources, sources_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.diagnosis.findings import Diagnosis
+    from dbbstation.sources.contract import ErrorSource
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,22 +38,34 @@ class Diagnosed:
         return diagnosis_summary(self.diagnosis, self.lacking)
 
 
+def default_candidates(known: Mapping[str, ErrorSource]) -> list[str]:
+    """Names of all error sources that are not fitted anyway."""
+    fitted = {source.name for source in default_sources()}
+    return [name for name, source in known.items() if name not in fitted and source.candidate]
+
+
 def diagnose_sessions(
-    paths: Sequence[Path], candidates: Sequence[str], exclude: Sequence[str], say: Callable[[str], None]
+    paths: Sequence[Path],
+    candidates: Sequence[str] | None,
+    exclude: Sequence[str],
+    say: Callable[[str], None],
+    known: Mapping[str, ErrorSource] | None = None,
 ) -> Diagnosed:
     """Read sessions of one machine and find what a kinematic calibration of them leaves out.
 
     Args:
         paths: session folders or session files.
-        candidates: names of the error sources to look for.
+        candidates: names of the error sources to look for; all that are known if None.
         exclude: names of tests to leave out.
         say: told what was noticed in the files and what is being done.
+        known: every error source by name; those of the package if None.
 
     Raises:
         InputError: faults of files and traces, or a name that no source has.
         CalibrationError: the kinematic model cannot be fitted.
     """
-    named = sources_named(candidates)
+    known = known_sources() if known is None else known
+    named = sources_named(default_candidates(known) if candidates is None else candidates, known)
     recorded = load_sessions(paths, exclude)
     for warning in recorded.warnings:
         say(f"note: {warning}")

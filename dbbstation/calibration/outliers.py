@@ -73,6 +73,7 @@ class Outlier:
         size_um: how far off: rms of a run, distance of a ball from its place [µm].
         shift_um: where a ball stands, machine axes; None for a run [µm].
         text: what it looks like, in words.
+        sure: False where a badly seated ball cannot be told from a wrong CMM row: it was put up once only.
     """
 
     kind: Kind
@@ -81,6 +82,7 @@ class Outlier:
     size_um: float
     shift_um: tuple[float, float, float] | None
     text: str
+    sure: bool = True
 
 
 def calibrate_robust(fit: Fit, observations: Sequence[Observation]) -> tuple[Calibration, tuple[Outlier, ...]]:
@@ -272,7 +274,8 @@ def _off_its_place(fit: Fit, calibration: Calibration, runs: Sequence[Observatio
         what = f"{where}: badly seated, or its CMM row is wrong; put it up again to tell"
     size = 1e3 * float(np.hypot(*shift[:2]))
     kind = Kind.BALL if together else Kind.MOUNTING
-    return Outlier(kind, of[0].test, ", ".join(run.label for run in of), size, _um(shift), what), freed, again
+    labels = ", ".join(run.label for run in of)
+    return Outlier(kind, of[0].test, labels, size, _um(shift), what, sure=bool(alike)), freed, again
 
 
 _TAIL = 5.7e-7

@@ -51,7 +51,7 @@ def calibration_summary(
         "gaps": list(gaps(calibration)),
         "directions_regularised": list(calibration.directions_regularised),
         "parameters_prescribed": [f"{source}.{name}" for source, name in calibration.prescribed],
-        "outliers": [_outlier(outlier) for outlier in outliers],
+        "outliers": [outlier_summary(outlier) for outlier in outliers],
         "scatter": [_scatter(check) for check in check_scatter(seats_of(calibration))],
         "observability": _visibility(visibility(calibration)),
         "sources": [_term(calibration, term) for term in calibration.layout.terms if _is_machines(term)],
@@ -94,7 +94,8 @@ def _term(calibration: Calibration, term: Term) -> dict[str, Any]:
     return {"name": term.source.name, **shared, "parameters": parameters}
 
 
-def _outlier(outlier: Outlier) -> dict[str, Any]:
+def outlier_summary(outlier: Outlier) -> dict[str, Any]:
+    """One thing that does not belong, as plain numbers."""
     shift = None if outlier.shift_um is None else list(outlier.shift_um)
     return {
         "kind": str(outlier.kind),

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.calibration.fit import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Shape, ranges, shapes, strongest_waves, variables
-from dbbstation.inference.race import Candidate, Variant
-from dbbstation.inference.square_root import Block, Columns, compress
+from dbbstation.inference.race import Candidate, Race, Variant
+from dbbstation.inference.square_root import Block, Columns, compress, joined
 from dbbstation.trace.average import averaged, means, sector_of
 
 if TYPE_CHECKING:
@@ -54,6 +56,15 @@ class Channel:
     named: tuple[Candidate, ...]
     unnamed: tuple[Candidate, ...]
     residual_mm: tuple[NDArray[np.float64], ...]
+
+    @cached_property
+    def joined(self) -> Block:
+        """All runs as one block."""
+        return joined(self.blocks, self.columns)
+
+    def race(self, noise_mm: float) -> Race:
+        """Candidates on what the base leaves, at a noise of one sample [mm]."""
+        return Race([self.joined], self.base, self.held, self.columns, max(noise_mm, SMALLEST_NOISE_MM))
 
     @property
     def base(self) -> Columns:

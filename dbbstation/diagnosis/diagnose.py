@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import chi2
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration, calibrate, default_sources
+from dbbstation.calibration.outliers import calibrate_robust
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
 from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.next_test import propose
 from dbbstation.diagnosis.verdicts import doubted, judge, testable, unexplained
+from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import CalibrationError, ModelError
 from dbbstation.inference.harmonics import Misfit, misfit
-from dbbstation.inference.held_out import held_out_rms
+from dbbstation.inference.held_out import HeldOut, held_out
 from dbbstation.inference.race import Choice, Race, select, worth_of
+from dbbstation.inference.stability import stability
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
@@ -42,6 +46,12 @@ STANDS_OUT_SIGMA = 4.0
 
 SIGNIFICANT = 1e-3
 """Probability below which a misfit counts as one."""
+
+MOST_LOOKS = 3
+"""Times that naming and runs that do not belong may settle against each other."""
+
+RIVALS, DRAWS = 6, 20
+"""Best sources that compete in each draw of a part of the tests, and draws."""
 
 FOLDS = 5
 """Groups of tests that are left out in turn."""
@@ -75,14 +85,24 @@ def diagnose(
         CalibrationError: the base model cannot be fitted.
         ModelError: a source needs what the runs or the machine file do not give.
     """
+    by_name = {source.name: source for source in sources}
     runs = [thinned(observation) for observation in observations]
     progress("kinematic calibration")
-    before = calibrate(machine, runs)
-    progress("candidates")
-    channel = channel_of(before, sources)
-    first = misfit_of(before)
-    by_name = {source.name: source for source in sources}
-    settled = _settle(channel, before, first, by_name, progress)
+    before, outliers = calibrate_robust(partial(calibrate, machine), runs)
+    for _ in range(MOST_LOOKS):
+        progress("candidates")
+        channel = channel_of(before, sources)
+        first = misfit_of(before)
+        settled = _settle(channel, before, first, by_name, progress)
+        if not settled.chosen:
+            break
+        # What stood out beside a model without physics may not beside one with it, and the other way round.
+        again, beside = calibrate_robust(partial(_refitted, settled.after), runs)
+        if {(o.kind, o.run) for o in beside} == {(o.kind, o.run) for o in outliers}:
+            break
+        progress("runs that do not belong")
+        outliers = beside
+        before = calibrate(machine, again.observations)
     chosen, after = settled.chosen, settled.after
     progress("verdicts")
     joint = channel_of(after, sources) if chosen else channel
@@ -95,9 +115,11 @@ def diagnose(
         settled = Round((), before, first, settled.race)
         findings = tuple(rest.demoted(findings))
     findings = doubted(findings, rest.finding, by_name)
-    held_out = _held_out(channel, chosen, settled.left.noise)
+    predicted = _held_out(channel, chosen, settled.left.noise)
+    steady = _stability(channel, findings, settled)
+    findings = tuple(replace(f, stability=steady.get(f.name)) for f in findings)
     progress("next test")
-    mismatch = first.probability < SIGNIFICANT or bool(chosen)
+    mismatch = first.probability < SIGNIFICANT or bool(chosen) or bool(outliers)
     found = [by_name[choice.candidate.name] for choice in chosen]
     return Diagnosis(
         mismatch=mismatch,
@@ -105,7 +127,9 @@ def diagnose(
         left=settled.left,
         before=before,
         after=after,
-        held_out_um=held_out,
+        held_out=predicted,
+        outliers=outliers,
+        workspace=workspace_error(before, after) if chosen else None,
         locations=_locations(before, after, found, first, rest.finding.variable) if mismatch else (),
         sources=findings,
         unexplained=rest.finding,
@@ -157,9 +181,9 @@ def _settle(
     falls between two points, a second one may seem to be needed; the exact fit then finds no amplitude for it.
     """
     dropped: set[str] = set()
-    best = Round((), before, first, _race(channel, first))
+    best = Round((), before, first, channel.race(first.noise))
     for _ in range(MOST_ROUNDS):
-        race = _race(channel, best.left)
+        race = channel.race(best.left.noise)
         candidates = [candidate for candidate in channel.named if candidate.name not in dropped]
         chosen = select(race, candidates, THRESHOLD, MOST_SOURCES)
         found = {choice.candidate.name for choice in chosen}
@@ -181,7 +205,7 @@ def _settle(
             best = Round(tuple(chosen), after, left, race)
     # Names, fit and what is left of it belong together, whatever ended the rounds.
     left = misfit_of(best.after)
-    return replace(best, left=left, race=_race(channel, left))
+    return replace(best, left=left, race=channel.race(left.noise))
 
 
 def _by_chance(channel: Channel, settled: Round) -> float:
@@ -192,11 +216,6 @@ def _by_chance(channel: Channel, settled: Round) -> float:
     tried = sum(len(candidate.variants) for candidate in channel.named)
     found = [(settled.race.explained([c.variant]), len(c.variant.columns)) for c in settled.chosen]
     return min((min(1.0, tried * float(chi2.sf(square, freedom))) for square, freedom in found), default=1.0)
-
-
-def _race(channel: Channel, left: Misfit) -> Race:
-    """Race on a channel with the noise that a fit leaves."""
-    return Race(channel.blocks, channel.base, channel.held, channel.columns, max(left.noise, SMALLEST_NOISE_MM))
 
 
 def _stands_out(calibration: Calibration, name: str) -> bool:
@@ -236,17 +255,57 @@ def _with_shape(
     return values
 
 
-def _held_out(channel: Channel, chosen: Sequence[Choice], noise_mm: float) -> tuple[float, float]:
-    """Root mean square of predictions of left-out tests without and with the chosen sources [µm]."""
+def _refitted(like: Calibration, observations: Sequence[Observation]) -> Calibration:
+    """Fit runs with the sources of another fit, begun at its values."""
+    layout = like.layout
+    sources = list({term.source.name: term.source for term in layout.terms}.values())
+    begin = {
+        term.source.name: like.x[term.columns]
+        for term in layout.terms
+        if any(parameter.shape for parameter in term.parameters)
+    }
+    return calibrate(layout.machine, observations, sources, begin)
+
+
+def _tests(channel: Channel) -> list[int]:
+    """Number of the test of each run, counted in the order of recording."""
     order = {name: k for k, name in enumerate(dict.fromkeys(o.test for o in channel.observations))}
-    folds = min(FOLDS, len(order))
-    groups = [order[o.test] % folds for o in channel.observations]
+    return [order[o.test] for o in channel.observations]
+
+
+def _stability(channel: Channel, findings: Sequence[SourceFinding], settled: Round) -> dict[str, float]:
+    """How often each of the best sources is chosen again from part of the tests; nothing where none was chosen."""
+    if not settled.chosen:
+        return {}
+    best = {finding.name for finding in sorted(findings, key=lambda f: -f.gain)[:RIVALS]}
+    best |= {choice.candidate.name for choice in settled.chosen}
+    rivals = [candidate for candidate in channel.named if candidate.name in best]
+    return stability(
+        channel.blocks,
+        _tests(channel),
+        channel.base,
+        channel.held,
+        rivals,
+        max(settled.left.noise, SMALLEST_NOISE_MM),
+        THRESHOLD,
+        MOST_SOURCES,
+        DRAWS,
+        np.random.default_rng(len(channel.observations)),
+    )
+
+
+def _held_out(channel: Channel, chosen: Sequence[Choice], noise_mm: float) -> tuple[HeldOut, HeldOut]:
+    """Predictions of left-out tests without and with the chosen sources [mm]."""
+    tests = _tests(channel)
+    folds = min(FOLDS, max(tests) + 1)
+    groups = [test % folds for test in tests]
     base = np.arange(len(channel.base.prior))
     joint = np.concatenate([base, *(choice.variant.columns for choice in chosen)])
     without, having = (
-        held_out_rms(channel.blocks, groups, channel.known, active, noise_mm, channel.held) for active in (base, joint)
+        held_out(channel.blocks, groups, channel.known, active, max(noise_mm, SMALLEST_NOISE_MM), channel.held)
+        for active in (base, joint)
     )
-    return 1e3 * without, 1e3 * having
+    return without, having
 
 
 def _locations(

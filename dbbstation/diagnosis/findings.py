@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.outliers import Outlier
+    from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.inference.harmonics import Misfit
+    from dbbstation.inference.held_out import HeldOut
 
 
 class Verdict(StrEnum):
@@ -44,6 +47,7 @@ class SourceFinding:
         parameters: values with their uncertainty as fitted; for a source that was not, the best amplitudes beside those
             that were, whose uncertainty says how much could hide.
         text: one sentence for people.
+        stability: share of draws of seven tenths of the tests in which it is chosen again; None where it was not tried.
     """
 
     name: str
@@ -55,6 +59,7 @@ class SourceFinding:
     rest_um: float
     parameters: dict[str, Value]
     text: str
+    stability: float | None = None
 
 
 @dataclass(frozen=True)
@@ -152,7 +157,9 @@ class Diagnosis:
         left: misfit of the joint model.
         before: fit of the base model.
         after: joint fit; the same as `before` where nothing was found.
-        held_out_um: root mean square of predictions of left-out tests, before and after [µm].
+        held_out: predictions of left-out tests, before and after [mm].
+        outliers: balls and runs that do not belong, kept from pulling the fits.
+        workspace: how far the earlier calibration was off elsewhere; None where nothing was found.
         locations: largest share first.
         sources: best first.
         unexplained: what is left.
@@ -165,7 +172,9 @@ class Diagnosis:
     left: Misfit
     before: Calibration
     after: Calibration
-    held_out_um: tuple[float, float]
+    held_out: tuple[HeldOut, HeldOut]
+    outliers: tuple[Outlier, ...]
+    workspace: WorkspaceError | None
     locations: tuple[Location, ...]
     sources: tuple[SourceFinding, ...]
     unexplained: Unexplained

@@ -5,6 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.calibration.evaluation import rms_um
+from dbbstation.calibration.outliers import Kind
+from dbbstation.calibration.summary import outlier_summary
+from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,9 +32,17 @@ def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[
             "before": rms_um(diagnosis.before.residual_mm),
             "after": rms_um(diagnosis.after.residual_mm),
         },
-        "held_out_rms_um": {"before": diagnosis.held_out_um[0], "after": diagnosis.held_out_um[1]},
+        "held_out_rms_um": {when: 1e3 * of.rms for when, of in zip(WHEN, diagnosis.held_out, strict=True)},
+        "held_out_normalised": {when: of.normalised for when, of in zip(WHEN, diagnosis.held_out, strict=True)},
+        "circularity_um": _circularity(diagnosis),
+        "workspace": _workspace(diagnosis),
+        "outliers": [outlier_summary(outlier) for outlier in diagnosis.outliers],
         "locations": [_location(location) for location in diagnosis.locations],
-        "sources": [_source(source) for source in diagnosis.sources] + [_lacking(*item) for item in lacking.items()],
+        "sources": [
+            *_seats(diagnosis),
+            *(_source(source) for source in diagnosis.sources),
+            *(_lacking(*item) for item in lacking.items()),
+        ],
         "unexplained": {"rms_um": rest.rms_um, "strut": rest.strut, "variable": rest.variable, "text": rest.text},
         "parameter_shift": [
             {
@@ -45,6 +56,63 @@ def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[
         ],
         "next_test": _next_test(diagnosis),
     }
+
+
+WHEN = ("before", "after")
+
+
+def _circularity(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Circularity that is left of every run, under the kinematic and the joint model."""
+    return [
+        {
+            "test": run.test,
+            "direction": str(run.raw.circle.direction),
+            "repeat": run.repeat,
+            **{
+                when: figures(run.raw, run.raw.circle.bar_mm + left).circularity_um
+                for when, left in zip(WHEN, both, strict=True)
+            },
+        }
+        for run, *both in zip(
+            diagnosis.before.observations, diagnosis.before.residual_mm, diagnosis.after.residual_mm, strict=True
+        )
+    ]
+
+
+def _workspace(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    found = diagnosis.workspace
+    if found is None:
+        return None
+    return {
+        "error_rms_um": found.rms_um,
+        "error_greatest_um": found.greatest_um,
+        "at_pose": list(found.at_pose),
+        "uncertainty_rms_um": found.uncertainty_um,
+    }
+
+
+def _seats(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+    """Balls that do not stand where they should, under the names of the sources that say so."""
+    entries = []
+    for name, kinds in SEATS.items():
+        told = [outlier for outlier in diagnosis.outliers if outlier.kind in kinds]
+        if told:
+            alone = all(outlier.sure for outlier in told)
+            entries.append(
+                {
+                    **_lacking(name, "; ".join(outlier.text for outlier in told)),
+                    "verdict": "identified" if alone else "ambiguous",
+                    "ambiguous_with": [] if alone else [other for other in SEATS if other != name],
+                }
+            )
+    return entries
+
+
+SEATS = {
+    "mounting": frozenset({Kind.MOUNTING, Kind.MOVED}),
+    "ball-coordinate": frozenset({Kind.BALL, Kind.WRONG_PLACE}),
+}
+"""Which outliers are which error source of the measurement."""
 
 
 def _location(location: Location) -> dict[str, Any]:
@@ -76,6 +144,7 @@ def _source(source: SourceFinding) -> dict[str, Any]:
         "signature_rms_um": source.whole_um,
         "unconcealed_rms_um": source.rest_um,
         "gain": source.gain,
+        "stability": source.stability,
         "parameters": {
             name: {"value": v.value, "uncertainty": v.uncertainty, "unit": v.unit}
             for name, v in source.parameters.items()
@@ -91,6 +160,7 @@ def _lacking(name: str, why: str) -> dict[str, Any]:
         "ambiguous_with": [],
         "concealed": None,
         "gain": None,
+        "stability": None,
         "parameters": {},
         "text": why,
     }

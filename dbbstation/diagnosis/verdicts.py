@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 TESTABLE_SIGMA = 5.0
 """An amplitude of the plausible size must stand so far out of its standard deviation for a source to be testable."""
 
+TESTABLE_SHARE = 0.5
+"""Share of the combinations of a source's amplitudes that must be seen for the source to be ruled out."""
+
 AS_GOOD = 5.0
 """Difference in log evidence below which one source explains the recordings about as well as another."""
 
@@ -38,8 +41,12 @@ SHAPE_THRESHOLD = 10.0
 
 
 def testable(race: Race, variant: Variant, others: Sequence[Variant]) -> bool:
-    """Whether a plausible amplitude of a source would be seen beside the base and others."""
-    return bool(np.any(variant.prior / race.sigma(variant, others) >= TESTABLE_SIGMA))
+    """Whether plausible amplitudes of a source would be seen beside the base and others.
+
+    A source with many amplitudes may be seen along some of their combinations only: half of them have to be.
+    """
+    seen = race.visible(variant, others) >= TESTABLE_SIGMA
+    return bool(np.mean(seen) >= TESTABLE_SHARE)
 
 
 def judge(
@@ -67,7 +74,7 @@ def judge(
     free = free_directions(channel.base, machine_columns, channel.held)
     names = [choice.candidate.name for choice in chosen]
     likes = _likenesses(race, chosen, channel)
-    rest = Race(joint.blocks, joint.base, joint.held, joint.columns, noise_mm)
+    rest = joint.race(noise_mm)
     on_joint = {candidate.name: candidate for candidate in joint.named}
     findings = []
     for candidate in channel.named:
@@ -77,7 +84,7 @@ def judge(
             others = [c.variant for c in chosen if c.candidate.name != candidate.name]
             _, together = race.best_variant(candidate, others)
             gain = together - race.evidence(others)
-            signature = concealment(joint.blocks, machine_columns, *_fitted_amplitudes(after, candidate.name), free)
+            signature = concealment([joint.joined], machine_columns, *_fitted_amplitudes(after, candidate.name), free)
             values = _fitted_values(after, candidate.name)
             verdict = Verdict.AMBIGUOUS if alike else Verdict.IDENTIFIED
         else:
@@ -87,7 +94,7 @@ def judge(
             verdict = Verdict.RULED_OUT if seen else Verdict.NOT_TESTABLE
             verdict = Verdict.AMBIGUOUS if alike else verdict
             variant, _ = race.best_variant(candidate, [])
-            signature = concealment(channel.blocks, machine_columns, variant.columns, variant.prior, free)
+            signature = concealment([channel.joined], machine_columns, variant.columns, variant.prior, free)
         findings.append(
             SourceFinding(
                 name=candidate.name,
@@ -250,7 +257,7 @@ def unexplained(
 
 def _best_shape(channel: Channel, noise_mm: float) -> tuple[Race, Candidate, Variant, float]:
     """Unnamed shape with the greatest evidence on a channel."""
-    race = Race(channel.blocks, channel.base, channel.held, channel.columns, noise_mm)
+    race = channel.race(noise_mm)
     trials = [(*race.best_variant(candidate, []), candidate) for candidate in channel.unnamed]
     variant, gain, candidate = max(trials, key=lambda trial: trial[1])
     return race, candidate, variant, gain

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.square_root import Block, Columns, solve
+from dbbstation.inference.square_root import Block, Columns, Solution, solve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,18 +15,30 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def held_out_rms(
+@dataclass(frozen=True)
+class HeldOut:
+    """What predictions leave of measurements that were not fitted.
+
+    Attributes:
+        rms: root mean square once random effects that only the left-out blocks know have settled under their priors, in
+            the channel's unit: where a ball came to stand says nothing for or against a model of the machine.
+        normalised: root of the sum of squares in units of its predicted covariance, by noise, random effects and the
+            uncertainty of what was fitted, over its degrees of freedom; near 1 where model and uncertainties are right.
+    """
+
+    rms: float
+    normalised: float
+
+
+def held_out(
     blocks: Sequence[Block],
     groups: Sequence[int],
     known: Columns,
     active: NDArray[np.int64],
     noise: float,
     held: NDArray[np.float64],
-) -> float:
-    """Root mean square of what predictions leave of groups of blocks that were left out in turn.
-
-    Random effects that only the left-out blocks know are given the values that suit them best under their priors:
-    where a ball came to stand in a mounting says nothing for or against a model of the machine.
+) -> HeldOut:
+    """Leave groups of blocks out in turn and predict them from the others.
 
     Args:
         blocks: compressed runs.
@@ -37,14 +50,17 @@ def held_out_rms(
     """
     used = Columns(known.prior[active], known.scale[active], known.random[active])
     thin = [_restricted(block, active) for block in blocks]
-    square, count = 0.0, 0
+    square, count, weighted, rows = 0.0, 0, 0.0, 0
     for group in sorted(set(groups)):
         kept = [b for b, g in zip(thin, groups, strict=True) if g != group]
         out = [b for b, g in zip(thin, groups, strict=True) if g == group]
         fitted = solve(kept, used, noise, held)
         square += _left(out, used, fitted.x, noise)
         count += sum(block.count for block in out)
-    return float(np.sqrt(square / count))
+        inside, degrees = _weighted(out, fitted, noise)
+        weighted += inside
+        rows += degrees
+    return HeldOut(float(np.sqrt(square / count)), float(np.sqrt(weighted / max(rows, 1))))
 
 
 def _restricted(block: Block, active: NDArray[np.int64]) -> Block:
@@ -55,17 +71,35 @@ def _restricted(block: Block, active: NDArray[np.int64]) -> Block:
     return Block(columns, block.triangle[:, inside], block.target, block.count, block.square)
 
 
-def _left(blocks: Sequence[Block], known: Columns, x: NDArray[np.float64], noise: float) -> float:
-    """Sum of squares that is left of blocks once their random effects have settled."""
-    size = len(known.prior)
-    random = np.flatnonzero(known.random)
-    rows, targets = [], []
+def _wide(blocks: Sequence[Block], size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    rows = []
     for block in blocks:
         wide = np.zeros((len(block.target), size))
         wide[:, block.columns] = block.triangle
         rows.append(wide)
-        targets.append(block.target)
-    whole, target = np.vstack(rows), np.concatenate(targets)
+    return np.vstack(rows), np.concatenate([block.target for block in blocks])
+
+
+def _weighted(blocks: Sequence[Block], fitted: Solution, noise: float) -> tuple[float, int]:
+    """Sum of squares of what predictions leave, weighted by its predicted covariance, and its degrees of freedom.
+
+    The covariance is noise + W C W^T; with C = F F^T its inverse needs a matrix of C's size only [Woodbury].
+    """
+    # The last row of a triangle holds the length of what no column reaches, which is not one measurement's noise.
+    cut = [Block(b.columns, b.triangle[:-1], b.target[:-1], b.count, b.square) for b in blocks]
+    whole, target = _wide(cut, len(fitted.x))
+    remaining = (target - whole @ fitted.x) / noise
+    variance, axes = np.linalg.eigh(fitted.covariance)
+    spread = whole @ (axes * np.sqrt(np.maximum(variance, 0.0))) / noise
+    towards = spread.T @ remaining
+    explained = towards @ np.linalg.solve(np.eye(len(towards)) + spread.T @ spread, towards)
+    return float(remaining @ remaining - explained), len(remaining)
+
+
+def _left(blocks: Sequence[Block], known: Columns, x: NDArray[np.float64], noise: float) -> float:
+    """Sum of squares that is left of blocks once their random effects have settled."""
+    random = np.flatnonzero(known.random)
+    whole, target = _wide(blocks, len(known.prior))
     fixed = x.copy()
     fixed[random] = 0.0
     remaining = target - whole @ fixed

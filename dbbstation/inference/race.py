@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from dbbstation.inference.square_root import Block, Columns
 
 
+PAIRED = 8
+"""Best single candidates of which all pairs are tried."""
+
+
 @dataclass(frozen=True, eq=False)
 class Variant:
     """One form of a candidate: columns with priors, and the values of shape that they were made with.
@@ -132,6 +136,22 @@ class Race:
             variance = np.sum((vt[:, : len(variant.columns)] / s[:, None]) ** 2, axis=0)
         return variant.prior * np.sqrt(variance)
 
+    def visible(self, variant: Variant, others: Sequence[Variant] = ()) -> NDArray[np.float64]:
+        """How far plausible amplitudes stand out of what the measurement leaves uncertain, most visible first, (p,).
+
+        Singular values of the signature in units of plausible sizes, base and others fitted: along each direction of
+        the amplitudes the plausible size over its standard deviation.
+        """
+        columns = self._left[:, variant.columns - self._first] * variant.prior
+        if others:
+            beside = np.concatenate([other.columns for other in others]) - self._first
+            prior = np.concatenate([other.prior for other in others])
+            explained = np.vstack([self._left[:, beside], np.diag(1.0 / prior)])
+            padded = np.vstack([columns, np.zeros((len(prior), columns.shape[1]))])
+            fitted, *_ = np.linalg.lstsq(explained, padded, rcond=None)
+            columns = padded - explained @ fitted
+        return np.asarray(np.linalg.svd(columns, compute_uv=False), dtype=np.float64)
+
     def best_variant(self, candidate: Candidate, others: Sequence[Variant]) -> tuple[Variant, float]:
         """Best form of a candidate beside others, and the log evidence of all its forms together."""
         evidences = np.array([self.evidence([*others, variant]) for variant in candidate.variants])
@@ -153,7 +173,9 @@ class Race:
 
 
 def select(race: Race, candidates: Sequence[Candidate], threshold: float, most: int) -> list[Choice]:
-    """Best combination of candidates, grown and pruned one at a time.
+    """Best combination of candidates, grown and pruned one at a time, but begun with the best pair where that is better.
+
+    Two effects may hide each other so that neither helps alone.
 
     Args:
         race: what the base leaves.
@@ -170,14 +192,31 @@ def select(race: Race, candidates: Sequence[Candidate], threshold: float, most: 
         if not trials:
             break
         candidate, variant, together = max(trials, key=lambda trial: trial[2])
-        if together - before < threshold:
+        step = [] if together - before < threshold else [Choice(candidate, variant)]
+        if not chosen and most > 1:
+            step = _best_pair(race, trials, step, threshold)
+        if not step:
             break
-        grown = _pruned(race, _settled(race, [*chosen, Choice(candidate, variant)]), threshold)
+        grown = _pruned(race, _settled(race, [*chosen, *step]), threshold)
         # Pruning may undo the step or lead back; only what explains more is a step, so that this comes to an end.
         if race.evidence([choice.variant for choice in grown]) <= before:
             break
         chosen = grown
     return chosen
+
+
+def _best_pair(
+    race: Race, trials: Sequence[tuple[Candidate, Variant, float]], single: list[Choice], threshold: float
+) -> list[Choice]:
+    """Return the best pair among the best singles, or the single, where no pair is worth a second name more."""
+    best, evidence = single, race.evidence([choice.variant for choice in single])
+    leading = sorted(trials, key=lambda trial: -trial[2])[:PAIRED]
+    for k, (first, first_variant, _) in enumerate(leading):
+        for second, second_variant, _ in leading[k + 1 :]:
+            together = race.evidence([first_variant, second_variant])
+            if together - evidence > threshold * (2 - len(best)):
+                best, evidence = [Choice(first, first_variant), Choice(second, second_variant)], together
+    return best
 
 
 def _pruned(race: Race, chosen: list[Choice], threshold: float) -> list[Choice]:

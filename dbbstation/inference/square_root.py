@@ -58,6 +58,26 @@ def compress(columns: NDArray[np.int64], jacobian: NDArray[np.float64], target: 
     return Block(columns, triangle[:, :-1], triangle[:, -1], len(target), float(target @ target))
 
 
+def joined(blocks: Sequence[Block], columns: int) -> Block:
+    """One block over all columns that says what several blocks of one noise say together."""
+    wide = np.zeros((sum(len(block.target) for block in blocks), columns + 1))
+    row = 0
+    for block in blocks:
+        if block.noise is not None:
+            raise ValueError("blocks with a noise of their own cannot be joined with others")
+        wide[row : row + len(block.target), block.columns] = block.triangle
+        wide[row : row + len(block.target), -1] = block.target
+        row += len(block.target)
+    triangle = _triangle(wide)
+    return Block(
+        columns=np.arange(columns),
+        triangle=triangle[:, :-1],
+        target=triangle[:, -1],
+        count=sum(block.count for block in blocks),
+        square=sum(block.square for block in blocks),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Columns:
     """What is known of the columns of x before the measurement.

@@ -86,6 +86,7 @@ def concealed_gravity(
     gravity_finding = next(f for f in found.sources if f.name == "gravity")
     shifts = np.array([shift.shift_um for shift in found.shifts if shift.parameter.startswith("base-joints")])
     value = gravity_finding.parameters["strut_compliance_um_kn"]
+    held_out = [1e3 * predicted.rms for predicted in found.held_out]
     numbers = {
         "seed": seed,
         "residual_um": {
@@ -93,7 +94,7 @@ def concealed_gravity(
             "kinematic": rms_um(found.before.residual_mm),
             "joint": rms_um(found.after.residual_mm),
         },
-        "held_out_um": {"kinematic": found.held_out_um[0], "joint": found.held_out_um[1]},
+        "held_out_um": {"kinematic": held_out[0], "joint": held_out[1]},
         "verdict": str(gravity_finding.verdict),
         "concealed": gravity_finding.concealed,
         "signature_um": gravity_finding.whole_um,

@@ -9,9 +9,10 @@ from scipy.stats import multivariate_normal
 
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.harmonics import bands, coefficients, misfit, smooth
-from dbbstation.inference.held_out import held_out_rms
+from dbbstation.inference.held_out import held_out
 from dbbstation.inference.race import Candidate, Race, Variant, select
-from dbbstation.inference.square_root import Columns, compress, solve
+from dbbstation.inference.square_root import Columns, compress, joined, solve
+from dbbstation.inference.stability import stability
 
 NOISE = 0.5
 T = np.linspace(0, 1, 60, endpoint=False)
@@ -140,8 +141,76 @@ def test_left_out_runs_are_predicted_as_by_hand(rng):
         whole = np.vstack([terms(run)[:, :2] for run in kept])
         fitted, *_ = np.linalg.lstsq(whole, np.concatenate([targets[run] for run in kept]), rcond=None)
         squares += np.sum((targets[out] - terms(out)[:, :2] @ fitted) ** 2)
-    found = held_out_rms(blocks, list(range(RUNS)), known, np.array([0, 1]), NOISE, NONE_HELD)
-    assert found == pytest.approx(np.sqrt(squares / 240), rel=1e-9)
+    found = held_out(blocks, list(range(RUNS)), known, np.array([0, 1]), NOISE, NONE_HELD)
+    assert found.rms == pytest.approx(np.sqrt(squares / 240), rel=1e-9)
+
+
+def test_left_out_runs_in_units_of_their_predicted_covariance(rng):
+    """Random effects that only a left-out run knows, and a model that is right: chi-square over its freedom."""
+    columns = [np.array([0, 1, 2 + run]) for run in range(RUNS)]
+    known = Columns(np.array([np.inf, np.inf] + [0.8] * RUNS), np.ones(2 + RUNS), np.array([False] * 2 + [True] * RUNS))
+    active, found, wrong = np.arange(2 + RUNS), [], []
+    for _ in range(200):
+        jacobians = [np.column_stack([terms(run)[:, :2], np.sin(2 * np.pi * T)]) for run in range(RUNS)]
+        x = np.concatenate([[3.0, -1.0], rng.normal(0, 0.8, RUNS)])
+        targets = [j @ x[c] + rng.normal(0, NOISE, 60) for j, c in zip(jacobians, columns, strict=True)]
+        blocks = [compress(c, j, t) for c, j, t in zip(columns, jacobians, targets, strict=True)]
+        found.append(held_out(blocks, list(range(RUNS)), known, active, NOISE, NONE_HELD).normalised)
+        narrow = Columns(np.where(known.random, 0.1, known.prior), known.scale, known.random)
+        wrong.append(held_out(blocks, list(range(RUNS)), narrow, active, NOISE, NONE_HELD).normalised)
+    # Three rows of each of four runs: 12 degrees of freedom, dependent a little, in each of 200 draws.
+    assert np.mean(np.square(found)) == pytest.approx(1.0, abs=0.1)
+    assert np.mean(np.square(wrong)) > 3.0
+
+
+def test_two_effects_that_hide_each_other_are_found_as_a_pair(rng):
+    """Columns that are nearly opposite: each alone explains next to nothing of their sum, both explain it all."""
+    line = rng.normal(size=240)
+    other = -line + 0.05 * rng.normal(size=240)
+    third = rng.normal(size=240)
+    jacobian = np.column_stack([np.ones(240), line, other, third])
+    target = jacobian @ [1.0, 10.0, 10.0, 0.0] + rng.normal(0, 0.1, 240)
+    base = Columns(np.full(1, np.inf), np.ones(1), np.zeros(1, dtype=bool))
+    race = Race([compress(np.arange(4), jacobian, target)], base, np.zeros((0, 1)), 4, 0.1)
+    candidates = [
+        Candidate(name, (Variant(np.array([k]), np.array([20.0])),)) for k, name in enumerate(("a", "b", "c"), start=1)
+    ]
+    assert {choice.candidate.name for choice in select(race, candidates, 5.0, 3)} == {"a", "b"}
+
+
+def test_visible_is_plausible_size_over_standard_deviation(rng):
+    race, _, _ = race_on(rng, [0.0, 0.0, 0.0, 0.0])
+    for candidate in CANDIDATES:
+        variant = candidate.variants[0]
+        assert race.visible(variant) == pytest.approx(variant.prior / race.sigma(variant))
+        beside = [CANDIDATES[0].variants[0]] if candidate.name != "sine" else [CANDIDATES[2].variants[0]]
+        assert race.visible(variant, beside) == pytest.approx(variant.prior / race.sigma(variant, beside), rel=1e-6)
+
+
+def test_of_two_amplitudes_that_only_their_sum_shows_one_combination_is_visible(rng):
+    line = rng.normal(size=200)
+    jacobian = np.column_stack([np.ones(200), line, line])
+    base = Columns(np.full(1, np.inf), np.ones(1), np.zeros(1, dtype=bool))
+    race = Race([compress(np.arange(3), jacobian, line)], base, np.zeros((0, 1)), 3, 0.1)
+    both = Variant(np.array([1, 2]), np.ones(2))
+    seen = race.visible(both)
+    # Along (1, 1) / sqrt(2) the column is sqrt(2) times the line.
+    expected = np.sqrt(2.0) * np.linalg.norm(line - line.mean()) / 0.1
+    assert seen == pytest.approx([expected, 0.0], abs=1e-6 * expected)
+
+
+def test_what_is_there_is_chosen_from_parts_of_the_runs_and_what_is_not_is_not(rng):
+    _, blocks, _ = race_on(rng, [0.6, 0.0, 0.0, 0.0])
+    again = stability(blocks, list(range(RUNS)), BASE, NONE_HELD, CANDIDATES, NOISE, 3.0, 2, 10, rng)
+    assert again == {"sine": 1.0, "cosine": 0.0, "square": 0.0, "parabola": 0.0}
+
+
+def test_joined_blocks_say_what_they_said_apart(rng):
+    race, blocks, _ = race_on(rng, [0.6, 0.0, 0.3, 0.0])
+    together = Race([joined(blocks, 6)], BASE, NONE_HELD, 6, NOISE)
+    assert together.chi2 == pytest.approx(race.chi2)
+    variants = [candidate.variants[0] for candidate in CANDIDATES[:2]]
+    assert together.evidence(variants) == pytest.approx(race.evidence(variants))
 
 
 def test_coefficients_of_white_noise_and_of_a_sine(rng):

@@ -1,0 +1,106 @@
+"""What a missing effect cost away from the tests: how far two models put the tool apart over the workspace."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.summary import identified_model
+from dbbstation.errors import MachineError
+from dbbstation.machine.travel import check_travel
+from dbbstation.model.uncertainty import position_uncertainty_mm
+from dbbstation.sources.contract import Motion, Need
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import MachineModel
+
+REACH = 0.6
+"""Share of the travel about its middle that is looked at; the corners beyond are hardly used."""
+
+TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0))
+
+STEPS = 5
+"""Places along each axis."""
+
+ANYWHERE = frozenset({Need.POSE})
+"""What a source may need to be known away from any path or time."""
+
+
+@dataclass(frozen=True)
+class WorkspaceError:
+    """Errors over the workspace, lengths of position errors.
+
+    Attributes:
+        rms_um: how far the earlier calibration put the tool from where the joint model puts it [µm].
+        greatest_um: the greatest of these [µm].
+        at_pose: where that is, X, Y, Z, A, B, C [mm, deg].
+        uncertainty_um: root mean square of the joint model's own standard uncertainty [µm].
+    """
+
+    rms_um: float
+    greatest_um: float
+    at_pose: tuple[float, ...]
+    uncertainty_um: float
+
+
+def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError | None:
+    """Compare two calibrations of one machine over the workspace; None where no place is within travel.
+
+    Only sources that need no more than the pose are looked at: drift and backlash have no place of their own. A common
+    shift is left out, since a program's zero is set on the part.
+    """
+    machine = before.layout.machine
+    poses = workspace(machine)
+    if len(poses) == 0:
+        return None
+    motion = Motion(poses)
+    was, now = (_anywhere(c.model).actual_poses(motion)[:, :3] for c in (before, after))
+    apart = was - now
+    apart = apart - apart.mean(axis=0)
+    length = np.linalg.norm(apart, axis=1)
+    worst = int(np.argmax(length))
+    identified = identified_model(after, {}, {})
+    identified = replace(identified, model=_anywhere(identified.model))
+    own = np.linalg.norm(position_uncertainty_mm(identified, motion), axis=1)
+    return WorkspaceError(
+        rms_um=1e3 * _rms(length),
+        greatest_um=1e3 * float(length[worst]),
+        at_pose=tuple(poses[worst].tolist()),
+        uncertainty_um=1e3 * _rms(own),
+    )
+
+
+def workspace(machine: Machine) -> NDArray[np.float64]:
+    """Poses over the inner part of the travel that the machine can take, shape (n, 6) [mm, deg]."""
+    travel = machine.travel
+    middle = sum(travel.z_mm) / 2.0
+    across = np.linspace(-REACH, REACH, STEPS) * travel.xy_radius_mm
+    up = middle + np.linspace(-REACH, REACH, STEPS) * (travel.z_mm[1] - travel.z_mm[0]) / 2.0
+    x, y, z, tilt = np.meshgrid(across, across, up, np.arange(len(TILTS_DEG)), indexing="ij")
+    tilts = np.array(TILTS_DEG)[tilt.ravel()]
+    poses = np.column_stack([x.ravel(), y.ravel(), z.ravel(), tilts, np.zeros(len(tilts))])
+    inside = np.hypot(poses[:, 0], poses[:, 1]) <= REACH * travel.xy_radius_mm + 1e-9
+    return poses[[row for row in np.flatnonzero(inside) if _reachable(machine, poses[row : row + 1])]]
+
+
+def _reachable(machine: Machine, pose: NDArray[np.float64]) -> bool:
+    try:
+        check_travel(machine, pose, where="workspace")
+    except MachineError:
+        return False
+    return True
+
+
+def _anywhere(model: MachineModel) -> MachineModel:
+    own = model.of_the_machine()
+    return replace(own, sources=tuple(f for f in own.sources if f.source.needs <= ANYWHERE))
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))

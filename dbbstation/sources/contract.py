@@ -249,6 +249,8 @@ class ErrorSource(ABC):
     weighs_struts: ClassVar[bool] = False
     """True where its `load_n` is that of the strut weights, which the machine file may state as well."""
     texts: ClassVar[Texts]
+    candidate: ClassVar[bool] = True
+    """Whether a diagnosis may name it; False for what only describes an error and is no cause of one."""
 
     @abstractmethod
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:

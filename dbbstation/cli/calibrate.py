@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.source_files import source_file_option
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 @click.option(
     "--sources", metavar="A,B,...", help="Error sources to fit, in place of strut-reference-length,base-joints."
 )
+@source_file_option
 @click.option(
     "--method",
     type=click.Choice(["jig", "conv-a", "conv-b"]),
@@ -36,6 +39,7 @@ def calibrate(
     sessions: tuple[Path, ...],
     *,
     sources: str | None,
+    source_files: tuple[Path, ...],
     method: str,
     prescribe: str | None,
     exclude: tuple[str, ...],
@@ -59,6 +63,7 @@ def calibrate(
       dbbstation calibrate monday tuesday --exclude h --json
       dbbstation calibrate standard-test --method conv-a
       dbbstation calibrate monday --sources strut-reference-length,base-joints,gravity,cog-shift,drive-friction
+      dbbstation calibrate monday --source-file scale_bow.py --sources strut-reference-length,base-joints,scale-bow
 
     With drive-friction among the sources, recorded motor currents count as well: gains and friction of the drives, and
     with cog-shift the centre of gravity.
@@ -73,13 +78,17 @@ def calibrate(
     from dbbstation.errors import ModelError
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.models import write_model
+    from dbbstation.files.own_sources import every_source, sources_of
     from dbbstation.recorded import load_sessions
     from dbbstation.sources.registry import sources_named
 
     if out is not None:
         refuse_existing(out, force=force)
     chosen = KINEMATIC_SOURCES if sources is None else tuple(filter(None, map(str.strip, sources.split(","))))
-    fitted = sources_named(dict.fromkeys(chosen + MEASUREMENT_SOURCES))
+    every = every_source(source_files)
+    for name in set(sources_of(source_files, every)) - set(chosen):
+        say(f"note: {name} is known now, but not fitted: name it with --sources")
+    fitted = sources_named(dict.fromkeys(chosen + MEASUREMENT_SOURCES), every)
     if not machine_sources(fitted):
         raise ModelError(
             "none of the error sources named belongs to the machine and shows in circles: there is nothing to calibrate",

@@ -7,12 +7,15 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.source_files import source_file_option
+
 
 @click.command()
 @click.argument("files", nargs=-1, type=click.Path(path_type=Path), metavar="FILE...")
+@source_file_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.option("--schema", metavar="FORMAT", help="Print the JSON Schema of a format, such as dbb-plan/1, and stop.")
-def check(files: tuple[Path, ...], *, as_json: bool, schema: str | None) -> None:
+def check(files: tuple[Path, ...], *, source_files: tuple[Path, ...], as_json: bool, schema: str | None) -> None:
     r"""Validate machines, plans, jigs, models, runs (.csv, .csv.part), recordings of drives and session folders.
 
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
@@ -36,9 +39,10 @@ def check(files: tuple[Path, ...], *, as_json: bool, schema: str | None) -> None
         raise click.UsageError("name at least one file or session folder")
 
     from dbbstation.files.checking import check as check_one
-    from dbbstation.sources.registry import known_sources
+    from dbbstation.files.own_sources import every_source
 
-    results = [check_one(file, known_sources()) for file in files]
+    known = every_source(source_files)
+    results = [check_one(file, known) for file in files]
     problems = [problem for result in results for problem in result.problems]
     if as_json:
         print_json(

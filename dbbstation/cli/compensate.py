@@ -6,12 +6,15 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.source_files import source_file_option
+
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
 
 @click.command()
 @click.argument("program_file", type=_FILE, metavar="PROGRAM")
 @click.option("--model", "model_file", type=_FILE, required=True, help="Calibrated model.")
+@source_file_option
 @click.option("--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language to write.")
 @click.option("--from", "source", metavar="D", help="Language of PROGRAM [what its extension says].")
 @click.option("--out", type=_FILE, required=True, help="File to write.")
@@ -35,6 +38,7 @@ def compensate(
     *,
     program_file: Path,
     model_file: Path,
+    source_files: tuple[Path, ...],
     dialect: str,
     source: str | None,
     out: Path,
@@ -67,7 +71,7 @@ def compensate(
     done = compensated_program(
         path,
         written_in,
-        loaded_inverse(model_file, time_s),
+        loaded_inverse(model_file, time_s, source_files),
         chord_mm=chord_um / 1e3,
         origin={"program file": hashed(program_file)},
     )

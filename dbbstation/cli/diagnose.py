@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.source_files import source_file_option
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-
-SOURCES = ("gravity", "backlash", "thermal-struts", "bar-drift")
-"""What is looked for where nothing else is asked for."""
 
 
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@click.option("--sources", metavar="A,B,...", help=f"Sources to look for, in place of {', '.join(SOURCES)}.")
+@click.option("--sources", metavar="A,B,...", help="Sources to look for, in place of all that are known.")
+@source_file_option
 @click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
 @click.option("--force", is_flag=True, help="Overwrite the model file.")
@@ -25,6 +25,7 @@ def diagnose(
     sessions: tuple[Path, ...],
     *,
     sources: str | None,
+    source_files: tuple[Path, ...],
     exclude: tuple[str, ...],
     out: Path | None,
     force: bool,
@@ -41,6 +42,7 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7
       dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml
       dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
+      dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
     """
     from dbbstation.calibration.evaluation import evaluate
     from dbbstation.calibration.summary import calibration_summary, identified_model
@@ -49,11 +51,12 @@ def diagnose(
     from dbbstation.diagnosed import diagnose_sessions
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.models import write_model
+    from dbbstation.files.own_sources import every_source
 
     if out is not None:
         refuse_existing(out, force=force)
-    candidates = [name.strip() for name in sources.split(",")] if sources else SOURCES
-    diagnosed = diagnose_sessions(sessions, candidates, exclude, say)
+    candidates = [name.strip() for name in sources.split(",")] if sources else None
+    diagnosed = diagnose_sessions(sessions, candidates, exclude, say, every_source(source_files))
     found, summary = diagnosed.diagnosis, diagnosed.summary()
     if out is not None:
         calibrated = calibration_summary(found.after, evaluate(found.after.model, found.after.observations))
@@ -76,6 +79,8 @@ def _print(summary: Mapping[str, Any]) -> None:
     else:
         click.echo(f"The recordings agree with the kinematic model (probability {summary['probability']:.2g}).")
     click.echo()
+    for outlier in summary["outliers"]:
+        click.echo(f"does not belong, kept from pulling the fits: {outlier['text']}")
     _print_sources(summary["sources"])
     if summary["locations"]:
         click.echo("\nwhere the misfit is largest:")
@@ -83,7 +88,18 @@ def _print(summary: Mapping[str, Any]) -> None:
             click.echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
     residual, held_out = summary["residual_rms_um"], summary["held_out_rms_um"]
     click.echo(f"\nresidual within mountings {residual['before']:.2f} -> {residual['after']:.2f} µm rms")
-    click.echo(f"left-out tests, predicted {held_out['before']:.2f} -> {held_out['after']:.2f} µm rms")
+    normalised = summary["held_out_normalised"]
+    click.echo(
+        f"left-out tests, predicted {held_out['before']:.2f} -> {held_out['after']:.2f} µm rms; in units of what "
+        f"noise and uncertainties allow {normalised['before']:.2f} -> {normalised['after']:.2f}"
+    )
+    if summary["workspace"]:
+        elsewhere = summary["workspace"]
+        click.echo(
+            f"over the workspace the earlier calibration was off by {elsewhere['error_rms_um']:.1f} µm rms, "
+            f"{elsewhere['error_greatest_um']:.1f} µm at most; the joint model is uncertain by "
+            f"{elsewhere['uncertainty_rms_um']:.1f} µm"
+        )
     if summary["parameter_shift"]:
         click.echo("the earlier calibration had been pulled, most of all:")
         for shift in summary["parameter_shift"][:4]:
@@ -104,8 +120,10 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
     for source in sources:
         hidden = "" if source["concealed"] is None else f"{100 * source['concealed']:.0f} %"
         gain = "" if source["gain"] is None else f"{source['gain']:.0f}"
-        rows.append([source["name"], source["verdict"], gain, hidden, ", ".join(source["ambiguous_with"])])
-    print_table(["source", "verdict", "log evidence", "concealed", "not told from"], rows)
+        again = "" if source["stability"] is None else f"{100 * source['stability']:.0f} %"
+        alike = ", ".join(source["ambiguous_with"])
+        rows.append([source["name"], source["verdict"], gain, hidden, again, alike])
+    print_table(["source", "verdict", "log evidence", "concealed", "again", "not told from"], rows)
     for source in sources:
         if source["verdict"] in {"identified", "ambiguous"}:
             click.echo()

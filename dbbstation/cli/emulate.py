@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.source_files import source_file_option
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -25,6 +27,7 @@ _LOOK_S = 0.2
 @click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="Balls and circles.")
 @click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
 @click.option("--truth", type=click.Path(path_type=Path), help="Model with what is wrong with the actual machine.")
+@source_file_option
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random.")
 @click.option("--rate-hz", type=click.FloatRange(0.1, 100000.0), help="Samples per second, where it is set to others.")
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of NC programs to run.")
@@ -41,6 +44,7 @@ def emulate(
     plan_file: Path,
     machine_file: Path,
     truth: Path | None,
+    source_files: tuple[Path, ...],
     seed: int,
     programs: Path | None,
     rate_hz: float | None,
@@ -76,7 +80,7 @@ def emulate(
 
     protocol = at_rate(load_instrument(instrument), rate_hz)
     machine, plan = read_machine(machine_file), read_plan(plan_file)
-    model = _truth(machine, truth, seed)
+    model = _truth(machine, truth, source_files, seed)
     virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))
     virtual.check()
     clock = ScaledClock(time_scale)
@@ -99,7 +103,7 @@ def emulate(
             click.echo("switched off", err=True)
 
 
-def _truth(machine: Machine, file: Path | None, seed: int) -> MachineModel:
+def _truth(machine: Machine, file: Path | None, source_files: tuple[Path, ...], seed: int) -> MachineModel:
     """Return the actual machine: of a model file, or a random one.
 
     Raises:
@@ -108,13 +112,13 @@ def _truth(machine: Machine, file: Path | None, seed: int) -> MachineModel:
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.machine_file import machine_data, machine_parts
     from dbbstation.files.models import read_model
+    from dbbstation.files.own_sources import every_source
     from dbbstation.model.machine_model import MachineModel
-    from dbbstation.sources.registry import known_sources
     from dbbstation.virtual.truth import random_kinematics
 
     if file is None:
         return MachineModel(machine, random_kinematics(machine, seed))
-    model = read_model(file, known_sources()).model.of_the_machine()
+    model = read_model(file, every_source(source_files)).model.of_the_machine()
     if machine_data(machine_parts(model.machine)) != machine_data(machine_parts(machine)):
         what = f"its nominal machine ({model.machine.name}) is not the one given with --machine ({machine.name})"
         raise InputError([Problem(str(file), 0, 0, what, "give the machine file that the model was made for")])

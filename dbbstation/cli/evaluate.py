@@ -6,13 +6,18 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.source_files import source_file_option
+
 
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
 @click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
+@source_file_option
 @click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def evaluate(sessions: tuple[Path, ...], *, model: Path, exclude: tuple[str, ...], as_json: bool) -> None:
+def evaluate(
+    sessions: tuple[Path, ...], *, model: Path, source_files: tuple[Path, ...], exclude: tuple[str, ...], as_json: bool
+) -> None:
     r"""Compare recordings with the nominal machine (before) and with a model (after).
 
     After is what the model leaves of the recordings, not a new measurement. Flatness over X, Y = ±190 mm and
@@ -29,10 +34,10 @@ def evaluate(sessions: tuple[Path, ...], *, model: Path, exclude: tuple[str, ...
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.output import print_json, say
     from dbbstation.files.models import read_model
+    from dbbstation.files.own_sources import every_source
     from dbbstation.recorded import load_sessions
-    from dbbstation.sources.registry import known_sources
 
-    identified = read_model(model, known_sources())
+    identified = read_model(model, every_source(source_files))
     recorded = load_sessions(sessions, exclude)
     for warning in recorded.warnings:
         say(f"note: {warning}")

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.source_files import source_file_option
+
 
 @click.command()
 @click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
+@source_file_option
 @click.option("--poses", required=True, type=click.Path(path_type=Path), help="CSV of commanded poses.")
 @click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="CSV of actual poses.")
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON.")
-def predict(*, model: Path, poses: Path, out: Path, force: bool, as_json: bool) -> None:
+def predict(*, model: Path, source_files: tuple[Path, ...], poses: Path, out: Path, force: bool, as_json: bool) -> None:
     r"""Say where the tool really goes for commanded poses, and how well that is known.
 
     Columns in: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Out: the same, actual, with u_x_mm,u_y_mm,u_z_mm, one standard
@@ -29,14 +32,14 @@ def predict(*, model: Path, poses: Path, out: Path, force: bool, as_json: bool) 
     from dbbstation.cli.output import print_json, say
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.models import read_model
+    from dbbstation.files.own_sources import every_source
     from dbbstation.files.pose_table import read_poses, write_poses
     from dbbstation.machine.travel import check_travel
     from dbbstation.model.uncertainty import position_uncertainty_mm
     from dbbstation.sources.contract import Motion
-    from dbbstation.sources.registry import known_sources
 
     refuse_existing(out, force=force)
-    identified = read_model(model, known_sources())
+    identified = read_model(model, every_source(source_files))
     table = read_poses(poses)
     check_travel(identified.model.machine, table.poses, where=str(poses))
     motion = Motion(table.poses)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.source_files import source_file_option
+
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
 
@@ -15,6 +17,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.option("--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language of the control.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
 @click.option("--model", "model_file", type=_FILE, help="Compensate with this calibrated model.")
+@source_file_option
 @click.option("--test", "tests", multiple=True, metavar="NAME", help="This test only; may be given more than once.")
 @click.option(
     "--step-deg", type=click.FloatRange(0.01, 5.0), default=0.1, show_default=True, help="Angle between points [deg]."
@@ -42,6 +45,7 @@ def program(
     dialect: str,
     out: Path,
     model_file: Path | None,
+    source_files: tuple[Path, ...],
     tests: tuple[str, ...],
     step_deg: float,
     clearance_mm: float,
@@ -73,7 +77,7 @@ def program(
 
     written_in = dialect_named(dialect)
     plan, machine = read_plan(plan_file), read_machine(machine_file)
-    inverse = None if model_file is None else loaded_inverse(model_file, time_s)
+    inverse = None if model_file is None else loaded_inverse(model_file, time_s, source_files)
     programs = circle_programs(
         plan,
         machine,

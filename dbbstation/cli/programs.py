@@ -11,9 +11,9 @@ import numpy as np
 from dbbstation.cli.output import print_json, print_table
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.models import read_model
+from dbbstation.files.own_sources import every_source
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.nc.export import Inverse
-from dbbstation.sources.registry import known_sources
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from dbbstation.nc.export import Program
 
 
-def loaded_inverse(model_file: Path, time_s: float | None) -> Inverse:
+def loaded_inverse(model_file: Path, time_s: float | None, source_files: Sequence[Path]) -> Inverse:
     """Read the model to compensate with; the header will name it and its sessions by hash.
 
     Raises:
         InputError: every fault of the file with its place.
     """
-    identified = read_model(model_file, known_sources())
+    identified = read_model(model_file, every_source(source_files))
     origin = {"model file": hashed(model_file)}
     origin |= {f"session {name}": f"sha256 {digest}" for name, digest in identified.sessions.items()}
     return Inverse(identified.model, origin, time_s)

@@ -6,14 +6,19 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.source_files import source_file_option
+
 
 @click.command()
 @click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
+@source_file_option
 @click.option("--plan", required=True, type=click.Path(path_type=Path), help="Test plan.")
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder to make.")
 @click.option("--samples", default=720, show_default=True, type=click.IntRange(36), help="Samples per turn.")
 @click.option("--interval-s", default=200.0, show_default=True, help="Time from the start of one run to the next [s].")
-def simulate(*, model: Path, plan: Path, out: Path, samples: int, interval_s: float) -> None:
+def simulate(
+    *, model: Path, source_files: tuple[Path, ...], plan: Path, out: Path, samples: int, interval_s: float
+) -> None:
     r"""Write the session that a ball bar would record on the machine of a model, without noise.
 
     Balls stand where the plan has them, those that it puts up under the spindle where the model has the tool tip; only
@@ -31,15 +36,15 @@ def simulate(*, model: Path, plan: Path, out: Path, samples: int, interval_s: fl
     from dbbstation.cli.output import say
     from dbbstation.errors import OutputError
     from dbbstation.files.models import read_model
+    from dbbstation.files.own_sources import every_source
     from dbbstation.files.plan_file import read_inline_plan
     from dbbstation.files.session_writer import FinishedRun, write_session
     from dbbstation.model.simulation import simulate_circle
-    from dbbstation.sources.registry import known_sources
     from dbbstation.virtual.under_spindle import SetUp, put_up
 
     if out.exists():
         raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
-    identified = read_model(model, known_sources())
+    identified = read_model(model, every_source(source_files))
     machine_model = identified.model.of_the_machine()
     inline = read_inline_plan(plan)
     tests = inline.to_domain()

@@ -16,6 +16,7 @@ from dbbstation.files.yaml_out import yaml_text
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import ErrorSource, Fitted, Owner
+from dbbstation.sources.registry import HOW_TO_ADD
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -61,7 +62,10 @@ def parse_model(path: Path, known_sources: Mapping[str, ErrorSource], faults: li
     fitted = [reader.fitted(("sources", i), source) for i, source in enumerate(file.sources)]
     effects = enumerate(file.measurement_effects)
     fitted += [reader.fitted(("measurement_effects", i), effect, effect.shared) for i, effect in effects]
-    covariance = np.array(file.covariance.matrix, dtype=np.float64) if _is_square(file.covariance) else None
+    covariance = None
+    if _is_square(file.covariance):
+        count = len(file.covariance.rows)  # none at all in a model that was written by hand
+        covariance = np.array(file.covariance.matrix, dtype=np.float64).reshape(count, count)
     _check_rows(document, file, faults)
     if covariance is None:
         what = f"covariance.matrix: {len(file.covariance.rows)} rows of as many numbers were expected, one per row name"
@@ -96,7 +100,8 @@ class _Sources:
         source = self._known.get(entry.name)
         if source is None:
             near = difflib.get_close_matches(entry.name, self._known, n=1, cutoff=0.6)
-            remedy = f"did you mean `{near[0]}`?" if near else f"known: {', '.join(self._known)}"
+            remedy = f"did you mean `{near[0]}`?" if near else f"known: {', '.join(self._known)}."
+            remedy += f" {HOW_TO_ADD}"
             self._fault((*location, "name"), f"no error source is called `{entry.name}`", remedy)
             return None
         if (source.belongs_to is Owner.MACHINE) is bool(shared):

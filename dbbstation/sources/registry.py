@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 
+HOW_TO_ADD = "One of your own is given with --source-file FILE.py, or its package installed"
+"""What a name that nobody knows may lack."""
+
+
 @cache
 def known_sources() -> Mapping[str, ErrorSource]:
     """All error sources of the package, sorted by name."""
@@ -31,18 +35,23 @@ def known_sources() -> Mapping[str, ErrorSource]:
     return MappingProxyType(dict(sorted(found.items())))
 
 
-def sources_named(names: Iterable[str]) -> tuple[ErrorSource, ...]:
+def sources_named(names: Iterable[str], known: Mapping[str, ErrorSource] | None = None) -> tuple[ErrorSource, ...]:
     """Sources by their names.
+
+    Args:
+        names: of the sources.
+        known: every error source by name; those of the package if None.
 
     Raises:
         ModelError: a name that no source has.
     """
-    known = known_sources()
+    known = known_sources() if known is None else known
     chosen = []
     for name in names:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
-            remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+            remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}."
+            remedy += f" {HOW_TO_ADD}"
             raise ModelError(f"no error source is called {name!r}", remedy=remedy)
         chosen.append(known[name])
     return tuple(chosen)

@@ -1,0 +1,193 @@
+"""Error sources that somebody wrote: from a Python file or an installed package; every fault told with its place."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+
+import pytest
+
+from dbbstation.errors import InputError
+from dbbstation.files.machine_file import read_machine
+from dbbstation.files.own_sources import every_source, sources_of
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.sources.contract import Owner
+from dbbstation.sources.registry import known_sources
+from dbbstation.sources.trial import tried, undeclared
+
+EXAMPLE = shipped_folder("fixtures") / "sources" / "scale_bow.py"
+
+
+def own(tmp_path, text, name="own.py"):
+    path = tmp_path / name
+    path.write_text(textwrap.dedent(text), encoding="utf-8")
+    return path
+
+
+def changed(tmp_path, *pairs):
+    """The example with texts replaced."""
+    text = EXAMPLE.read_text(encoding="utf-8")
+    for old, new in pairs:
+        assert old in text
+        text = text.replace(old, new)
+    return own(tmp_path, text)
+
+
+def told(*files):
+    with pytest.raises(InputError) as refused:
+        every_source(files)
+    return str(refused.value)
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """Install the example as a package whose entry point is given."""
+
+    def install(entry):
+        folder = tmp_path / "site"
+        (folder / "bowed-1.0.dist-info").mkdir(parents=True)
+        (folder / "bowed-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: bowed\nVersion: 1.0\n")
+        (folder / "bowed-1.0.dist-info" / "entry_points.txt").write_text(f"[dbbstation.sources]\nbow = {entry}\n")
+        (folder / "bowed_scale.py").write_text(EXAMPLE.read_text(encoding="utf-8"), encoding="utf-8")
+        monkeypatch.syspath_prepend(folder)
+
+    return install
+
+
+def test_without_files_there_are_those_of_the_package():
+    assert every_source() == known_sources()
+
+
+def test_a_file_adds_its_source():
+    every = every_source([EXAMPLE])
+    assert set(every) - set(known_sources()) == {"scale-bow"}
+    assert every["scale-bow"].belongs_to is Owner.MACHINE
+    assert sources_of([EXAMPLE], every) == ("scale-bow",)
+    assert "scale-bow" not in known_sources()
+
+
+def test_a_file_given_twice_counts_once(tmp_path):
+    assert set(every_source([EXAMPLE, EXAMPLE.parent / "." / EXAMPLE.name])) >= {"scale-bow"}
+    del tmp_path
+
+
+def test_nothing_is_written_beside_the_file(tmp_path):
+    path = changed(tmp_path)
+    every_source([path])
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_class_that_others_derive_from_may_leave_things_to_them(tmp_path):
+    text = EXAMPLE.read_text(encoding="utf-8").replace("class ScaleBow(LinearSource)", "class ScaleBow(Half)")
+    half = "\n\nclass Half(LinearSource):\n    pass\n\n"
+    path = own(tmp_path, text.replace("\n\nclass ScaleBow", half + "\n\nclass ScaleBow"))
+    assert "scale-bow" in every_source([path])
+
+
+def test_an_installed_package_adds_its_source(installed):
+    installed("bowed_scale:ScaleBow")
+    assert "scale-bow" in every_source()
+
+
+@pytest.mark.parametrize(
+    ("entry", "why"),
+    [
+        ("bowed_scale:Missing", "cannot be loaded: AttributeError"),
+        ("no_such_module_at_all:Bow", "cannot be loaded: ModuleNotFoundError"),
+        ("bowed_scale:np", "bowed_scale:np is no class that derives from ErrorSource"),
+    ],
+)
+def test_an_entry_point_that_does_not_hold_names_its_package(installed, entry, why):
+    installed(entry)
+    text = told()
+    assert text.startswith(f"entry point bow of the package bowed: {why}")
+    assert text.endswith("; mend or uninstall the package bowed")
+
+
+def test_a_package_and_a_file_with_one_name_are_refused(installed):
+    installed("bowed_scale:ScaleBow")
+    assert "`scale-bow` is known already, from entry point bow of the package bowed" in told(EXAMPLE)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    assert told(tmp_path / "none.py").endswith("none.py: there is no such file; check the path")
+
+
+def test_a_syntax_error_has_its_line(tmp_path):
+    assert re.search(r"own\.py:2:\d+: is not Python: ", told(own(tmp_path, "a = 1\nb = = 2\n")))
+
+
+def test_a_binary_file_is_no_python(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_bytes(b"\x00\x01a = 1\n")
+    assert "own.py" in told(path)
+    assert "is not Python" in told(path)
+
+
+def test_an_error_when_it_is_run_has_its_line(tmp_path):
+    assert "own.py:2: cannot be run: ZeroDivisionError: division by zero" in told(own(tmp_path, "a = 1\nb = a / 0\n"))
+
+
+def test_a_module_that_it_cannot_import_is_named(tmp_path):
+    assert "own.py:1: cannot be run: ModuleNotFoundError: No module named 'nowhere_to_be_found'" in told(
+        own(tmp_path, "import nowhere_to_be_found\n")
+    )
+
+
+def test_a_file_without_an_error_source(tmp_path):
+    assert "own.py: no class in it derives from ErrorSource; see " in told(own(tmp_path, "class Bow:\n    pass\n"))
+
+
+def test_a_name_that_is_taken(tmp_path):
+    text = told(changed(tmp_path, ('"scale-bow"', '"gravity"')))
+    assert re.search(r"own\.py:11: an error source `gravity` is known already, from dbbstation itself", text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('    name = "scale-bow"\n', "", "it needs a `name` in small letters with hyphens"),
+        ('"scale-bow"', '"Scale bow"', "it needs a `name` in small letters with hyphens"),
+        ("    belongs_to = Owner.MACHINE\n", "", "it needs `belongs_to`, one of Owner.MACHINE, "),
+        ("def parameters(", "def parameter(", "it has no parameters"),
+        ("def derivative(", "def derived(", "it has no derivative"),
+        ("texts = Texts", "text = Texts", "it needs `texts`, a Texts that says what, shows"),
+        ('"The scale of a strut is bowed."', '" "', "its texts say nothing under what"),
+        ("    belongs_to", '    needs = {"pose"}\n    belongs_to', "its `needs` must be a frozenset of Need"),
+        ("50.0, f", "0.0, f", "its parameter strut_1_um needs a plausible size above zero"),
+        ("{i + 1}_um", "um", "two of its parameters are called strut_um"),
+        ("strut_mm=1e-3", "tool_tip_mm=1e-3", "tool_tip_mm of its derivative has the shape (181, 6, 6), not (3, 6)"),
+        (" * np.eye(STRUTS))", ")", "strut_mm of its derivative has the shape (181, 6, 1), not (6, 6) or (181, 6, 6)"),
+        ("1e-3 * place", "np.nan * place", "strut_mm of its derivative is not a number somewhere"),
+    ],
+)
+def test_what_is_lacking_of_the_contract_is_told(tmp_path, old, new, why):
+    text = told(changed(tmp_path, (old, new)))
+    assert re.search(r"own\.py:11: ScaleBow: ", text)
+    assert why in text
+
+
+def test_a_derivative_that_is_not_that_of_the_effect_is_told(tmp_path):
+    wrong = "    def effect(self, motion, machine, values):\n        return self.derivative(motion, machine, values).times(2 * values)\n"
+    path = own(tmp_path, EXAMPLE.read_text(encoding="utf-8") + "\n" + wrong)
+    assert "its derivative of strut_mm by strut_1_um is not what its effect does" in told(path)
+
+
+def test_an_error_in_its_own_code_has_its_line(tmp_path):
+    path = changed(tmp_path, ("shortest, longest = machine.travel.strut_mm", "shortest, longest = machine.travel"))
+    text = told(path)
+    assert re.search(r"own\.py:29: ScaleBow: TypeError: .*, when it was tried on a circle", text)
+
+
+def test_all_faults_of_all_files_are_told(tmp_path):
+    first = changed(tmp_path, ('"scale-bow"', '"gravity"'))
+    second = own(tmp_path, "b = = 2\n", "second.py")
+    assert len(told(first, second, tmp_path / "third.py").splitlines()) == 3
+
+
+@pytest.mark.parametrize("source", known_sources().values(), ids=lambda s: s.name)
+def test_the_trial_finds_nothing_wrong_with_sources_that_are_right(source, reference):
+    machine = read_machine(shipped_folder("fixtures") / "machines" / "every-key.yaml")
+    assert undeclared(type(source)) == []
+    assert tried(source, machine) == []
+    assert tried(source, reference) == []

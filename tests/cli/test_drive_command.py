@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import DONE, FAILED
+from dbbstation.files.shipped import shipped_folder
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
 
@@ -78,3 +79,19 @@ def test_what_cannot_be_done_is_said(run, strut, arguments, said):
     assert outcome.code == FAILED
     assert said in outcome.err
     assert outcome.out == ""
+
+
+def test_the_example_of_the_documentation(run):
+    """fixtures/drives/strut.csv, made by `python -m tests.diagnosis.drive.make_example`, says in its head what is true."""
+    data = run("drive", shipped_folder("fixtures") / "drives" / "strut.csv", "--json").data
+    numbers = [
+        (data["parameters"]["mass_kg"], 80.0),
+        (data["friction"]["forwards"]["viscous_n_s_m"], 160.0),
+        (data["friction"]["backwards"]["viscous_n_s_m"], 240.0),
+        (data["friction"]["forwards"]["coulomb_n"], 20.0),
+    ]
+    assert all(abs(number["value"] - true) < 3.0 * number["uncertainty"] for number, true in numbers)
+    assert {s["name"] for s in data["sources"] if s["verdict"] == "identified"} == {
+        "coulomb-friction",
+        "friction-asymmetry",
+    }

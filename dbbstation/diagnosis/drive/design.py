@@ -44,7 +44,7 @@ class Design:
         force_n: in the band, shape (m,) [N].
         columns: in the band, base first, shape (m, k).
         groups: block of each sample, shape (m,); blocks follow each other in time.
-        named: candidates with a name.
+        named: candidates with a name; the shape of a variant is the place of its form.
         unnamed: unnamed shapes, by variable.
         forms: of the variants of each named candidate.
         sources: by name.
@@ -106,10 +106,10 @@ def design_of(signals: Signals, sources: Sequence[DriveSource]) -> Design:
     named: list[Candidate] = []
     for name, of_source in forms.items():
         variants = []
-        for form in of_source:
+        for place, form in enumerate(of_source):
             pieces.append(signals.compared(form.columns(signals, form.value)))
             prior = np.array([parameter.plausible for parameter in form.amplitudes])
-            variants.append(Variant(np.arange(count, count + len(prior)), prior, (form.value,)))
+            variants.append(Variant(np.arange(count, count + len(prior)), prior, (float(place),)))
             count += len(prior)
         if variants:
             named.append(Candidate(name, tuple(variants)))

@@ -49,9 +49,9 @@ class Term:
 
 
 def term_of(design: Design, candidate: Candidate, variant: Variant) -> Term:
-    """Term of a candidate in one of its variants."""
-    place = next(k for k, one in enumerate(candidate.variants) if one is variant)
-    return Term(candidate.name, design.forms[candidate.name][place], variant.shape[0])
+    """Term of a candidate in one of its variants, whose shape says which form it is."""
+    form = design.forms[candidate.name][int(variant.shape[0])]
+    return Term(candidate.name, form, form.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,13 +212,15 @@ def with_method(fitted: DriveFit, other: DriveFit | None) -> DriveFit:
         other: the same model fitted in another band, None where there is none; a value may lie anywhere between the
             two, and as far on the other side.
     """
-    moved = np.zeros_like(fitted.values)
+    moved, unsure = np.zeros_like(fitted.values), np.zeros_like(fitted.values)
     if other is not None:
+        unsure = np.diag(other.covariance)
         moved = other.values - fitted.values
         shaped = _shaped(fitted)
         for k, (one, two) in enumerate(zip(shaped, _shaped(other), strict=True), start=len(moved) - len(shaped)):
             moved[k] = np.log(two.value / one.value)
-    more = moved**2 / 3.0 + (METHOD_SHARE * fitted.values) ** 2
+    # A value that the other band hardly sees moves by chance there, which is no fault of this one.
+    more = np.maximum(moved**2 - unsure, 0.0) / 3.0 + (METHOD_SHARE * fitted.values) ** 2
     wider = np.sqrt(1.0 + more / np.maximum(np.diag(fitted.covariance), 1e-300))
     return replace(fitted, covariance=fitted.covariance * np.outer(wider, wider))
 

@@ -10,7 +10,16 @@ import numpy as np
 from dbbstation.diagnosis.drive.design import BASE, design_of
 from dbbstation.diagnosis.drive.findings import Curve, DriveDiagnosis, DriveFinding, Number, Rest, Step
 from dbbstation.diagnosis.drive.fit import DriveFit, Term, base_values, fit, term_of, with_method
-from dbbstation.diagnosis.drive.judge import SIGNIFICANT, by_chance, doubtful, judge, overruled, rest_of
+from dbbstation.diagnosis.drive.judge import (
+    METHOD_SHARE,
+    SIGNIFICANT,
+    by_chance,
+    doubtful,
+    judge,
+    overruled,
+    rest_of,
+    share_of_force,
+)
 from dbbstation.diagnosis.drive.limits import Limits, limits_of, mass_is_known, told
 from dbbstation.diagnosis.drive.locate import locate
 from dbbstation.diagnosis.drive.signals import signals_of
@@ -69,18 +78,19 @@ def identify(
     signals = signals_of(recording, cutoff_hz)
     progress("columns")
     design = design_of(signals, sources)
+    narrow = _in_half_the_band(recording, design)
     limits = limits_of(design)
-    before = fit(design, ())
+    before = _joint(design, narrow, ())
     _refuse_wrong_sign(before, recording.name)
     progress("candidates")
     race, named, unnamed = design.race(before.columns)
-    chosen, after = _chosen(design, race, named, before)
+    chosen, after = _chosen(design, narrow, race, named)
     progress("verdicts")
     findings = judge(design, race, chosen, after)
     withdrawn = overruled(race, unnamed, chosen)
     if withdrawn:
         chosen = [choice for choice in chosen if choice.candidate.name not in withdrawn]
-        after = _joint(design, chosen, before)
+        after = _joint(design, narrow, chosen)
         findings = judge(design, race, chosen, after)
         findings = tuple(_withdrawn(f) if f.name in withdrawn else f for f in findings)
     rest = rest_of(design, after)
@@ -89,13 +99,10 @@ def identify(
         # What may only make up for another law must not pull the values of what stands.
         findings = tuple(_doubted(f, rest.variable or "") if f.name in suspects else f for f in findings)
         chosen = [choice for choice in chosen if choice.candidate.name not in suspects]
-        after = _joint(design, chosen, before)
+        after = _joint(design, narrow, chosen)
         rest = rest_of(design, after)
+        findings = tuple(_as_fitted(finding, after) for finding in findings)
     findings = tuple(_with_caution(design, finding, rest) for finding in findings)
-    progress("half the band")
-    narrow = _in_half_the_band(recording, design)
-    before, after = (with_method(one, None if narrow is None else fit(narrow, one.terms)) for one in (before, after))
-    findings = tuple(_as_fitted(finding, after) for finding in findings)
     probability, misfit_n = by_chance(design, before.square, before.columns.shape[1])
     held_back = signals.t_s[signals.kept] > np.quantile(signals.t_s[signals.kept], 1.0 - HELD_BACK)
     mismatch = probability < SIGNIFICANT or bool(chosen)
@@ -138,37 +145,55 @@ def _refuse_wrong_sign(before: DriveFit, name: str) -> None:
             )
 
 
-def _chosen(design: Design, race: Race, named: Sequence[Candidate], before: DriveFit) -> tuple[list[Choice], DriveFit]:
-    """Select causes, fit them exactly, drop those that do not stand out of their uncertainty, or cannot be.
+def _chosen(
+    design: Design, narrow: Design | None, race: Race, named: Sequence[Candidate]
+) -> tuple[list[Choice], DriveFit]:
+    """Select causes, fit them exactly, drop those that do not stand out of their uncertainty, and forms that cannot be.
 
     What explains most beside the others comes first.
     """
-    dropped: set[str] = set()
+    left = {candidate.name: candidate for candidate in named}
     while True:
-        chosen = select(race, [c for c in named if c.name not in dropped], THRESHOLD, MOST_SOURCES)
-        if not chosen:
-            return [], before
+        chosen = select(race, list(left.values()), THRESHOLD, MOST_SOURCES)
         worth = [worth_of(race, chosen, one) for one in chosen]
         chosen = [chosen[k] for k in np.argsort(worth)[::-1]]
-        after = _joint(design, chosen, before)
-        out = {term.name: _stands_out(design, after, term) for term in after.terms}
-        weakest = min(out, key=out.__getitem__)
-        if out[weakest] > STANDS_OUT_SIGMA:
+        after = _joint(design, narrow, chosen)
+        values = after.all_values()
+        impossible = [one for one in chosen if not design.sources[one.candidate.name].possible(values)]
+        for one in impossible:
+            # Another form of it may still be right, beside something else.
+            forms = tuple(v for v in left[one.candidate.name].variants if v is not one.variant)
+            left[one.candidate.name] = replace(one.candidate, variants=forms)
+            if not forms:
+                del left[one.candidate.name]
+        if impossible:
+            continue
+        out = {term.name: _stands_out(after, term) for term in after.terms}
+        # Less than low-pass and differences leave of a perfect drive has no name, however well it stands out.
+        out |= {one.candidate.name: 0.0 for one in chosen if share_of_force(design, race, chosen, one) < METHOD_SHARE}
+        weakest = min(out, key=out.__getitem__, default=None)
+        if weakest is None or out[weakest] > STANDS_OUT_SIGMA:
             return chosen, after
-        dropped.add(weakest)
+        del left[weakest]
 
 
-def _joint(design: Design, chosen: Sequence[Choice], before: DriveFit) -> DriveFit:
-    """Base and chosen causes fitted together, exactly."""
-    return fit(design, [term_of(design, c.candidate, c.variant) for c in chosen]) if chosen else before
+def _joint(design: Design, narrow: Design | None, chosen: Sequence[Choice]) -> DriveFit:
+    """Base and chosen causes fitted together, exactly, with all that is known of their uncertainty."""
+    fitted = fit(design, [term_of(design, c.candidate, c.variant) for c in chosen])
+    return with_method(fitted, None if narrow is None else fit(narrow, fitted.terms))
 
 
-def _stands_out(design: Design, fitted: DriveFit, term: Term) -> float:
-    """Greatest amplitude of a cause in units of its standard uncertainty; zero where its values cannot be."""
-    if not design.sources[term.name].possible(fitted.all_values()):
-        return 0.0
+def _stands_out(fitted: DriveFit, term: Term) -> float:
+    """Greatest amplitude of a cause in units of its standard uncertainty."""
     rows = fitted.amplitudes(term.name)
     return float(np.max(np.abs(fitted.values[rows]) / np.sqrt(np.diag(fitted.covariance)[rows])))
+
+
+def _as_fitted(finding: DriveFinding, fitted: DriveFit) -> DriveFinding:
+    """The finding with the values of the last model, where its cause is in it."""
+    if finding.name not in {term.name for term in fitted.terms}:
+        return finding
+    return replace(finding, parameters=fitted.parameters(finding.name))
 
 
 def _in_half_the_band(recording: DriveRecording, design: Design) -> Design | None:
@@ -177,13 +202,6 @@ def _in_half_the_band(recording: DriveRecording, design: Design) -> Design | Non
         return design_of(signals_of(recording, 0.5 * design.signals.cutoff_hz), list(design.sources.values()))
     except CalibrationError:
         return None
-
-
-def _as_fitted(finding: DriveFinding, fitted: DriveFit) -> DriveFinding:
-    """The finding with the values of a fit that has its cause."""
-    if finding.name not in {term.name for term in fitted.terms}:
-        return finding
-    return replace(finding, parameters=fitted.parameters(finding.name))
 
 
 def _withdrawn(finding: DriveFinding) -> DriveFinding:

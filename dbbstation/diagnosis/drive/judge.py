@@ -62,6 +62,14 @@ def by_chance(design: Design, square: float, used: int) -> tuple[float, float]:
     return float(f_distribution.sf(ratio, freedom, left)), rms
 
 
+def share_of_force(design: Design, race: Race, chosen: Sequence[Choice], one: Choice) -> float:
+    """Root mean square of what a name explains beside the others, over that of the force."""
+    others = [choice.variant for choice in chosen if choice is not one]
+    alone = race.explained([c.variant for c in chosen]) - (race.explained(others) if others else 0.0)
+    rms = design.noise_n * np.sqrt(max(alone, 0.0) / len(design.force_n))
+    return float(rms) / design.signals.scale.force_n
+
+
 def judge(design: Design, race: Race, chosen: Sequence[Choice], after: DriveFit) -> tuple[DriveFinding, ...]:
     """One finding per cause, best first.
 

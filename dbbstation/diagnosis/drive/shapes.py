@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.signals import Signals
@@ -39,8 +41,8 @@ class Shape:
     columns: NDArray[np.float64]
 
 
-def shapes(signals: Signals) -> list[Shape]:
-    """Return all families of curves that the recording has the variable of."""
+def shapes(signals: Signals) -> Iterator[Shape]:
+    """Give all families of curves that the recording has the variable of, one after another: long ones are large."""
     direction = signals.direction
     since = signals.since_reversal_m
     curves = [
@@ -56,11 +58,9 @@ def shapes(signals: Signals) -> list[Shape]:
         after = np.isfinite(since)
         place = np.log(np.clip(np.where(after, since, np.inf), nearest, signals.scale.travel_m))
         curves.append(("travel since reversal", place, direction * after))
-    found = []
     for variable, values, factor in curves:
         columns = hats(values, *_range(values[signals.kept]))
-        found.append(Shape(variable, columns if factor is None else columns * factor[:, None]))
-    return found
+        yield Shape(variable, columns if factor is None else columns * factor[:, None])
 
 
 def hats(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.float64]:

@@ -40,6 +40,9 @@ EDGE_PERIODS = 3.0
 WIDEST = 1 / 20
 """Widest band that is chosen, of the sampling rate: the differences lose a hundredth of the acceleration there."""
 
+HIGHEST_HZ = 100.0
+"""Widest band that is chosen however fast the sampling: above it a drive is no rigid mass any more."""
+
 NOISE_SHARE = 0.03
 """Noise of the acceleration over the acceleration itself, in the band that is chosen. Noise in it makes the mass too
 small by the square of this, a thousandth."""
@@ -241,7 +244,8 @@ def _chosen_cutoff(position_m: NDArray[np.float64], rate_hz: float, floor: float
     Where it does so nowhere, as at constant speed, a band that leaves speed and force a hundred samples.
     """
     frequency, power = _spectrum(position_m, rate_hz)
-    tried = np.geomspace(2.0, rate_hz * WIDEST, 40)
+    widest = min(rate_hz * WIDEST, HIGHEST_HZ)
+    tried = np.geomspace(min(2.0, 0.5 * widest), widest, 40)
     signal = np.array(
         [np.trapezoid(power * (2.0 * np.pi * frequency) ** 4 * (frequency <= f), frequency) for f in tried]
     )
@@ -250,4 +254,4 @@ def _chosen_cutoff(position_m: NDArray[np.float64], rate_hz: float, floor: float
     if len(good):
         return float(tried[good[-1]])
     seconds = len(position_m) / rate_hz
-    return float(min(rate_hz * WIDEST, max(200.0 / (PER_CUTOFF * seconds), 5.0)))
+    return float(min(widest, max(200.0 / (PER_CUTOFF * seconds), 5.0)))

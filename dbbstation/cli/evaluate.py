@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 from dbbstation.cli.source_files import source_file_option
 
@@ -20,7 +24,8 @@ def evaluate(
 ) -> None:
     r"""Compare recordings with the nominal machine (before) and with a model (after).
 
-    After is what the model leaves of the recordings, not a new measurement. Flatness over X, Y = ±190 mm and
+    After is what the model leaves of the recordings, not a new measurement. The second table sets the circularity that
+    was measured beside the one that the model predicts, both up to 30 undulations per revolution. Flatness over X, Y = ±190 mm and
     parallelism of a move along X are what the model predicts of programs that are not compensated.
 
     \b
@@ -30,6 +35,7 @@ def evaluate(
     """
     from dbbstation.calibration.evaluation import evaluate as compare
     from dbbstation.calibration.evaluation import plane_figures
+    from dbbstation.calibration.prediction import predicted_circles
     from dbbstation.calibration.summary import evaluation_summary
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.output import print_json, say
@@ -42,6 +48,8 @@ def evaluate(
     for warning in recorded.warnings:
         say(f"note: {warning}")
     summary = evaluation_summary(compare(identified.model, recorded.observations))
+    for run, circle in zip(summary["runs"], predicted_circles(identified.model, recorded.observations), strict=True):
+        run["circularity_30_upr_um"] = {"measured": circle.measured_um, "predicted": circle.predicted_um}
     height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
     plane = plane_figures(identified.model, height_mm)
     summary |= {"flatness_um": plane.flatness_um, "parallelism_um": plane.parallelism_um, "plane_z_mm": height_mm}
@@ -50,8 +58,23 @@ def evaluate(
         return
     print_runs(summary)
     click.echo()
+    _print_predicted(summary)
+    click.echo()
     click.echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
     click.echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
     click.echo(f"uncompensated at Z {height_mm:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
     click.echo(f"flatness               {summary['flatness_um']:8.1f} µm")
     click.echo(f"parallelism along X    {summary['parallelism_um']:8.1f} µm")
+
+
+def _print_predicted(summary: Mapping[str, Any]) -> None:
+    from dbbstation.cli.output import print_table
+
+    rows: list[list[object]] = []
+    for run in summary["runs"]:
+        measured, predicted = (run["circularity_30_upr_um"][of] for of in ("measured", "predicted"))
+        off = predicted - measured
+        share = f"{100 * off / measured:.0f}" if measured else "-"
+        rows.append([run["test"], run["direction"], run["repeat"], measured, predicted, off, share])
+    click.echo("circularity up to 30 undulations per revolution [µm]")
+    print_table(["test", "dir", "n", "measured", "predicted", "difference", "%"], rows)

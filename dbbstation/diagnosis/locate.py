@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Effect, Fitted
 
-SECTOR_DEG = 10.0
 MOST_LOCATIONS = 12
 COUNTS_SIGMA = 4.0
 """A smoothed deviation counts as misfit above this many of its standard deviations."""
@@ -64,18 +63,6 @@ def locate(
             )
     found.sort(key=lambda location: -location.share)
     return tuple(found[:MOST_LOCATIONS])
-
-
-def misfit_map(observations: Sequence[Observation], residual_mm: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Mean smoothed residual of every run in sectors of ten degrees by angle, shape (runs, 36) [µm]."""
-    rows = []
-    for observation, residual in zip(observations, residual_mm, strict=True):
-        curve = smooth(residual, np.radians(observation.raw.phi_deg))
-        sector = (observation.raw.theta_deg / SECTOR_DEG).astype(np.int64) % int(360 / SECTOR_DEG)
-        counts = np.bincount(sector, minlength=int(360 / SECTOR_DEG))
-        sums = np.bincount(sector, curve, minlength=int(360 / SECTOR_DEG))
-        rows.append(1e3 * sums / np.maximum(counts, 1))
-    return np.array(rows)
 
 
 def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> list[NDArray[np.float64] | None]:

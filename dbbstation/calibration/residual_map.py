@@ -1,0 +1,72 @@
+"""What a model leaves of every run, as a map over test and angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.harmonics import smooth
+from dbbstation.plan.circle import Direction
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.model.observation import Observation
+
+SECTORS = 36
+"""Means of ten degrees."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualMap:
+    """Mean smooth residuals over test and angle.
+
+    Attributes:
+        tests: names of the rows, in the order of the recordings.
+        um: by direction, rows by tests, columns by angle from +X towards +Y, NaN where nothing was recorded, shape
+            (tests, 36) each [µm].
+    """
+
+    tests: tuple[str, ...]
+    um: Mapping[Direction, NDArray[np.float64]]
+
+    @property
+    def reach_um(self) -> float:
+        """Greatest absolute value [µm]."""
+        return float(np.nanmax(np.abs(np.concatenate(list(self.um.values())))))
+
+
+def residual_map(observations: Sequence[Observation], residual_mm: Sequence[NDArray[np.float64]]) -> ResidualMap:
+    """Average what is left of every run, noise taken off, over ten degrees of angle.
+
+    Args:
+        observations: runs.
+        residual_mm: what a model leaves of each, shape (n,) [mm].
+    """
+    names = names_of_tests(observations)
+    rows = {name: k for k, name in enumerate(dict.fromkeys(names))}
+    um = {direction: np.full((len(rows), SECTORS), np.nan) for direction in Direction}
+    for observation, residual, name in zip(observations, residual_mm, names, strict=True):
+        um[observation.raw.circle.direction][rows[name]] = _by_angle_um(observation, residual)
+    return ResidualMap(tuple(rows), um)
+
+
+def names_of_tests(observations: Sequence[Observation]) -> list[str]:
+    """Test of every run, with a number where tests were repeated and the session where there are several."""
+    repeated = any(o.repeat > 1 for o in observations)
+    several = len({o.setup.session for o in observations}) > 1
+    return [
+        (f"{o.setup.session} " if several else "") + o.test + (f" {o.repeat}" if repeated else "") for o in observations
+    ]
+
+
+def _by_angle_um(observation: Observation, residual_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    curve = smooth(residual_mm, np.radians(observation.raw.phi_deg))
+    sector = (observation.raw.theta_deg * (SECTORS / 360.0)).astype(np.int64) % SECTORS
+    count = np.bincount(sector, minlength=SECTORS)
+    sums = np.bincount(sector, curve, minlength=SECTORS)
+    return np.where(count > 0, 1e3 * sums / np.maximum(count, 1), np.nan)

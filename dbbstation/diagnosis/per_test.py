@@ -1,0 +1,108 @@
+"""What naming causes gained in every test: traces beside both models, residuals and circularity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.evaluation import rms_um
+from dbbstation.calibration.residual_map import names_of_tests
+from dbbstation.trace.analysis import figures
+from dbbstation.trace.average import means, sector_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.diagnosis.findings import Diagnosis
+    from dbbstation.plan.circle import Direction
+
+TRACE_SECTORS = 360
+"""Points of a trace: means of a degree."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One run as deviations from the commanded circle, by rising angle, shape (s,) each.
+
+    Attributes:
+        direction: sense of travel.
+        theta_deg: angle from +X towards +Y [deg].
+        measured_um: bar length less its nominal length [µm].
+        before_um: the same as the base model, fitted, predicts it [µm].
+        after_um: as the joint model predicts it [µm].
+    """
+
+    direction: Direction
+    theta_deg: NDArray[np.float64]
+    measured_um: NDArray[np.float64]
+    before_um: NDArray[np.float64]
+    after_um: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GainOfTest:
+    """One test, all its runs together.
+
+    Attributes:
+        name: as in maps.
+        residual_um: root mean square of what is left within the mounting, before and after [µm].
+        circularity_um: greatest of its runs, of what is left, before and after [µm].
+        traces: its runs.
+    """
+
+    name: str
+    residual_um: tuple[float, float]
+    circularity_um: tuple[float, float]
+    traces: tuple[Trace, ...]
+
+    @property
+    def gain_um(self) -> float:
+        """How much less is left [µm]."""
+        return self.residual_um[0] - self.residual_um[1]
+
+
+def gains_by_test(diagnosis: Diagnosis) -> tuple[GainOfTest, ...]:
+    """What every test gained, in the order of the recordings."""
+    before, after = diagnosis.before, diagnosis.after
+    rounds = [_circularity_um(before), _circularity_um(after)]
+    names = names_of_tests(before.observations)
+    rows: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        rows.setdefault(name, []).append(k)
+    return tuple(
+        GainOfTest(
+            name=name,
+            residual_um=(
+                rms_um([before.residual_mm[k] for k in own]),
+                rms_um([after.residual_mm[k] for k in own]),
+            ),
+            circularity_um=(max(rounds[0][k] for k in own), max(rounds[1][k] for k in own)),
+            traces=tuple(_trace(diagnosis, k) for k in own),
+        )
+        for name, own in rows.items()
+    )
+
+
+def _circularity_um(calibration: Calibration) -> list[float]:
+    return [
+        figures(o.raw, o.raw.circle.bar_mm + left).circularity_um
+        for o, left in zip(calibration.observations, calibration.residual_mm, strict=True)
+    ]
+
+
+def _trace(diagnosis: Diagnosis, k: int) -> Trace:
+    raw = diagnosis.before.observations[k].raw
+    sector = sector_of(raw, TRACE_SECTORS)
+    measured = raw.length_mm - raw.circle.bar_mm
+    phi = means(raw.phi_deg, sector)
+    theta = np.mod(raw.circle.theta_deg(phi), 360.0)
+    order = np.argsort(theta)
+    curves = (
+        measured,
+        measured - diagnosis.before.residual_mm[k],
+        measured - diagnosis.after.residual_mm[k],
+    )
+    return Trace(raw.circle.direction, theta[order], *(1e3 * means(curve, sector)[order] for curve in curves))

@@ -1,0 +1,229 @@
+"""What found sources do to struts or readings, over the variable that organises it, beside what the readings say.
+
+The readings are drawn as partial residuals: the error that the joint model puts on a strut, plus what the residuals
+would put on that strut alone [Larsen and McCleary, Technometrics 14 (1972) 781]. Where the model is right they lie on
+its curve; where its curve has the wrong form they leave it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.shapes import variables
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.model.machine_model import MachineModel
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.diagnosis.findings import Diagnosis
+    from dbbstation.model.observation import Observation
+
+BINS = 14
+"""Pieces of a variable's range over which readings are averaged."""
+
+WAVE_PIECE_MM = 1.0
+"""The same of strut length where waves of it are looked at, down to periods of 4 mm [mm]."""
+
+SEEN = 2.5
+"""Fine pieces that are known this many times worse than usual are left out: they would drown the others."""
+
+OF_THE_READING = frozenset({"angle", "time of the reading"})
+"""What may organise an error without a name that is no strut's."""
+
+UNITS = {"strut-length": "mm", "strut-force": "N", "time": "s", "angle": "°"}
+"""Of the variables that something can be drawn over."""
+
+SENSES = {1.0: "lengthening", -1.0: "shortening"}
+"""Names of the branches of what hangs on the direction of travel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """One curve of a panel, averaged over pieces of the variable's range, shape (b,) each.
+
+    Attributes:
+        sense: `lengthening` or `shortening` where the error hangs on the direction of travel; empty otherwise.
+        variable: mean of the variable.
+        model_um: mean error that the source puts there in the joint model [µm].
+        before_um: error that would explain the residual of the base model best [µm].
+        after_um: the model's, plus the one that would explain the residual of the joint model best [µm].
+        sigma_um: standard deviation of either by noise, what fitted parameters take aside [µm].
+    """
+
+    sense: str
+    variable: NDArray[np.float64]
+    model_um: NDArray[np.float64]
+    before_um: NDArray[np.float64]
+    after_um: NDArray[np.float64]
+    sigma_um: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SourceCurves:
+    """One source.
+
+    Attributes:
+        source: its name; empty for what is left without a name.
+        variable: what the curves are drawn over.
+        unit: of the variable.
+        fine: the error may change from each piece of the range to the next, as a wave does.
+        struts: branches of each strut, 1 to 6; empty where the source moves no strut.
+        reading: branches of the bar's reading, where it moves no strut.
+    """
+
+    source: str
+    variable: str
+    unit: str
+    fine: bool
+    struts: tuple[tuple[Branch, ...], ...]
+    reading: tuple[Branch, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Samples of all runs, one column per strut or one for the reading, shape (n, c) each."""
+
+    variable: NDArray[np.float64]
+    sense: NDArray[np.float64]
+    model_mm: NDArray[np.float64]
+    gain: NDArray[np.float64]
+
+
+def source_curves(diagnosis: Diagnosis) -> tuple[SourceCurves, ...]:
+    """Curves of every source that was found; where none was, of what is left by the variable that organises it."""
+    names = found_sources(diagnosis)
+    if not names and diagnosis.unexplained.variable is not None:
+        return (_curves(diagnosis, ""),)
+    return tuple(_curves(diagnosis, name) for name in names)
+
+
+def found_sources(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Sources of the joint model that the base model has not."""
+    base = {term.source.name for term in diagnosis.before.layout.terms}
+    return tuple(dict.fromkeys(t.source.name for t in diagnosis.after.layout.terms if t.source.name not in base))
+
+
+def _curves(diagnosis: Diagnosis, name: str) -> SourceCurves:
+    after = diagnosis.after
+    wanted = _wanted(diagnosis, name)
+    if name:
+        moves_struts = any(_strut_mm(after, name, o) is not None for o in after.observations)
+    else:
+        moves_struts = wanted not in OF_THE_READING
+    signed, fine = "sign" in wanted, wanted == "strut-length wave"
+    variable = _drawn_over(wanted, after.observations, moves_struts=moves_struts)
+    samples = [_samples(after, name, o, variable, moves_struts=moves_struts) for o in after.observations]
+    whole = _Samples(
+        *(np.vstack([getattr(s, field) for s in samples]) for field in ("variable", "sense", "model_mm", "gain"))
+    )
+    before, left = np.concatenate(diagnosis.before.residual_mm), np.concatenate(after.residual_mm)
+    panels = tuple(
+        tuple(
+            _branch(whole, column, rows, label, before, left, diagnosis.left.noise, fine=fine)
+            for label, rows in _branches(whole.sense[:, column], signed=signed)
+        )
+        for column in range(whole.gain.shape[1])
+    )
+    return SourceCurves(
+        source=name,
+        variable=variable,
+        unit=UNITS[variable],
+        fine=fine,
+        struts=panels if moves_struts else (),
+        reading=() if moves_struts else panels[0],
+    )
+
+
+def _wanted(diagnosis: Diagnosis, name: str) -> str:
+    """Variable that organises a source, or what is left."""
+    if not name:
+        return diagnosis.unexplained.variable or ""
+    return next(t.source.varies_with for t in diagnosis.after.layout.terms if t.source.name == name)
+
+
+def _drawn_over(wanted: str, observations: Sequence[Observation], *, moves_struts: bool) -> str:
+    """Return the variable itself where it is one that every run has, else strut length, or angle for a reading."""
+    if wanted.startswith("time") and all(o.started_s is not None for o in observations):
+        return "time"
+    if not moves_struts or wanted == "angle":
+        return "angle"
+    return "strut-force" if wanted == "strut-force" else "strut-length"
+
+
+def _strut_mm(calibration: Calibration, name: str, observation: Observation) -> NDArray[np.float64] | None:
+    """Strut-length errors by one source of a model over the whole motion, shape (6,) or (n, 6) [mm]."""
+    motion, model = observation.motion(), calibration.model
+    acting = [f for f in model.acting(motion) if f.source.name == name]
+    effects = [f.source.effect(motion, model.as_found, f.values).strut_mm for f in acting]
+    return next((effect for effect in effects if effect is not None), None)
+
+
+def _samples(
+    calibration: Calibration, name: str, observation: Observation, variable: str, *, moves_struts: bool
+) -> _Samples:
+    motion, model = observation.motion(), calibration.model
+    bar = model.bar(motion)
+    known = variables(motion, model.machine)
+    angle = np.repeat(observation.raw.theta_deg[:, None], STRUTS, axis=1)
+    over = angle if variable == "angle" else known[variable][motion.kept]
+    if not moves_struts:
+        without = MachineModel(model.machine, tuple(f for f in model.sources if f.source.name != name))
+        added = bar.length_mm - without.bar(motion).length_mm
+        ones = np.ones((len(added), 1))
+        return _Samples(over[:, :1], ones, added[:, None], ones)
+    strut = _strut_mm(calibration, name, observation)
+    whole = np.broadcast_to(0.0 if strut is None else strut, (len(motion), STRUTS))
+    return _Samples(
+        over,
+        known["strut-speed-sign"][motion.kept],
+        whole[motion.kept],
+        bar.sensitivity.response.per_strut[motion.kept],
+    )
+
+
+def _branches(sense: NDArray[np.float64], *, signed: bool) -> list[tuple[str, NDArray[np.bool_]]]:
+    if not signed:
+        return [("", np.ones(len(sense), dtype=bool))]
+    return [(label, sense == sign) for sign, label in SENSES.items()]
+
+
+def _branch(
+    samples: _Samples,
+    column: int,
+    rows: NDArray[np.bool_],
+    sense: str,
+    before_mm: NDArray[np.float64],
+    left_mm: NDArray[np.float64],
+    noise_mm: float,
+    *,
+    fine: bool,
+) -> Branch:
+    """Average one column over pieces of its range; pieces without a sample are left out."""
+    over, gain = samples.variable[:, column], samples.gain[:, column]
+    pieces = int(np.ceil(np.ptp(over) / WAVE_PIECE_MM)) if fine else BINS
+    edges = np.linspace(over.min(), over.max(), pieces + 1)
+    piece = np.clip(np.searchsorted(edges, over[rows], side="right") - 1, 0, pieces - 1)
+    _, piece, count = np.unique(piece, return_inverse=True, return_counts=True)
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.bincount(piece, values[rows]) / count
+
+    power = mean(gain * gain)
+    sigma = 1e3 * noise_mm / np.sqrt(power * count)
+    seen = sigma <= SEEN * np.median(sigma) if fine else np.ones(len(sigma), dtype=bool)
+    model = 1e3 * mean(samples.model_mm[:, column])
+    return Branch(
+        sense=sense,
+        variable=mean(over)[seen],
+        model_um=model[seen],
+        before_um=(1e3 * mean(gain * before_mm) / power)[seen],
+        after_um=(model + 1e3 * mean(gain * left_mm) / power)[seen],
+        sigma_um=sigma[seen],
+    )

@@ -1,0 +1,193 @@
+"""Figure of a diagnosis: where the misfit was, which errors were found, what naming them gained."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from dbbstation.calibration.evaluation import rms_um
+from dbbstation.calibration.noise_level import fine_noise_mm
+from dbbstation.calibration.residual_map import residual_map
+from dbbstation.diagnosis.per_test import gains_by_test
+from dbbstation.diagnosis.source_curves import source_curves
+from dbbstation.plan.circle import Direction
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, as_svg, draw_maps, in_style
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import SubFigure
+
+    from dbbstation.diagnosis.findings import Diagnosis
+    from dbbstation.diagnosis.per_test import GainOfTest
+    from dbbstation.diagnosis.source_curves import Branch, SourceCurves
+
+WIDTH_IN = 11.0
+TRACES = 4
+"""Tests whose traces are drawn."""
+
+LINE_OF = {"": "-", "lengthening": "-", "shortening": "--"}
+MARKER_OF = {"": "o", "lengthening": "^", "shortening": "v"}
+LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
+
+
+def diagnosis_figure(diagnosis: Diagnosis) -> bytes:
+    """Draw maps of the misfit, errors over what organises them, traces and gains per test, as SVG."""
+    with in_style():
+        return as_svg(draw_diagnosis(diagnosis))
+
+
+def draw_diagnosis(diagnosis: Diagnosis) -> Figure:
+    """Lay the four parts out one below the other; parts that have nothing to show are left out."""
+    found = diagnosis.after is not diagnosis.before
+    curves, gains = source_curves(diagnosis), gains_by_test(diagnosis)
+    heights = [1.0 + ROW_IN * len(gains), *(2.1 for _ in curves), 4.6, 2.4]
+    figure = Figure(figsize=(WIDTH_IN, sum(heights) + 0.4), layout="constrained")
+    figure.suptitle(_headline(diagnosis), fontsize=11, fontweight="bold")
+    parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights, hspace=0.03)
+    _maps(parts[0], diagnosis, found=found)
+    for part, one in zip(parts[1:-2], curves, strict=True):
+        _curves(part, one, None if found else diagnosis.unexplained.strut, found=found)
+    _traces(parts[-2], gains, found=found)
+    _bars(parts[-1], diagnosis, gains, found=found)
+    return figure
+
+
+def _headline(diagnosis: Diagnosis) -> str:
+    if not diagnosis.mismatch:
+        return "The recordings agree with the kinematic model"
+    named = [f"{s.name} ({s.verdict})" for s in diagnosis.sources if str(s.verdict) in {"identified", "ambiguous"}]
+    return "Found: " + ", ".join(named) if named else diagnosis.unexplained.text
+
+
+def _maps(part: SubFigure, diagnosis: Diagnosis, *, found: bool) -> None:
+    fits = [("kinematic model", diagnosis.before)] + [("with causes found", diagnosis.after)] * found
+    maps = [residual_map(fit.observations, fit.residual_mm) for _, fit in fits]
+    panels: Any = part.subplots(1, 2 * len(fits), sharey=True)
+    mesh = draw_maps(panels, [title for title, _ in fits], maps, 1e3 * fine_noise_mm(diagnosis.after))
+    part.colorbar(mesh, ax=list(panels), label="measured less model, µm", pad=0.01)
+
+
+def _curves(part: SubFigure, one: SourceCurves, marked: int | None, *, found: bool) -> None:
+    what = "strut-length error" if one.struts else "error of the reading"
+    over = one.variable.replace("-", " ")
+    part.suptitle(f"{one.source or 'without a name'}: {what} over {over}", fontsize=9, x=0.01, ha="left")
+    panels: Any = part.subplots(1, len(one.struts) or 1, sharey=True, squeeze=False)[0]
+    for k, axes in enumerate(panels):
+        for branch in one.struts[k] if one.struts else one.reading:
+            _branch(axes, branch, found=found, fine=one.fine)
+        if one.struts:
+            axes.set_title(f"strut {k + 1}", fontweight="bold" if k + 1 == marked else "normal")
+        axes.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
+        axes.locator_params(axis="x", nbins=4 if one.struts else 10)
+        axes.set_xlabel(f"{over}, {one.unit}")
+    panels[0].set_ylabel("µm" if one.fine else "µm, bars ±2σ")
+    _legend_of_curves(part, panels[0], (one.struts or (one.reading,))[0], found=found)
+
+
+def _branch(axes: Axes, branch: Branch, *, found: bool, fine: bool) -> None:
+    x = branch.variable
+    if fine:
+        axes.plot(x, branch.before_um, color=BEFORE, linewidth=0.6)
+        return
+    marks: dict[str, Any] = {"markersize": 3.0, "linewidth": 0.0, "elinewidth": 0.8, "marker": MARKER_OF[branch.sense]}
+    axes.errorbar(x, branch.before_um, 2.0 * branch.sigma_um, color=BEFORE, **marks)
+    if found:
+        axes.errorbar(x, branch.after_um, 2.0 * branch.sigma_um, color=AFTER, **marks)
+        axes.plot(x, branch.model_um, color="black", linewidth=1.0, linestyle=LINE_OF[branch.sense])
+
+
+def _legend_of_curves(part: SubFigure, axes: Axes, branches: Sequence[Branch], *, found: bool) -> None:
+    dot: dict[str, Any] = {"linewidth": 0.0, "marker": "o", "markersize": 3.0}
+    handles = [axes.plot([], [], color=BEFORE, label="residual of the kinematic model", **dot)[0]]
+    if found:
+        handles += axes.plot([], [], color=AFTER, label="joint model and its residual", **dot)
+        handles += axes.plot([], [], color="black", linewidth=1.0, label="joint model")
+    for branch in branches:
+        if branch.sense:
+            marker, line = MARKER_OF[branch.sense], LINE_OF[branch.sense]
+            handles += axes.plot(
+                [], [], color="black", marker=marker, markersize=3.0, linewidth=1.0, linestyle=line, label=branch.sense
+            )
+    part.legend(handles=handles, loc="upper right", ncols=len(handles), borderpad=0.0)
+
+
+def _traces(part: SubFigure, gains: Sequence[GainOfTest], *, found: bool) -> None:
+    key = (lambda one: -one.gain_um) if found else (lambda one: -one.residual_um[0])
+    chosen = sorted(gains, key=key)[:TRACES]
+    which = "tests that gained most" if found else "tests with the largest residual"
+    part.suptitle(f"traces of the {which}", fontsize=9, x=0.01, ha="left")
+    panels: Any = part.subplots(3, len(chosen), sharex=True, sharey="row", squeeze=False)
+    for column, one in zip(panels.T, chosen, strict=True):
+        before, after = one.residual_um
+        column[0].set_title(f"test {one.name}: {before:.1f} → {after:.1f} µm rms" if found else f"test {one.name}")
+        for trace in one.traces:
+            line = LINE_OF_DIRECTION[trace.direction]
+            left = column[1 + list(Direction).index(trace.direction)]
+            column[0].plot(trace.theta_deg, trace.measured_um, color=MEASURED, linewidth=2.0, linestyle=line, alpha=0.5)
+            column[0].plot(trace.theta_deg, trace.before_um, color=BEFORE, linewidth=0.9, linestyle=line)
+            left.plot(trace.theta_deg, trace.measured_um - trace.before_um, color=BEFORE, linewidth=0.8)
+            if found:
+                column[0].plot(trace.theta_deg, trace.after_um, color=AFTER, linewidth=0.9, linestyle=line)
+                left.plot(trace.theta_deg, trace.measured_um - trace.after_um, color=AFTER, linewidth=0.8)
+        for axes in column:
+            axes.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
+            axes.set_xticks(QUARTERS)
+            axes.set_xlim(0.0, 360.0)
+        column[-1].set_xlabel("angle from +X to +Y, °")
+    reach = 1.05 * max(float(np.abs(axes.get_ylim()).max()) for axes in panels[1:, 0])
+    panels[1, 0].set_ylim(-reach, reach)
+    panels[2, 0].set_ylim(-reach, reach)
+    panels[0, 0].set_ylabel("off the commanded\ncircle, µm")
+    for row, direction in zip(panels[1:], Direction, strict=True):
+        row[0].set_ylabel(f"less model,\n{str(direction).upper()}, µm")
+    _legend_of_traces(part, panels[0, 0], found=found)
+
+
+def _legend_of_traces(part: SubFigure, axes: Axes, *, found: bool) -> None:
+    handles = [
+        axes.plot([], [], color=MEASURED, linewidth=2.0, alpha=0.5, label="measured")[0],
+        axes.plot([], [], color=BEFORE, linewidth=1.0, label="kinematic model")[0],
+        *([axes.plot([], [], color=AFTER, linewidth=1.0, label="with causes found")[0]] if found else []),
+        axes.plot([], [], color="black", linewidth=0.9, label="CCW")[0],
+        axes.plot([], [], color="black", linewidth=0.9, linestyle="--", label="CW")[0],
+    ]
+    part.legend(handles=handles, loc="upper right", ncols=5, borderpad=0.0)
+
+
+def _bars(part: SubFigure, diagnosis: Diagnosis, gains: Sequence[GainOfTest], *, found: bool) -> None:
+    panels: Any = part.subplots(1, 3, width_ratios=(0.32 * len(gains) + 0.6, 0.32 * len(gains) + 0.6, 2.2))
+    names = [one.name for one in gains]
+    _pairs(panels[0], names, [one.residual_um for one in gains], found=found)
+    panels[0].axhline(1e3 * fine_noise_mm(diagnosis.after), color="black", linewidth=0.8, linestyle="--", label="noise")
+    panels[0].set_title("residual of each test within its mounting")
+    panels[0].set_ylabel("µm rms")
+    _pairs(panels[1], names, [one.circularity_um for one in gains], found=found)
+    panels[1].set_title("circularity left of each test")
+    panels[1].set_ylabel("µm")
+    whole = (rms_um(diagnosis.before.residual_mm), rms_um(diagnosis.after.residual_mm))
+    _pairs(panels[2], ["residual", "tests left out,\npredicted"], [whole, _held_out_um(diagnosis)], found=found)
+    panels[2].set_title("all tests")
+    panels[2].set_ylabel("µm rms")
+    for axes in panels[:2]:
+        axes.set_xlabel("test")
+    part.suptitle("residual, circularity, prediction", fontsize=9, x=0.01, ha="left")
+    part.legend(*panels[0].get_legend_handles_labels(), loc="upper right", ncols=3, borderpad=0.0)
+
+
+def _held_out_um(diagnosis: Diagnosis) -> tuple[float, float]:
+    before, after = diagnosis.held_out
+    return 1e3 * before.rms, 1e3 * after.rms
+
+
+def _pairs(axes: Axes, names: Sequence[str], values: Sequence[tuple[float, float]], *, found: bool) -> None:
+    place = np.arange(len(names))
+    if found:
+        axes.bar(place - 0.2, [before for before, _ in values], 0.4, color=BEFORE, label="kinematic model")
+        axes.bar(place + 0.2, [after for _, after in values], 0.4, color=AFTER, label="with causes found")
+    else:
+        axes.bar(place, [before for before, _ in values], 0.6, color=BEFORE, label="kinematic model")
+    axes.set_xticks(place, names, rotation=90 if max(map(len, names)) > 3 and len(names) > 4 else 0)  # noqa: PLR2004

@@ -1,0 +1,104 @@
+"""What the figures share: one style, one way to bytes, maps over test and angle."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+
+from dbbstation.plan.circle import Direction
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from contextlib import AbstractContextManager
+
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.residual_map import ResidualMap
+
+STYLE: Any = {
+    "svg.hashsalt": "dbbstation",
+    "svg.fonttype": "none",
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 8,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 8,
+    "legend.frameon": False,
+}
+"""Same input, same bytes; text stays text."""
+
+MEASURED, BEFORE, AFTER = "#555555", "#d55e00", "#0072b2"
+"""Colours that the colour-blind tell apart [Okabe and Ito, Color Universal Design, 2008], and that differ in grey."""
+
+DIVERGING = "RdBu_r"
+"""Red and blue about white, told apart by all but the totally colour-blind [Brewer, ColorBrewer]."""
+
+QUARTERS = range(0, 361, 90)
+
+ROW_IN = 0.15
+"""Room of a row of a map [inch]."""
+
+
+def in_style() -> AbstractContextManager[None]:
+    """Draw what follows in the house style."""
+    return mpl.rc_context(STYLE)
+
+
+def as_svg(figure: Figure) -> bytes:
+    """Return the figure's bytes, the same for the same figure.
+
+    Paths are given to a hundredth of a point, which halves them. The layout's solver rounds as memory happens to lie;
+    clipping frames, whose names are hashes of all digits, are therefore counted in their order.
+    """
+    out = io.BytesIO()
+    figure.savefig(out, format="svg", metadata={"Date": None})
+    drawn = _PATH.sub(lambda path: _FURTHER_DIGITS.sub(rb"\1", path.group()), out.getvalue())
+    number = {name: k for k, name in enumerate(dict.fromkeys(_FRAME.findall(drawn)))}
+    return _FRAME.sub(lambda frame: f"frame{number[frame.group()]}".encode(), drawn)
+
+
+_PATH = re.compile(rb' d="[^"]*"')
+_FURTHER_DIGITS = re.compile(rb"(\.\d\d)\d+")
+_FRAME = re.compile(rb"\bp[0-9a-f]{10}\b")
+
+
+def draw_maps(panels: Sequence[Axes], titles: Sequence[str], maps: Sequence[ResidualMap], noise_um: float) -> QuadMesh:
+    """Draw maps side by side, both directions of each, with one scale whose zero is white.
+
+    Args:
+        panels: two for each map.
+        titles: one for each map.
+        maps: of the same tests.
+        noise_um: of one reading: the scale reaches that far at least, so that noise does not shout [µm].
+    """
+    reach = max(noise_um, *(one.reach_um for one in maps))
+    drawn = [(title, one, direction) for title, one in zip(titles, maps, strict=True) for direction in Direction]
+    for axes, (title, _, direction) in zip(panels, drawn, strict=True):
+        axes.set_title(f"{title}, {str(direction).upper()}")
+    panels[0].set_ylabel("test")
+    meshes = [
+        _map(axes, one.tests, one.um[direction], reach) for axes, (_, one, direction) in zip(panels, drawn, strict=True)
+    ]
+    return meshes[0]
+
+
+def _map(axes: Axes, tests: Sequence[str], values: NDArray[np.float64], reach: float) -> QuadMesh:
+    edges = np.linspace(0.0, 360.0, values.shape[1] + 1)
+    mesh = axes.pcolormesh(
+        edges, np.arange(len(tests) + 1), np.ma.masked_invalid(values), cmap=DIVERGING, vmin=-reach, vmax=reach
+    )
+    mesh.set_clip_on(False)
+    axes.set_facecolor("#cccccc")  # nothing recorded
+    axes.set_yticks(np.arange(len(tests)) + 0.5, tests)
+    axes.set_ylim(len(tests), 0)
+    axes.set_xticks(QUARTERS)
+    axes.set_xlabel("angle from +X to +Y, °")
+    return mesh

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 @source_file_option
 @click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
-@click.option("--force", is_flag=True, help="Overwrite the model file.")
+@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write a figure here, as SVG.")
+@click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def diagnose(
     sessions: tuple[Path, ...],
@@ -28,6 +29,7 @@ def diagnose(
     source_files: tuple[Path, ...],
     exclude: tuple[str, ...],
     out: Path | None,
+    figure: Path | None,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -40,7 +42,7 @@ def diagnose(
     \b
     Examples:
       dbbstation diagnose 2026-11-20-hexapod-7
-      dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml
+      dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml --figure diagnosis.svg
       dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
       dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
     """
@@ -49,12 +51,13 @@ def diagnose(
     from dbbstation.cli.calibrate import ELSEWHERE_IN_MODEL
     from dbbstation.cli.output import print_json, say
     from dbbstation.diagnosed import diagnose_sessions
-    from dbbstation.files.atomic import refuse_existing
+    from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.models import write_model
     from dbbstation.files.own_sources import every_source
 
-    if out is not None:
-        refuse_existing(out, force=force)
+    for path in (out, figure):
+        if path is not None:
+            refuse_existing(path, force=force)
     candidates = [name.strip() for name in sources.split(",")] if sources else None
     diagnosed = diagnose_sessions(sessions, candidates, exclude, say, every_source(source_files))
     found, summary = diagnosed.diagnosis, diagnosed.summary()
@@ -62,6 +65,11 @@ def diagnose(
         calibrated = calibration_summary(found.after, evaluate(found.after.model, found.after.observations))
         kept = {key: value for key, value in calibrated.items() if key not in ELSEWHERE_IN_MODEL}
         write_model(out, identified_model(found.after, kept, diagnosed.recorded.sessions), force=force)
+    if figure is not None:
+        from dbbstation.report.diagnosis_figure import diagnosis_figure
+
+        write_bytes(figure, diagnosis_figure(found), force=force)
+        say(f"figure written to {figure}")
     if as_json:
         print_json(summary)
     else:

@@ -97,11 +97,9 @@ class _Samples:
 
 
 def source_curves(diagnosis: Diagnosis) -> tuple[SourceCurves, ...]:
-    """Curves of every source that was found; where none was, of what is left by the variable that organises it."""
-    names = found_sources(diagnosis)
-    if not names and diagnosis.unexplained.variable is not None:
-        return (_curves(diagnosis, ""),)
-    return tuple(_curves(diagnosis, name) for name in names)
+    """Curves of every source that was found, and of what is left where some variable organises it."""
+    left = ("",) if diagnosis.unexplained.variable is not None else ()
+    return tuple(_curves(diagnosis, name) for name in (*found_sources(diagnosis), *left))
 
 
 def found_sources(diagnosis: Diagnosis) -> tuple[str, ...]:

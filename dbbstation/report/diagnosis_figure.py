@@ -50,7 +50,7 @@ def draw_diagnosis(diagnosis: Diagnosis) -> Figure:
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights, hspace=0.03)
     _maps(parts[0], diagnosis, found=found)
     for part, one in zip(parts[1:-2], curves, strict=True):
-        _curves(part, one, None if found else diagnosis.unexplained.strut, found=found)
+        _curves(part, one, None if one.source else diagnosis.unexplained.strut, found=found)
     _traces(parts[-2], gains, found=found)
     _bars(parts[-1], diagnosis, gains, found=found)
     return figure
@@ -91,7 +91,7 @@ def _curves(part: SubFigure, one: SourceCurves, marked: int | None, *, found: bo
 def _branch(axes: Axes, branch: Branch, *, found: bool, fine: bool) -> None:
     x = branch.variable
     if fine:
-        axes.plot(x, branch.before_um, color=BEFORE, linewidth=0.6)
+        axes.plot(x, branch.after_um, color=AFTER if found else BEFORE, linewidth=0.6)
         return
     marks: dict[str, Any] = {"markersize": 3.0, "linewidth": 0.0, "elinewidth": 0.8, "marker": MARKER_OF[branch.sense]}
     axes.errorbar(x, branch.before_um, 2.0 * branch.sigma_um, color=BEFORE, **marks)

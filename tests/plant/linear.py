@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 SAMPLES_PER_TURN = 240
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Course:
     """One run of the scene on a grid of times, with the sensitivities of its readings.
 
@@ -84,6 +84,16 @@ class LinearSession:
             block = np.zeros((len(course.along), len(names), 3))
             block[:, names.index(of(course.slot))] = -course.along
             return block.reshape(len(block), -1)
+
+        return self._joined(columns)
+
+    def lateness(self, mechanisms: Sequence[Mechanism]) -> FloatArray:
+        """`(m, runs)`: readings [mm/s] by how late every run is believed to be, on a machine with these mechanisms."""
+
+        def columns(course: Course) -> FloatArray:
+            block = np.zeros((len(course.kept), len(self.courses)))
+            block[:, self.courses.index(course)] = np.gradient(_change_mm(course, mechanisms), course.motion.session_s)
+            return block
 
         return self._joined(columns)
 

@@ -1,0 +1,136 @@
+"""Blind studies: sizes by another way of counting, kinds as asked for, the same bytes from the same seed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path as FilePath
+
+import numpy as np
+import pytest
+
+from tests.plant.blind.circumstances import drawn
+from tests.plant.blind.families import families
+from tests.plant.blind.hide import Hider
+from tests.plant.blind.limits import BAR_UM, FREE_MM, Limits
+from tests.plant.blind.listed import CONCEALED, LISTED, SINGLE
+from tests.plant.blind.sessions import KINDS, Task, make_session, make_study, tasks
+from tests.plant.blind.unlisted import UNLISTED
+from tests.plant.linear import LinearSession
+from tests.plant.mechanisms.backlash import Backlash
+from tests.plant.mechanisms.gravity import Gravity
+from tests.plant.noise import Noise
+from tests.plant.plan import HOLDER_REPEATABILITY_UM, subset, table_ii_plan
+from tests.plant.session import scene_of
+
+
+@pytest.fixture(scope="module")
+def session() -> LinearSession:
+    return LinearSession(scene_of(subset(table_ii_plan(3), ["a", "h", "l"])), 40)
+
+
+def test_standard_deviations_are_those_of_generalised_least_squares(session: LinearSession) -> None:
+    noise, rate_hz = Noise(0.4), 20.0
+    signature = session.signature([Backlash((2.0, 0.0, 0.0, 0.0, 0.0, 0.0))])
+    # The whole covariance of the readings [mm²], with everything random in it but the kinematic parameters.
+    covariance = np.diag((noise.white_um / 1000.0) ** 2 * session.samples_per_s / rate_hz)
+    covariance += (BAR_UM / 1000.0) ** 2 * np.ones_like(covariance)
+    for k, test in enumerate(session.scene.plan.tests):
+        ball = session.scene.plan.ball(test.ball)
+        both_um2 = HOLDER_REPEATABILITY_UM[ball.holder] ** 2 + ball.uncertainty_um**2
+        shift = session.shifts(lambda slot: slot.test.name)[:, 3 * k : 3 * k + 3]
+        covariance += both_um2 * 1e-6 * shift @ shift.T
+    design = np.column_stack([session.kinematic, signature])
+    prior = np.diag([FREE_MM**-2] * 24 + [0.0])
+    normal = design.T @ np.linalg.solve(covariance, design) + prior
+    expected = 1.0 / np.sqrt(np.linalg.inv(normal)[-1, -1])
+    limits = Limits(session, noise, rate_hz)
+    assert limits.sigmas(signature) == pytest.approx(expected, rel=1e-4)
+    # Four times the samples, or half the noise: twice as far out of it. Holders and bar do not average.
+    assert expected < Limits(session, noise, 4 * rate_hz).sigmas(signature) < 2.001 * expected
+
+
+def test_another_effect_fitted_too_takes_its_part(session: LinearSession) -> None:
+    limits = Limits(session, Noise(), 20.0)
+    signature = session.signature([Gravity(1e-6)])
+    assert limits.sigmas(signature, 3.0 * signature[:, None]) < 1e-3 * limits.sigmas(signature)
+    steps = session.by_strut(Backlash())
+    assert 0.5 * limits.sigmas(signature) < limits.sigmas(signature, steps) <= limits.sigmas(signature)
+
+
+def test_runs_without_angles_are_early_or_late_where_sampling_is_coarse() -> None:
+    circumstances = drawn(np.random.default_rng(5), 5)
+    linear = LinearSession(circumstances.scene(), 60)
+    base = [circumstances.kinematics]
+    signature = linear.signature([Gravity(1e-6)])
+
+    def sigmas(rate_hz: float, *, angles: bool) -> float:
+        return Limits(linear, Noise(), rate_hz, base, angles=angles).sigmas(signature)
+
+    assert sigmas(5.0, angles=False) < sigmas(5.0, angles=True)
+    assert sigmas(250.0, angles=False) == sigmas(250.0, angles=True)
+
+
+@pytest.mark.parametrize("name", [*LISTED, *UNLISTED])
+def test_every_effect_can_be_drawn_and_grows_with_its_scale(name: str, session: LinearSession) -> None:
+    effect = {**LISTED, **UNLISTED}[name](np.random.default_rng(4), session.scene)
+    assert effect.name == name
+    assert np.abs(effect.direction).max() == pytest.approx(1.0)
+    assert effect.at(1.0).listed == (name in LISTED)
+    carriers = effect.carried_by()
+    small, large = (session.change(effect.at(share * effect.most), carriers) for share in (0.001, 0.002))
+    if name not in {"time-skew", "bar-cyclic"}:  # nothing changes along the circles of a perfect machine
+        assert np.abs(small).max() > 0
+        np.testing.assert_allclose(large, 2.0 * small, atol=0.02 * np.abs(large).max())
+
+
+def test_sizes_are_what_was_asked_for(session: LinearSession) -> None:
+    del session
+    rng = np.random.default_rng(12)
+    hider = Hider(rng, drawn(rng, 12))
+    single = hider.single("backlash")[0].answer
+    assert single["name"] == "backlash"
+    assert 1.0 <= single["size"] <= 10.0
+    assert single["size_with_all_amplitudes_free"] <= single["size"] * (1 + 1e-6)
+    assert single["unconcealed_rms_um"] <= single["signature_rms_um"]
+    for hidden in hider.pair():
+        assert hidden.answer["testable"]
+    outside = hider.outside("lobed-socket")[0].answer
+    assert not outside["listed"]
+    assert outside["size"] >= 1.0
+    assert outside["nearest"] in families(LinearSession(scene_of(table_ii_plan()), 8))
+    for name in CONCEALED:
+        faint = hider.concealed(name)[0].answer
+        assert not faint["testable"]
+        assert 0.0 < faint["size"] <= 0.5 + 1e-9
+
+
+def test_counts_and_names_in_turn() -> None:
+    planned = tasks({"clean": 3, "single": 50, "pair": 2, "outside": 12, "concealed": 7}, 1)
+    assert [task.number for task in planned] == list(range(1, 75))
+    kinds = [task.kind for task in planned]
+    assert {kind: kinds.count(kind) for kind in KINDS} == dict(zip(KINDS, (3, 50, 2, 12, 7), strict=True))
+    assert {task.name for task in planned if task.kind == "single"} == set(SINGLE)
+    assert {task.name for task in planned if task.kind == "outside"} == set(UNLISTED)
+    # The order says nothing.
+    assert kinds != sorted(kinds, key=KINDS.index)
+
+
+def test_the_same_seed_makes_the_same_session(tmp_path: FilePath) -> None:
+    task = Task(3, "single", "gravity")
+    answers = [make_session(tmp_path / name, 8, task) for name in ("1", "2")]
+    assert json.dumps(answers[0], default=str) == json.dumps(answers[1], default=str)
+    for file in (tmp_path / "1").rglob("*.*"):
+        assert file.read_bytes() == (tmp_path / "2" / file.relative_to(tmp_path / "1")).read_bytes()
+
+
+def test_a_study_is_sessions_and_one_file_of_answers(tmp_path: FilePath) -> None:
+    counts = {"clean": 1, "single": 1, "pair": 0, "outside": 0, "concealed": 0}
+    told: list[int] = []
+    sealed = make_study(tmp_path / "study", counts, 2, 1, told.append)
+    assert told == [1, 2]
+    answers = json.loads(sealed.read_text())
+    assert answers["format"] == "blind-answers/1"
+    assert sorted(path.name for path in (tmp_path / "study").iterdir()) == ["0001", "0002", "answers.json"]
+    hidden = next(answer for answer in answers["sessions"] if answer["kind"] == "single")
+    told_text = (tmp_path / "study" / hidden["session"] / "session.yaml").read_text()
+    assert hidden["effects"][0]["name"] not in told_text

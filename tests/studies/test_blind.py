@@ -1,0 +1,211 @@
+"""The study of hidden effects: scoring on verdicts made up here, the way through the files on two short sessions."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from dbbstation.cli import main
+from dbbstation.errors import InputError
+from dbbstation.studies.blind import judge_sessions, read_answers, verdict_folder
+from dbbstation.studies.blind_score import compare, numbers, score
+from tests.plant.mechanisms.gravity import Gravity
+from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.session import record
+
+CANDIDATES = ("gravity", "backlash", "thermal-struts", "bar-drift", "play")
+
+
+def effect(name, size=2.0, **more):
+    told = {"name": name, "listed": True, "testable": size >= 1, "size": size, "struts": [], "variables": []}
+    return told | {"amplitudes": {}} | more
+
+
+def answer(session, kind, *effects):
+    truth = {"delta_length_mm": [0.0] * 6, "delta_base_mm": [[0.0, 0.0, 0.25]] * 6}
+    return {
+        "session": session,
+        "seed": 7,
+        "kind": kind,
+        "effects": list(effects),
+        "raised_bars": False,
+        "circumstances": {"plan": "table-ii", "rate_hz": 25.0, "angles": True},
+        "truth": truth,
+    }
+
+
+def verdict(*identified, declared=None, mismatch=None, left=(0.0, None, None), parameters=None, shift=()):
+    """What a diagnosis might say: names, ambiguities as {name: others}, what is left as (rms, strut, variable)."""
+    declared = declared or {}
+    sources = []
+    for name in CANDIDATES:
+        word = "identified" if name in identified else "ambiguous" if name in declared else "ruled-out"
+        values = (parameters or {}).get(name, {})
+        sources.append(
+            {
+                "name": name,
+                "verdict": word,
+                "ambiguous_with": list(declared.get(name, ())),
+                "parameters": {k: {"value": v, "uncertainty": u, "unit": "µm"} for k, (v, u) in values.items()},
+            }
+        )
+    summary = {
+        "mismatch": bool(identified or declared or left[0]) if mismatch is None else mismatch,
+        "sources": sources,
+        "unexplained": {"rms_um": left[0], "strut": left[1], "variable": left[2]},
+        "locations": [],
+        "held_out_rms_um": {"before": 4.0, "after": 0.5},
+        "noise_um": 0.5,
+        "parameter_shift": [{"parameter": p, "after_um": a, "uncertainty_um": u} for p, a, u in shift],
+    }
+    return {"summary": summary, "seconds": 1.0}
+
+
+def test_known_verdicts_make_a_known_table():
+    backlash, gravity, drift = (effect(name) for name in ("backlash", "gravity", "bar-drift"))
+    wobble = effect("odd-gear-wobble", listed=False, struts=[3], variables=["strut-length"])
+    said = {
+        # Clean: silent, a false alarm without a name, one with a name.
+        "01": (answer("01", "clean"), verdict()),
+        "02": (answer("02", "clean"), verdict(mismatch=True)),
+        "03": (answer("03", "clean"), verdict("gravity")),
+        # Singles: named; declared; declared too widely; wrongly named; the true name and one too many; unseen.
+        "04": (answer("04", "single", backlash), verdict("backlash")),
+        "05": (answer("05", "single", backlash), verdict(declared={"backlash": ["play"], "play": ["backlash"]})),
+        "06": (answer("06", "single", drift), verdict(declared={"bar-drift": ["play", "gravity", "backlash"]})),
+        "07": (answer("07", "single", gravity), verdict("play")),
+        "08": (answer("08", "single", gravity), verdict("gravity", "play")),
+        "09": (answer("09", "single", gravity), verdict()),
+        # Pairs: both; one.
+        "10": (answer("10", "pair", gravity, backlash), verdict("gravity", "backlash")),
+        "11": (answer("11", "pair", gravity, backlash), verdict("gravity")),
+        # Outside: right strut; right variable on another strut; neither; named.
+        "12": (answer("12", "outside", wobble), verdict(left=(1.0, 3, "time"))),
+        "13": (answer("13", "outside", wobble), verdict(left=(1.0, 2, "strut-length of the reading"))),
+        "14": (answer("14", "outside", wobble), verdict(left=(1.0, 5, "angle"))),
+        "15": (answer("15", "outside", wobble), verdict("play", left=(1.0, 3, "strut-length"))),
+        # One of the list that was not looked for.
+        "16": (answer("16", "single", effect("servo-lag", struts=[2])), verdict(left=(1.0, 2, "time"))),
+    }
+    outcomes = score({k: a for k, (a, _) in said.items()}, {k: v for k, (_, v) in said.items()})
+    found = numbers(outcomes)
+    hits = {title: (share["hits"], share["count"]) for title, share in found["shares"].items()}
+    assert hits == {
+        "clean: false alarm": (2, 3),
+        "single: detected": (5, 6),
+        "single: named": (2, 6),
+        "single: named or within a declared ambiguity": (3, 6),
+        "single: wrongly named": (2, 6),
+        "pair: both named": (1, 2),
+        "pair: both named or within a declared ambiguity": (1, 2),
+        "pair: wrongly named": (0, 2),
+        "outside: detected": (4, 4),
+        "outside: given a name": (1, 4),
+        "outside: located": (3, 4),
+        "not-a-candidate: given a name": (0, 1),
+        "not-a-candidate: located": (1, 1),
+        "single of 2 to 5 limits: named or within": (3, 6),
+    }
+    assert found["shares"]["clean: false alarm"]["interval"] == pytest.approx([0.208, 0.939], abs=1e-3)
+    assert found["confusion"]["gravity"] == {"play": 2, "gravity": 1, "nothing": 1}
+    assert found["confusion"]["backlash + gravity"] == {"gravity": 2, "backlash": 1}
+    assert found["effects"]["backlash"]["within"] == 2
+    failed = [failure["session"] for failure in found["failures"]]
+    # Names where nothing is, before wrong names, before silence.
+    assert failed[0] in {"02", "03"}
+    assert set(failed) == {"02", "03", "06", "07", "08", "09", "11", "14", "15"}
+    json.dumps(found, allow_nan=False)
+
+
+def test_an_ambiguity_counts_only_where_the_diagnosis_declares_it():
+    hidden = answer("01", "single", effect("bar-drift"))
+    assert not compare(hidden, verdict("thermal-struts")).within
+    both = {"thermal-struts": ["bar-drift"], "bar-drift": ["thermal-struts"]}
+    assert compare(hidden, verdict(declared=both)).within
+    assert compare(hidden, verdict(declared=both)).wrong == ()
+    other = {"thermal-struts": ["play"], "play": ["thermal-struts"]}
+    assert compare(hidden, verdict(declared=other)).wrong == ("thermal-struts", "play")
+
+
+def test_errors_count_in_their_own_sigma():
+    hidden = answer("01", "single", effect("backlash", amplitudes={"strut_1_um": 4.0}))
+    told = verdict("backlash", parameters={"backlash": {"strut_1_um": (4.3, 0.1)}})
+    assert compare(hidden, told).deviations == {"backlash strut_1_um": pytest.approx(3.0)}
+    # A common height of the base joints is not seen by level bars, and not asked for.
+    told = verdict(
+        "backlash", shift=[("base-joints joint_2_z", 10.0, 5.0), ("strut-reference-length strut_3", -4.0, 2.0)]
+    )
+    assert compare(hidden, told).pulls == pytest.approx((2.0, -2.0))
+    assert compare(hidden, told).held_out == pytest.approx(1.0)
+    assert compare(hidden, told).gain == pytest.approx(8.0)
+
+
+def test_what_nobody_can_see_may_be_named_by_its_name_only_and_at_its_size():
+    faint = effect("gravity", size=0.3, amplitudes={"strut_compliance_um_kn": 0.1})
+    hidden = answer("01", "concealed", faint)
+    assert compare(hidden, verdict()).right
+    assert not compare(hidden, verdict("play")).right
+    consistent = {"gravity": {"strut_compliance_um_kn": (0.0, 0.07)}}
+    assert compare(hidden, verdict(parameters=consistent)).right
+    too_sure = {"gravity": {"strut_compliance_um_kn": (0.0, 0.01)}}
+    assert not compare(hidden, verdict(parameters=too_sure)).right
+
+
+def test_a_diagnosis_that_breaks_is_the_worst_failure():
+    hidden = answer("01", "single", effect("gravity"))
+    outcomes = [compare(hidden, {"error": "LinAlgError: singular", "seconds": 1.0}), compare(hidden, verdict("play"))]
+    found = numbers(outcomes)
+    assert found["without_a_diagnosis"] == ["01"]
+    assert [failure["said"] for failure in found["failures"]] == ["LinAlgError: singular", "play"]
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("blind")
+    answers = []
+    for name, hidden in (("0001", []), ("0002", [Gravity()])):
+        truth = record(folder / name, seed=int(name), mechanisms=[RandomKinematics(), *hidden], rate_hz=25.0)
+        effects = [effect("gravity", 90.0, amplitudes={"strut_compliance_um_kn": 9.68})] if hidden else []
+        told = answer(name, "single" if hidden else "clean", *effects)
+        answers.append(told | {"truth": {k: np.asarray(v).tolist() for k, v in _machine_of(truth).items()}})
+    (folder / "answers.json").write_text(json.dumps({"format": "blind-answers/1", "sessions": answers}))
+    return folder
+
+
+def _machine_of(truth):
+    return {"delta_length_mm": truth.delta_length_mm, "delta_base_mm": truth.delta_base_mm}
+
+
+def test_a_study_goes_on_where_it_stopped(study):
+    names = ("gravity", "backlash")
+    told = []
+    kept = verdict_folder(study, names)
+    first = judge_sessions(study, names, 1, lambda done, total: told.append((done, total)))
+    assert told == [(0, 2), (1, 2), (2, 2)]
+    (kept / "0002.json").unlink()
+    (kept / "0001.json").write_text(json.dumps(first["0001"] | {"seconds": -1.0}))
+    second = judge_sessions(study, names, 1, lambda _done, _total: None)
+    assert second["0001"]["seconds"] == -1.0
+    assert second["0002"]["summary"] == first["0002"]["summary"]
+    found = numbers(score(read_answers(study), second))
+    assert found["shares"]["single: named"]["hits"] == 1
+    assert found["shares"]["clean: false alarm"]["hits"] == 0
+    assert found["kinematics_in_sigma"]["rms"] < 2.0
+
+
+def test_the_command_prints_the_tables(study, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["study", "blind", str(study), "--candidates", "gravity,backlash", "--jobs", "1"])
+    assert left.value.code == 0
+    printed = capsys.readouterr().out
+    assert "clean: false alarm" in printed
+    assert "joints and lengths" in printed
+
+
+def test_a_folder_without_answers_says_what_is_missing(tmp_path):
+    with pytest.raises(InputError, match="answers cannot be read"):
+        read_answers(tmp_path)
+    with pytest.raises(InputError, match="no session folders"):
+        judge_sessions(tmp_path, ("gravity",), 1, lambda _done, _total: None)

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 )
 @click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
-@click.option("--force", is_flag=True, help="Overwrite the model file.")
+@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write a figure here, as SVG.")
+@click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def calibrate(
     sessions: tuple[Path, ...],
@@ -44,6 +45,7 @@ def calibrate(
     prescribe: str | None,
     exclude: tuple[str, ...],
     out: Path | None,
+    figure: Path | None,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -59,7 +61,7 @@ def calibrate(
     \b
     Examples:
       dbbstation calibrate 2026-11-20-hexapod-7
-      dbbstation calibrate 2026-11-20-hexapod-7 --out model.yaml
+      dbbstation calibrate 2026-11-20-hexapod-7 --out model.yaml --figure circles.svg
       dbbstation calibrate monday tuesday --exclude h --json
       dbbstation calibrate standard-test --method conv-a
       dbbstation calibrate monday --sources strut-reference-length,base-joints,gravity,cog-shift,drive-friction
@@ -76,14 +78,14 @@ def calibrate(
     from dbbstation.calibration.summary import calibration_summary, identified_model
     from dbbstation.cli.output import print_json, say
     from dbbstation.errors import ModelError
-    from dbbstation.files.atomic import refuse_existing
+    from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.models import write_model
     from dbbstation.files.own_sources import every_source, sources_of
     from dbbstation.recorded import load_sessions
     from dbbstation.sources.registry import sources_named
 
-    if out is not None:
-        refuse_existing(out, force=force)
+    for path in filter(None, (out, figure)):
+        refuse_existing(path, force=force)
     chosen = KINEMATIC_SOURCES if sources is None else tuple(filter(None, map(str.strip, sources.split(","))))
     every = every_source(source_files)
     for name in set(sources_of(source_files, every)) - set(chosen):
@@ -104,6 +106,11 @@ def calibrate(
     if out is not None:
         kept = {key: value for key, value in summary.items() if key not in ELSEWHERE_IN_MODEL}
         write_model(out, identified_model(calibration, kept, recorded.sessions), force=force)
+    if figure is not None:
+        from dbbstation.report.calibration_figure import calibration_figure
+
+        write_bytes(figure, calibration_figure(calibration), force=force)
+        say(f"figure written to {figure}")
     for outlier in summary["outliers"]:
         say(f"does not belong, kept from pulling the fit: {outlier['text']}")
     if as_json:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dbbstation.calibration.evaluation import rms_um
 from dbbstation.calibration.residual_map import names_of_tests
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.average import means, sector_of
+from dbbstation.trace.average import by_angle
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
@@ -95,14 +94,7 @@ def _circularity_um(calibration: Calibration) -> list[float]:
 
 def _trace(diagnosis: Diagnosis, k: int) -> Trace:
     raw = diagnosis.before.observations[k].raw
-    sector = sector_of(raw, TRACE_SECTORS)
-    measured = raw.length_mm - raw.circle.bar_mm
-    phi = means(raw.phi_deg, sector)
-    theta = np.mod(raw.circle.theta_deg(phi), 360.0)
-    order = np.argsort(theta)
-    curves = (
-        measured,
-        measured - diagnosis.before.residual_mm[k],
-        measured - diagnosis.after.residual_mm[k],
-    )
-    return Trace(raw.circle.direction, theta[order], *(1e3 * means(curve, sector)[order] for curve in curves))
+    measured = 1e3 * (raw.length_mm - raw.circle.bar_mm)
+    predicted = [measured - 1e3 * fit.residual_mm[k] for fit in (diagnosis.before, diagnosis.after)]
+    theta, curves = by_angle(raw, [measured, *predicted], TRACE_SECTORS)
+    return Trace(raw.circle.direction, theta, *curves)

@@ -10,6 +10,8 @@ import numpy as np
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from dbbstation.trace.circle import RawCircle
@@ -44,3 +46,22 @@ def means(values: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np.f
     if values.ndim == 1:
         return np.bincount(group, values) / count
     return np.column_stack([np.bincount(group, column) / count for column in values.T])
+
+
+def by_angle(
+    raw: RawCircle, curves: Sequence[NDArray[np.float64]], sectors: int
+) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    """Means over sectors of the turn, by rising angle: for drawing.
+
+    Args:
+        raw: the circle.
+        curves: at its samples, shape (n,) each.
+        sectors: of the turn.
+
+    Returns:
+        Angle from +X towards +Y, shape (s,) [deg], and each curve, shape (s,).
+    """
+    sector = sector_of(raw, sectors)
+    theta = np.mod(raw.circle.theta_deg(means(raw.phi_deg, sector)), FULL_TURN_DEG)
+    order = np.argsort(theta)
+    return theta[order], [means(curve, sector)[order] for curve in curves]

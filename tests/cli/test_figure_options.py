@@ -26,3 +26,17 @@ def test_a_diagnosis_drawn(run, elsewhere, tmp_path):
     drawn, outcome = drawn_twice(run, tmp_path / "diagnosis.svg", *arguments)
     assert b"residual of each test within its mounting" in drawn
     assert outcome.data == run(*arguments).data
+
+
+def test_a_calibration_drawn(run, fifteen, tmp_path):
+    arguments = ("calibrate", fifteen, "--json")
+    drawn, outcome = drawn_twice(run, tmp_path / "calibration.svg", *arguments)
+    assert b"leverage of each test" in drawn
+    assert outcome.data == run(*arguments).data
+
+
+def test_a_calibration_without_known_places_drawn(run, elsewhere, tmp_path):
+    drawn = tmp_path / "conv-a.svg"
+    outcome = run("calibrate", elsewhere, "--method", "conv-a", "--figure", drawn)
+    assert outcome.code == DONE, outcome.err
+    assert "no ball of known place" in drawn.read_text(encoding="utf-8")

@@ -1,0 +1,39 @@
+"""The figure of a calibration: well-formed, the same bytes each time, every part in it; round numbers of its keys."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from dbbstation.calibration.fit import calibrate
+from dbbstation.files.plan_file import read_plan
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.report.calibration_figure import _round, calibration_figure
+from dbbstation.studies.virtual_session import draw_session
+from dbbstation.virtual.truth import random_kinematics
+
+
+@pytest.fixture(scope="module")
+def fit(reference):
+    plan = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
+    truth = MachineModel(reference, random_kinematics(reference, 5))
+    return calibrate(reference, draw_session(truth, plan, np.random.default_rng(3), 3e-4, 360))
+
+
+def test_every_part_is_drawn_and_drawn_alike(fit):
+    drawn = calibration_figure(fit)
+    texts = ["".join(t.itertext()).strip() for t in ET.fromstring(drawn).iter("{http://www.w3.org/2000/svg}text")]  # noqa: S314 - our own
+    assert len([text for text in texts if ": circularity " in text]) == 15
+    assert {"left within mountings, CCW", "left within mountings, CW", "leverage of each test"} <= set(texts)
+    assert {"centres off the balls, nominal machine", "centres off the balls, calibrated"} <= set(texts)
+    assert {"Z -1150 mm", "Z -1008 mm", "Z -870 mm"} <= set(texts)
+    assert {"2 × 0.99 µm stated", "2 × 2.02 µm stated"} <= set(texts)  # hypot of 0.58 or 1.85 and 0.8
+    assert calibration_figure(fit) == drawn
+
+
+@pytest.mark.parametrize(("value", "expected"), [(0.37, 0.2), (1.0, 1.0), (4.99, 2.0), (5.0, 5.0), (730.0, 500.0)])
+def test_keys_are_round(value, expected):
+    assert _round(value) == pytest.approx(expected)

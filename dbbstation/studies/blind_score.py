@@ -42,7 +42,8 @@ class Outcome:
         identified: names that it gives.
         declared: names that it says it cannot tell apart, with those that each is not told from.
         named: each hidden effect is identified.
-        within: each hidden effect is identified or in a declared ambiguity of at most three.
+        within: each hidden effect is identified or in a declared ambiguity of at most three: it with its own rivals, or
+            all that hang together.
         wrong: names given, alone or as an ambiguity, where nothing of the kind is hidden.
         located: what is left, or the misfit, is put on the right strut or variable; None where nothing was asked.
         quiet: none of the hidden effects is claimed at a size that it has not (for what nobody can see).
@@ -123,10 +124,11 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any]) -> Outcome:
     kind = answer["kind"] if listed <= set(by_name) else NO_CANDIDATE
     asked = listed if kind != "concealed" else {e["name"] for e in effects if e["testable"]}
     found = [name for name in asked if name in identified]
-    close = [name for name in asked if name in declared and len(declared[name]) < MOST_DECLARED]
+    groups = _hanging_together(declared)
+    close = [name for name in asked if _declared_closely(name, declared, groups)]
     # A name is no lie where what nobody can see is really there.
     wrong = [name for name in identified if name not in listed]
-    wrong += [name for name, others in declared.items() if not listed & {name, *others}]
+    wrong += [name for name in declared if not any(name in group and listed & group for group in groups)]
     unexplained = summary["unexplained"]
     before, after = summary["held_out_rms_um"]["before"], summary["held_out_rms_um"]["after"]
     return Outcome(
@@ -148,13 +150,13 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any]) -> Outcome:
         deviations={
             f"{effect['name']} {key}": z
             for effect in effects
-            if effect["name"] in identified
+            if effect["name"] in identified and kind != "concealed"
             for key, z in _deviations(effect["amplitudes"], by_name[effect["name"]]).items()
         },
         pulls=_pulls(answer, summary),
         held_out=after / summary["noise_um"] if summary["noise_um"] else float("nan"),
         gain=before / after if after else float("nan"),
-        said=_said(identified, declared, unexplained, verdict),
+        said=_said(identified, groups, unexplained, verdict),
     )
 
 
@@ -219,6 +221,22 @@ _NOTHING: dict[str, Any] = {
 }
 
 
+def _hanging_together(declared: Mapping[str, Sequence[str]]) -> list[frozenset[str]]:
+    """Names that are not told apart, also by way of a third."""
+    groups: list[frozenset[str]] = []
+    for name, others in declared.items():
+        joined = frozenset({name, *others})
+        touching = [group for group in groups if group & joined]
+        groups = [group for group in groups if not group & joined] + [joined.union(*touching)]
+    return groups
+
+
+def _declared_closely(name: str, declared: Mapping[str, Sequence[str]], groups: Sequence[frozenset[str]]) -> bool:
+    """Whether a name is in an ambiguity of few."""
+    own = name in declared and len(declared[name]) < MOST_DECLARED
+    return own or any(name in group and len(group) <= MOST_DECLARED for group in groups)
+
+
 def _recorded(circumstances: Mapping[str, Any]) -> str:
     angles = "" if circumstances["angles"] else " no angles"
     return f"{circumstances['plan']} {circumstances['rate_hz']:g} Hz{angles}"
@@ -275,14 +293,13 @@ def _pulls(answer: Mapping[str, Any], summary: Mapping[str, Any]) -> tuple[float
 
 def _said(
     identified: Sequence[str],
-    declared: Mapping[str, Sequence[str]],
+    groups: Sequence[frozenset[str]],
     unexplained: Mapping[str, Any],
     verdict: Mapping[str, Any],
 ) -> str:
     if "error" in verdict:
         return str(verdict["error"])
-    groups = dict.fromkeys(" or ".join(sorted({name, *others})) for name, others in declared.items())
-    parts = [*identified, *(f"({group})" for group in groups)]
+    parts = [*identified, *(f"({' or '.join(sorted(group))})" for group in groups)]
     if unexplained["rms_um"] > 0:
         strut = f" strut {unexplained['strut']}" if unexplained["strut"] else ""
         parts.append(f"[left {unexplained['rms_um']:.2g} µm by {unexplained['variable']}{strut}]")

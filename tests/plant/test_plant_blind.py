@@ -18,6 +18,7 @@ from tests.plant.blind.unlisted import UNLISTED
 from tests.plant.linear import LinearSession
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.gravity import Gravity
+from tests.plant.mechanisms.servo import TimeSkew
 from tests.plant.noise import Noise
 from tests.plant.plan import HOLDER_REPEATABILITY_UM, subset, table_ii_plan
 from tests.plant.session import scene_of
@@ -67,7 +68,10 @@ def test_runs_without_angles_are_early_or_late_where_sampling_is_coarse() -> Non
         return Limits(linear, Noise(), rate_hz, base, angles=angles).sigmas(signature)
 
     assert sigmas(5.0, angles=False) < sigmas(5.0, angles=True)
-    assert sigmas(250.0, angles=False) == sigmas(250.0, angles=True)
+    assert sigmas(250.0, angles=False) == pytest.approx(sigmas(250.0, angles=True), rel=0.01)
+    late = linear.change(TimeSkew(1.0), base)
+    assert Limits(linear, Noise(), 25.0, base, angles=False).sigmas(late) < 1e-2
+    assert Limits(linear, Noise(), 25.0, base).sigmas(late) > 0.1
 
 
 @pytest.mark.parametrize("name", [*LISTED, *UNLISTED])

@@ -125,6 +125,10 @@ def test_an_ambiguity_counts_only_where_the_diagnosis_declares_it():
     both = {"thermal-struts": ["bar-drift"], "bar-drift": ["thermal-struts"]}
     assert compare(hidden, verdict(declared=both)).within
     assert compare(hidden, verdict(declared=both)).wrong == ()
+    # By way of a third: bar-drift or play, play or thermal-struts.
+    chain = {"play": ["bar-drift", "thermal-struts"], "thermal-struts": ["play"]}
+    assert compare(hidden, verdict(declared=chain)).within
+    assert compare(hidden, verdict(declared=chain)).wrong == ()
     other = {"thermal-struts": ["play"], "play": ["thermal-struts"]}
     assert compare(hidden, verdict(declared=other)).wrong == ("thermal-struts", "play")
 

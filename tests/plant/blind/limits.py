@@ -1,8 +1,9 @@
 """How large an effect must be to be seen: its amplitude over the standard deviation of a fit that knows everything else.
 
 The fit has the 24 kinematic parameters, one shift per mounting and per entry of the CMM sheet, and the bar's length,
-all with their usual scatter. Where a recording has no angles, they come from the two edges of the radial feed, and each
-run is early or late by what its sampling leaves open. With `C` all their columns in units of scatter and of the noise of a sample, an
+all with their usual scatter. Where a recording has no angles, they come from the two edges of the radial feed: what is
+late in all runs alike is then late at the edges too and cannot be seen, and each run is early or late by what its
+sampling leaves open. With `C` all their columns in units of scatter and of the noise of a sample, an
 effect's columns `S` keep the information `SᵀS - SᵀC (1 + CᵀC)⁻¹ CᵀS`.
 """
 
@@ -28,6 +29,8 @@ TESTABLE_SIGMA = 5.0
 BAR_UM = 0.5
 FREE_MM = 1.0
 """Scatter that leaves a kinematic parameter free, and keeps finite what circles cannot see."""
+FREE_S = 1.0
+"""The same for the time by which all runs are late."""
 
 
 class Limits:
@@ -65,10 +68,11 @@ class Limits:
             session.shifts(lambda slot: slot.test.ball),
             np.ones((len(self._weight), 1)),
         ]
-        late_s = 0.0 if angles else _edge_s(plan.path, rate_hz)
-        if late_s > 0.0:
-            columns.append(session.lateness(base))
-            scatter_mm = np.concatenate([scatter_mm, np.full(len(session.scene.slots), late_s)])
+        if not angles:
+            late = session.lateness(base)
+            columns += [late, late.sum(axis=1, keepdims=True)]
+            each_s = np.full(late.shape[1], _edge_s(plan.path, rate_hz))
+            scatter_mm = np.concatenate([scatter_mm, each_s, [FREE_S]])
         self._known = np.concatenate(columns, axis=1) * scatter_mm * self._weight[:, None]
         self._factor = cho_factor(np.eye(self._known.shape[1]) + self._known.T @ self._known)
 

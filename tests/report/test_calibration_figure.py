@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -32,6 +33,12 @@ def test_every_part_is_drawn_and_drawn_alike(fit):
     assert {"Z -1150 mm", "Z -1008 mm", "Z -870 mm"} <= set(texts)
     assert {"2 × 0.99 µm stated", "2 × 2.02 µm stated"} <= set(texts)  # hypot of 0.58 or 1.85 and 0.8
     assert calibration_figure(fit) == drawn
+    # Paths are shortened and frames renamed after drawing: both must still be what they were.
+    named = set(re.findall(rb' id="([^"]+)"', drawn))
+    assert set(re.findall(rb"url\(#([^)]+)\)", drawn)) | set(re.findall(rb'href="#([^"]+)"', drawn)) <= named
+    paths = re.findall(rb' d="([^"]*)"', drawn)
+    assert len(paths) > 1000
+    assert all(re.fullmatch(rb"\s*(?:[MLQCz]\s*|-?\d+(?:\.\d{1,2})?(?:e-\d+)?\s*)*", path) for path in paths)
 
 
 @pytest.mark.parametrize(("value", "expected"), [(0.37, 0.2), (1.0, 1.0), (4.99, 2.0), (5.0, 5.0), (730.0, 500.0)])

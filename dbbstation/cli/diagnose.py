@@ -12,6 +12,9 @@ from dbbstation.cli.source_files import source_file_option
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from dbbstation.diagnosis.findings import Diagnosis
+    from dbbstation.diagnosis.unexplained_model import Kept
+
 
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
@@ -19,6 +22,11 @@ if TYPE_CHECKING:
 @source_file_option
 @click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
+@click.option(
+    "--keep-unexplained",
+    is_flag=True,
+    help="Keep in that model what has no name, as a curve over strut length or force: compensated, cause unknown.",
+)
 @click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write a figure here, as SVG.")
 @click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -29,6 +37,7 @@ def diagnose(
     source_files: tuple[Path, ...],
     exclude: tuple[str, ...],
     out: Path | None,
+    keep_unexplained: bool,
     figure: Path | None,
     force: bool,
     as_json: bool,
@@ -45,26 +54,34 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml --figure diagnosis.svg
       dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
       dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
+      dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
     """
     from dbbstation.calibration.evaluation import evaluate
     from dbbstation.calibration.summary import calibration_summary, identified_model
     from dbbstation.cli.calibrate import ELSEWHERE_IN_MODEL
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.diagnosed import diagnose_sessions
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.models import write_model
     from dbbstation.files.own_sources import every_source
 
-    for path in (out, figure):
-        if path is not None:
-            refuse_existing(path, force=force)
+    if keep_unexplained and out is None:
+        raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
+    for path in filter(None, (out, figure)):
+        refuse_existing(path, force=force)
     candidates = [name.strip() for name in sources.split(",")] if sources else None
     diagnosed = diagnose_sessions(sessions, candidates, exclude, say, every_source(source_files))
     found, summary = diagnosed.diagnosis, diagnosed.summary()
     if out is not None:
-        calibrated = calibration_summary(found.after, evaluate(found.after.model, found.after.observations))
+        unnamed = _kept(found) if keep_unexplained else None
+        fit = found.after if unnamed is None else unnamed.fit
+        calibrated = calibration_summary(fit, evaluate(fit.model, fit.observations))
         kept = {key: value for key, value in calibrated.items() if key not in ELSEWHERE_IN_MODEL}
-        write_model(out, identified_model(found.after, kept, diagnosed.recorded.sessions), force=force)
+        of_sessions = diagnosed.recorded.sessions
+        model = identified_model(fit, kept, of_sessions) if unnamed is None else unnamed.identified(kept, of_sessions)
+        write_model(out, model, force=force)
+        say_unknown_causes(model.model)
     if figure is not None:
         from dbbstation.report.diagnosis_figure import diagnosis_figure
 
@@ -113,12 +130,51 @@ def _print(summary: Mapping[str, Any]) -> None:
         for shift in summary["parameter_shift"][:4]:
             click.echo(f"  {shift['parameter']}: {shift['shift_um']:+.0f} µm")
     click.echo(summary["unexplained"]["text"])
+    if summary["unexplained"]["curve"]:
+        _print_curve(summary["unexplained"]["curve"])
     if summary["next_test"]:
         test = summary["next_test"]
         click.echo(
             f"measure next: {test['text']}; it would tell {test['source']} to {test['sigma_after']:.2g} instead of "
             f"{test['sigma_before']:.2g} {test['unit']}"
         )
+
+
+def _kept(found: Diagnosis) -> Kept | None:
+    """What is left without a name, to be kept in the model; None, and why, where it cannot be."""
+    from dbbstation.cli.output import say
+    from dbbstation.diagnosis.unexplained_model import keep_unexplained
+    from dbbstation.errors import ModelError
+
+    try:
+        return keep_unexplained(found.unexplained.curve, found.after)
+    except ModelError as error:
+        say(f"note: the model is written without it: {error.what}")
+        return None
+
+
+MOST_POINTS = 12
+"""Points of a curve that are printed; a wave has many more, and is said by its size and period."""
+
+
+def _print_curve(curve: Mapping[str, Any]) -> None:
+    from dbbstation.cli.output import print_table
+
+    points = curve["points"]
+    click.echo(
+        f"it moves the readings by {curve['readings_um']:.2f} µm rms, {curve['unconcealed_um']:.2f} µm of that where no "
+        "kinematic parameter can follow; cause unknown:"
+    )
+    if curve["period_mm"] is not None:
+        click.echo(
+            f"  a wave of {curve['period_mm']:.2f} mm, from {points[0]['at']:.0f} to {points[-1]['at']:.0f} mm, up to "
+            f"{max(abs(point['value_um']) for point in points):.2f} µm"
+        )
+    step = -(-len(points) // MOST_POINTS)
+    rows = [[f"{p['at']:.6g}", f"{p['value_um']:+.2f}", "±", f"{p['uncertainty_um']:.2f}"] for p in points[::step]]
+    print_table([f"{curve['variable']} / {curve['unit']}", "error / µm", "", "std / µm"], rows)
+    if curve["convention"]:
+        click.echo(f"  ({curve['convention']})")
 
 
 def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:

@@ -30,6 +30,7 @@ def predict(*, model: Path, source_files: tuple[Path, ...], poses: Path, out: Pa
     import numpy as np
 
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.models import read_model
     from dbbstation.files.own_sources import every_source
@@ -40,6 +41,7 @@ def predict(*, model: Path, source_files: tuple[Path, ...], poses: Path, out: Pa
 
     refuse_existing(out, force=force)
     identified = read_model(model, every_source(source_files))
+    say_unknown_causes(identified.model)
     table = read_poses(poses)
     check_travel(identified.model.machine, table.poses, where=str(poses))
     motion = Motion(table.poses)
@@ -56,6 +58,7 @@ def predict(*, model: Path, source_files: tuple[Path, ...], poses: Path, out: Pa
                 "greatest_error_um": float(error_um.max()),
                 "greatest_uncertainty_um": worst_u_um,
                 "directions_lost": list(identified.directions_lost),
+                "unknown_causes": unknown_causes(identified.model),
             }
         )
         return

@@ -9,6 +9,7 @@ import click
 import numpy as np
 
 from dbbstation.cli.output import print_json, print_table
+from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.models import read_model
 from dbbstation.files.own_sources import every_source
@@ -32,6 +33,8 @@ def loaded_inverse(model_file: Path, time_s: float | None, source_files: Sequenc
     """
     identified = read_model(model_file, every_source(source_files))
     origin = {"model file": hashed(model_file)}
+    say_unknown_causes(identified.model)
+    origin |= {f"cause unknown {k}": name for k, name in enumerate(unknown_causes(identified.model), start=1)}
     origin |= {f"session {name}": f"sha256 {digest}" for name, digest in identified.sessions.items()}
     return Inverse(identified.model, origin, time_s)
 

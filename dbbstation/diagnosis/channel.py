@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM
-from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Shape, ranges, shapes, strongest_waves, variables
+from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Ranges, Shape, ranges, shapes, strongest_waves, variables
 from dbbstation.inference.race import Candidate, Race, Variant
 from dbbstation.inference.square_root import Block, Columns, compress, joined
 from dbbstation.trace.average import averaged, means, sector_of
@@ -46,6 +46,7 @@ class Channel:
         named: sources that have a name, as candidates.
         unnamed: shapes, as candidates; their names are `variable | strut | form`.
         residual_mm: per run, what the base fit leaves, measurement's effects included [mm].
+        extent: of the variables that shapes are curves of.
     """
 
     observations: tuple[Observation, ...]
@@ -56,6 +57,7 @@ class Channel:
     named: tuple[Candidate, ...]
     unnamed: tuple[Candidate, ...]
     residual_mm: tuple[NDArray[np.float64], ...]
+    extent: Ranges
 
     @cached_property
     def joined(self) -> Block:
@@ -146,6 +148,7 @@ def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Chan
         named=book.candidates(named=True),
         unnamed=book.candidates(named=False),
         residual_mm=tuple(left),
+        extent=extent,
     )
 
 
@@ -177,7 +180,7 @@ class _Book:
         self._sources: dict[
             tuple[str, tuple[float, ...]], dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
         ] = {}
-        self._shapes: dict[tuple[str, int | None, str], NDArray[np.int64]] = {}
+        self._shapes: dict[tuple[str, int | None, str], tuple[NDArray[np.int64], float | None]] = {}
 
     def source(
         self, source: ErrorSource, shared: str, shape: tuple[float, ...], prior: NDArray[np.float64]
@@ -192,8 +195,8 @@ class _Book:
         """Columns of a shape."""
         key = (shape.variable, shape.strut, shape.form)
         if key not in self._shapes:
-            self._shapes[key] = self._new(shape.count)
-        return self._shapes[key]
+            self._shapes[key] = (self._new(shape.count), shape.wave)
+        return self._shapes[key][0]
 
     def candidates(self, *, named: bool) -> tuple[Candidate, ...]:
         """Return the candidates with their variants."""
@@ -204,9 +207,10 @@ class _Book:
                 prior = np.concatenate([prior for _, prior in sets.values()])
                 variants.setdefault(name, []).append(Variant(columns, prior, form))
         else:
-            for (variable, strut, _), columns in self._shapes.items():
+            for (variable, strut, _), (columns, wave) in self._shapes.items():
+                form = () if wave is None else (wave,)
                 prior = np.full(len(columns), PLAUSIBLE_MM)
-                variants.setdefault(f"{variable} | {strut or ''}", []).append(Variant(columns, prior))
+                variants.setdefault(f"{variable} | {strut or ''}", []).append(Variant(columns, prior, form))
         return tuple(Candidate(name, tuple(forms)) for name, forms in variants.items())
 
     def _new(self, size: int) -> NDArray[np.int64]:

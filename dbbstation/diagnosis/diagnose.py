@@ -15,6 +15,8 @@ from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
 from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.next_test import propose
+from dbbstation.diagnosis.refit import refitted
+from dbbstation.diagnosis.unexplained_model import with_exact_wave
 from dbbstation.diagnosis.verdicts import doubted, judge, testable, unexplained
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import CalibrationError, ModelError
@@ -97,7 +99,7 @@ def diagnose(
         if not settled.chosen:
             break
         # What stood out beside a model without physics may not beside one with it, and the other way round.
-        again, beside = calibrate_robust(partial(_refitted, settled.after), runs)
+        again, beside = calibrate_robust(partial(refitted, settled.after), runs)
         if {(o.kind, o.run) for o in beside} == {(o.kind, o.run) for o in outliers}:
             break
         progress("runs that do not belong")
@@ -132,7 +134,7 @@ def diagnose(
         workspace=workspace_error(before, after) if chosen else None,
         locations=_locations(before, after, found, first, rest.finding.variable) if mismatch else (),
         sources=findings,
-        unexplained=rest.finding,
+        unexplained=with_exact_wave(rest.finding, after),
         shifts=_shifts(before, after),
         next_test=_next_test(channel, settled, findings, by_name),
     )
@@ -253,18 +255,6 @@ def _with_shape(
     values[shaped] = shape
     values[~shaped] = amplitudes[: int((~shaped).sum())]
     return values
-
-
-def _refitted(like: Calibration, observations: Sequence[Observation]) -> Calibration:
-    """Fit runs with the sources of another fit, begun at its values."""
-    layout = like.layout
-    sources = list({term.source.name: term.source for term in layout.terms}.values())
-    begin = {
-        term.source.name: like.x[term.columns]
-        for term in layout.terms
-        if any(parameter.shape for parameter in term.parameters)
-    }
-    return calibrate(layout.machine, observations, sources, begin)
 
 
 def _tests(channel: Channel) -> list[int]:

@@ -86,6 +86,40 @@ class Location:
 
 
 @dataclass(frozen=True)
+class CurvePoint:
+    """One point of a curve: where, its value and one standard uncertainty [µm]."""
+
+    at: float
+    value_um: float
+    uncertainty_um: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """An error without a name as a function of what organises it.
+
+    Attributes:
+        variable: what it is a function of.
+        unit: of that.
+        strut: 1 to 6; None where all struts follow it, or no strut's error is meant.
+        period_mm: of a wave [mm]; None for what is none.
+        convention: what was taken out of it because fitted parameters make that, in words; empty where nothing was.
+        readings_um: root mean square of what it does to the readings [µm].
+        unconcealed_um: of what the fitted machine parameters leave of that [µm].
+        points: least first; between them the curve is straight, or a wave.
+    """
+
+    variable: str
+    unit: str
+    strut: int | None
+    period_mm: float | None
+    convention: str
+    readings_um: float
+    unconcealed_um: float
+    points: tuple[CurvePoint, ...]
+
+
+@dataclass(frozen=True)
 class Unexplained:
     """What is left without a name.
 
@@ -95,6 +129,7 @@ class Unexplained:
         variable: what organises it; None where nothing does clearly.
         gain: log evidence of that description.
         text: one sentence for people.
+        curve: the error along the variable; None where nothing organises it clearly.
     """
 
     rms_um: float
@@ -102,6 +137,7 @@ class Unexplained:
     variable: str | None
     gain: float
     text: str
+    curve: Curve | None = None
 
 
 @dataclass(frozen=True)

@@ -34,9 +34,13 @@ PLAUSIBLE_MM = 0.004
 LOBES = tuple(range(2, 11))
 """Undulations per turn of an unnamed error of the reading that depends on the angle alone."""
 
-WAVES_PER_MM = np.arange(0.02, 0.26, 0.0015)
-"""Waves of strut travel that are looked for: periods of 50 down to 4 mm, spaced so that none falls between two over
-the 300 mm that a strut travels [1/mm]."""
+WAVES_PER_MM = np.arange(0.0035, 0.26, 0.0015)
+"""Waves of strut travel that are looked for: periods of 290 down to 4 mm, spaced so that none is missed over the 300
+to 700 mm that a strut travels [1/mm]."""
+
+FINER_PER_MM = (np.linspace(-0.0015, 0.0015, 31), np.linspace(-0.0001, 0.0001, 31))
+"""Around each of them and around the best of these, so that a wave keeps its phase to a degree from one end of the
+travel to the other [1/mm]."""
 
 STRONGEST = 2
 """Waves of each strut that are kept as shapes."""
@@ -52,6 +56,7 @@ class Shape:
         form: tells apart the variants of one variable, such as a period.
         columns: effect per amplitude at every sample of one run, p amplitudes.
         count: p.
+        wave: of strut length [1/mm]; None for what is no wave.
     """
 
     variable: str
@@ -59,6 +64,7 @@ class Shape:
     form: str
     columns: Effect
     count: int
+    wave: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +123,13 @@ def strongest_waves(
         power = np.hypot(np.cos(phase) @ weighted, np.sin(phase) @ weighted)
         peaks = np.flatnonzero((power >= np.roll(power, 1)) & (power >= np.roll(power, -1)))
         best = peaks[np.argsort(-power[peaks])][:STRONGEST]
-        found[i] = WAVES_PER_MM[np.resize(best, STRONGEST)]
+        wave = WAVES_PER_MM[best]
+        for finer in FINER_PER_MM:
+            near = wave[:, None] + finer
+            phase = 2.0 * np.pi * near[:, :, None] * length[:, i]
+            power = np.hypot(np.cos(phase) @ weighted, np.sin(phase) @ weighted)
+            wave = near[np.arange(len(best)), power.argmax(axis=1)]
+        found[i] = np.resize(wave, STRONGEST)
     return found
 
 
@@ -144,7 +156,9 @@ def shapes(motion: Motion, machine: Machine, extent: Ranges, waves: NDArray[np.f
             angle = 2.0 * np.pi * wave * values["strut-length"][:, i]
             own = np.zeros((len(motion), STRUTS, 2))
             own[:, i] = np.column_stack([np.cos(angle), np.sin(angle)])
-            found.append(Shape("strut-length wave", i + 1, f"period {1.0 / wave:.1f} mm", Effect(strut_mm=own), 2))
+            found.append(
+                Shape("strut-length wave", i + 1, f"period {1.0 / wave:.3f} mm", Effect(strut_mm=own), 2, wave)
+            )
     if "time" in extent.low:
         drift = hats(values["time"], extent.low["time"], extent.high["time"])[:, 0]
         found.append(Shape("time of the reading", None, "", Effect(reading_mm=drift), HATS))

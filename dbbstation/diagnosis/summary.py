@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.calibration.evaluation import rms_um
@@ -43,7 +44,13 @@ def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[
             *(_source(source) for source in diagnosis.sources),
             *(_lacking(*item) for item in lacking.items()),
         ],
-        "unexplained": {"rms_um": rest.rms_um, "strut": rest.strut, "variable": rest.variable, "text": rest.text},
+        "unexplained": {
+            "rms_um": rest.rms_um,
+            "strut": rest.strut,
+            "variable": rest.variable,
+            "text": rest.text,
+            "curve": None if rest.curve is None else asdict(rest.curve),
+        },
         "parameter_shift": [
             {
                 "parameter": shift.parameter,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
+from dbbstation.diagnosis.unexplained_curve import curve_of
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.race import Race, free_directions
 
@@ -235,6 +236,7 @@ def unexplained(
     if left.probability >= significant:
         return Rest(Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."), overrules=False)
     race, candidate, variant, gain = _best_shape(channel, left.noise)
+    about = channel
     named = [choice.variant for choice in chosen]
     # The first of the chosen explains most. Where even it falls short of one unnamed curve, the others were only
     # called in to make up for that.
@@ -242,7 +244,8 @@ def unexplained(
     overrules = bool(named) and min(race.explained(named[:1]), race.explained(named)) < enough
     if named and not overrules:
         # The names stand; what is left beside them is looked at about the joint fit.
-        _, candidate, _, gain = _best_shape(joint, left.noise)
+        about = joint
+        race, candidate, variant, gain = _best_shape(joint, left.noise)
     rms_um = 1e3 * (first.rms if overrules else left.rms)
     if gain < SHAPE_THRESHOLD:
         text = "Something is left beyond noise, and no variable organises it clearly."
@@ -252,7 +255,8 @@ def unexplained(
     text = (
         f"An error without a known name, organised by {variable}, {f'strut {number}' if number else 'no single strut'}."
     )
-    return Rest(Unexplained(rms_um, number, variable, gain, text), overrules=overrules)
+    curve = curve_of(about, race, candidate.name, variant)
+    return Rest(Unexplained(rms_um, number, variable, gain, text, curve), overrules=overrules)
 
 
 def _best_shape(channel: Channel, noise_mm: float) -> tuple[Race, Candidate, Variant, float]:

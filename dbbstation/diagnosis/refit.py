@@ -1,0 +1,33 @@
+"""A fit again: of other runs, or with more sources, begun where the last one ended."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.calibration.fit import Calibration, calibrate
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource
+
+
+def refitted(
+    like: Calibration,
+    observations: Sequence[Observation],
+    more: Sequence[ErrorSource] = (),
+    start: Mapping[str, NDArray[np.float64]] | None = None,
+) -> Calibration:
+    """Fit runs with the sources of another fit, begun at its values, and with more of them, begun where `start` says."""
+    layout = like.layout
+    sources = list({term.source.name: term.source for term in layout.terms}.values())
+    begin = {
+        term.source.name: like.x[term.columns]
+        for term in layout.terms
+        if any(parameter.shape for parameter in term.parameters)
+    }
+    return calibrate(layout.machine, observations, [*sources, *more], {**begin, **(start or {})})

@@ -1,0 +1,177 @@
+"""A model that keeps an error without a name, so that it can be predicted and compensated, marked as of unknown cause."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.calibration.summary import identified_model
+from dbbstation.diagnosis.findings import CurvePoint
+from dbbstation.diagnosis.refit import refitted
+from dbbstation.errors import CalibrationError, ModelError
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.contract import Effect, ErrorSource, Fitted
+from dbbstation.sources.registry import sources_named
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.diagnosis.findings import Curve, Unexplained
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.sources.contract import Motion, Parameter
+
+KEPT_AS = {
+    "strut-length": "unexplained-by-length",
+    "strut-length wave": "unexplained-wave",
+    "strut-force": "unexplained-by-force",
+}
+"""Sources that carry an unnamed error into a model, by what organises it: what any program knows of itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """A joint fit of everything that has a name and the curve that has none.
+
+    Attributes:
+        source: that carries the curve.
+        fit: with the curve of the struts that it was found on, and of no other.
+        to_all: matrix from the parameters that were fitted to those of the source, shape (p, f).
+        curve: as the diagnosis found it.
+    """
+
+    source: ErrorSource
+    fit: Calibration
+    to_all: NDArray[np.float64]
+    curve: Curve
+
+    def identified(self, report: Mapping[str, Any], sessions: Mapping[str, str]) -> IdentifiedModel:
+        """Return the model to keep, with a value for every parameter of the source; zero where nothing was fitted.
+
+        Args:
+            report: numbers of the fit, by name.
+            sessions: SHA-256 of each session file, by name.
+        """
+        found = identified_model(self.fit, {**report, "unexplained": asdict(self.curve)}, sessions)
+        machine, name = found.model.machine, self.source.name
+        names = [parameter.name for parameter in self.source.parameters(machine)]
+        sources = tuple(
+            Fitted(self.source, self.to_all @ one.values) if one.source.name == name else one
+            for one in found.model.sources
+        )
+        others = [k for k, (source, _, _) in enumerate(found.covariance_rows) if source != name]
+        own = [k for k, (source, _, _) in enumerate(found.covariance_rows) if source == name]
+        used = np.flatnonzero(self.to_all.any(axis=1))
+        spread = np.zeros((len(others) + len(used), len(found.covariance_rows)))
+        spread[np.arange(len(others)), others] = 1.0
+        spread[np.ix_(len(others) + np.arange(len(used)), np.array(own))] = self.to_all[used]
+        covariance = spread @ found.covariance @ spread.T
+        return replace(
+            found,
+            model=replace(found.model, sources=sources),
+            covariance_rows=(*(found.covariance_rows[k] for k in others), *((name, "", names[k]) for k in used)),
+            covariance=(covariance + covariance.T) / 2.0,
+        )
+
+
+def keep_unexplained(curve: Curve | None, after: Calibration) -> Kept:
+    """Fit what has a name and the curve that has none together.
+
+    Args:
+        curve: that the diagnosis found.
+        after: its joint fit of what has a name.
+
+    Raises:
+        ModelError: nothing is left without a name, or what is left follows nothing that a program knows.
+        CalibrationError: the fit does not converge.
+    """
+    if curve is None:
+        raise ModelError("nothing is left without a name that a curve describes", remedy="leave --keep-unexplained out")
+    if curve.variable not in KEPT_AS:
+        raise ModelError(
+            f"what is left follows {curve.variable}, which no program knows of itself: it cannot be compensated",
+            remedy="leave --keep-unexplained out",
+        )
+    (source,) = sources_named([KEPT_AS[curve.variable]])
+    machine = after.layout.machine
+    to_all = _to_all(len(source.parameters(machine)) // STRUTS, curve.strut)
+    part = _part(source, to_all, curve.strut)
+    begin = {} if curve.period_mm is None else {source.name: _wave(curve, machine)}
+    fit = refitted(after, after.observations, [part], begin)
+    return Kept(source, fit, to_all, curve)
+
+
+def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
+    """Return the finding with the wave of an exact fit: the race knows its period from a first look only.
+
+    A wave of few turns is partly made by joints, which pulls that look by some per cent; the fit has the period among
+    its parameters, with its uncertainty. Where the fit does not converge the finding stays.
+    """
+    curve = rest.curve
+    if curve is None or curve.period_mm is None or curve.strut is None:
+        return rest
+    try:
+        kept = keep_unexplained(curve, after)
+    except CalibrationError:
+        return rest
+    columns = next(term.columns for term in kept.fit.layout.terms if term.source.name == kept.source.name)
+    sine, cosine, period = kept.fit.x[columns]
+    at = np.array([point.at for point in curve.points])
+    angle = 2.0 * np.pi * (at - sum(after.layout.machine.travel.strut_mm) / 2.0) / period
+    by_period = -(sine * np.cos(angle) - cosine * np.sin(angle)) * angle / period
+    by = np.column_stack([np.sin(angle), np.cos(angle), by_period])
+    values = by[:, :2] @ (sine, cosine)
+    sigma = np.sqrt(np.einsum("ni,ij,nj->n", by, kept.fit.solution.covariance[columns, columns], by))
+    points = tuple(CurvePoint(*map(float, point)) for point in zip(at, values, sigma, strict=True))
+    return replace(rest, curve=replace(curve, period_mm=float(period), points=points))
+
+
+def _to_all(each: int, strut: int | None) -> NDArray[np.float64]:
+    """Parameters of one strut, or of a curve that all share, to those of all struts, shape (6 each, each)."""
+    chosen = np.ones(STRUTS) if strut is None else np.eye(STRUTS)[strut - 1]
+    return np.kron(chosen[:, None], np.eye(each))
+
+
+def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) -> ErrorSource:
+    """Return a source that has the parameters of one strut, or one set for all struts, and does what the whole does."""
+    first = int(np.flatnonzero(to_all.any(axis=1))[0])
+
+    class Part(ErrorSource):
+        """The whole source with parameters tied."""
+
+        name = whole.name
+        belongs_to = whole.belongs_to
+        needs = whole.needs
+        varies_with = whole.varies_with
+        candidate = False
+        texts = whole.texts
+
+        def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+            """Those of the first strut that it acts on."""
+            own = whole.parameters(machine)[first : first + to_all.shape[1]]
+            return own if strut else tuple(replace(p, name=p.name.replace("strut_1", "every_strut")) for p in own)
+
+        def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+            """What the whole does with these values."""
+            return whole.effect(motion, machine, to_all @ values)
+
+        def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+            """Derivative of that."""
+            return whole.derivative(motion, machine, to_all @ values).times(to_all)
+
+    return Part()
+
+
+def _wave(curve: Curve, machine: Machine) -> NDArray[np.float64]:
+    """Sine and cosine [µm] and period [mm] of a wave, from its points."""
+    assert curve.period_mm is not None  # noqa: S101 - asked by the caller
+    at = np.array([point.at for point in curve.points]) - sum(machine.travel.strut_mm) / 2.0
+    angle = 2.0 * np.pi * at / curve.period_mm
+    sides = np.array([point.value_um for point in curve.points])
+    (sine, cosine), *_ = np.linalg.lstsq(np.column_stack([np.sin(angle), np.cos(angle)]), sides, rcond=None)
+    return np.array([sine, cosine, curve.period_mm])

@@ -8,6 +8,7 @@ and B; C to I are predicted.
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from click.testing import CliRunner
 from dbbstation.calibration.fit import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, calibrate
 from dbbstation.calibration.prediction import predicted_circles
 from dbbstation.cli import cli
+from dbbstation.errors import ModelError
 from dbbstation.model.compensation import compensated
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Motion
@@ -86,6 +88,23 @@ def test_without_friction_among_the_sources_the_mean_of_both_directions_is_predi
     for one, other in zip(circles[::2], circles[1::2], strict=True):
         measured = (one.measured_um + other.measured_um) / 2.0
         assert one.predicted_um == pytest.approx(measured, rel=0.1, abs=1.0)
+
+
+def test_a_weight_that_is_a_fifth_too_large_predicts_the_same(tmp_path):
+    """The compliance takes it up; without any weight the error says so."""
+    folder = recorded_machine(tmp_path, 3, rubs=False)
+    seen = load_sessions([folder / "jig", folder / "conditions"], HELD_OUT)
+    held_out = load_sessions([folder / "conditions"], ["A", "B"]).observations
+    names = sources_named(GRAVITY + MEASUREMENT_SOURCES)
+    masses = replace(seen.machine.masses, platform_kg=1.2 * seen.machine.masses.platform_kg)
+    right, heavy = (
+        calibrate(machine, seen.observations, names).model
+        for machine in (seen.machine, replace(seen.machine, masses=masses))
+    )
+    for one, other in zip(predicted_circles(right, held_out), predicted_circles(heavy, held_out), strict=True):
+        assert other.predicted_um == pytest.approx(one.predicted_um, abs=0.02)
+    with pytest.raises(ModelError, match=r"gravity needs .* a weight off the drawing will do"):
+        calibrate(replace(seen.machine, masses=None), seen.observations, names)
 
 
 @pytest.mark.slow

@@ -32,7 +32,7 @@ WAVE_PIECE_MM = 1.0
 """The same of strut length where waves of it are looked at, down to periods of 4 mm [mm]."""
 
 SEEN = 2.5
-"""Fine pieces that are known this many times worse than usual are left out: they would drown the others."""
+"""Fine pieces that are known this many times worse than usual are left open: they would drown the others."""
 
 OF_THE_READING = frozenset({"angle", "time of the reading"})
 """What may organise an error without a name that is no strut's."""
@@ -52,8 +52,8 @@ class Branch:
         sense: `lengthening` or `shortening` where the error hangs on the direction of travel; empty otherwise.
         variable: mean of the variable.
         model_um: mean error that the source puts there in the joint model [µm].
-        before_um: error that would explain the residual of the base model best [µm].
-        after_um: the model's, plus the one that would explain the residual of the joint model best [µm].
+        before_um: error that would explain the residual of the base model best; NaN where hardly seen [µm].
+        after_um: the model's, plus the one that would explain the residual of the joint model best; NaN alike [µm].
         sigma_um: standard deviation of either by noise, what fitted parameters take aside [µm].
     """
 
@@ -215,13 +215,13 @@ def _branch(
 
     power = mean(gain * gain)
     sigma = 1e3 * noise_mm / np.sqrt(power * count)
-    seen = sigma <= SEEN * np.median(sigma) if fine else np.ones(len(sigma), dtype=bool)
+    seen = np.where((sigma <= SEEN * np.median(sigma)) | (not fine), 1.0, np.nan)
     model = 1e3 * mean(samples.model_mm[:, column])
     return Branch(
         sense=sense,
-        variable=mean(over)[seen],
-        model_um=model[seen],
-        before_um=(1e3 * mean(gain * before_mm) / power)[seen],
-        after_um=(model + 1e3 * mean(gain * left_mm) / power)[seen],
-        sigma_um=sigma[seen],
+        variable=mean(over),
+        model_um=model,
+        before_um=seen * 1e3 * mean(gain * before_mm) / power,
+        after_um=seen * (model + 1e3 * mean(gain * left_mm) / power),
+        sigma_um=sigma,
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.findings import Unexplained
-from dbbstation.diagnosis.source_curves import BINS, found_sources, source_curves
+from dbbstation.diagnosis.source_curves import BINS, SEEN, found_sources, source_curves
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
@@ -116,7 +116,11 @@ def test_what_has_no_name_is_drawn_by_what_organises_it(reference, variable, ove
     assert (len(one.struts), len(one.reading)) == ((6, 0) if "wave" in variable else (0, 1))
     branch = one.struts[1][0] if one.struts else one.reading[0]
     assert np.all(branch.model_um == 0.0)
-    assert branch.after_um == pytest.approx(branch.before_um)
+    assert branch.after_um == pytest.approx(branch.before_um, nan_ok=True)
+    left_open = np.isnan(branch.after_um)
+    assert np.all(branch.sigma_um[left_open] > SEEN * np.median(branch.sigma_um))
+    assert not left_open.all()
+    assert one.fine or not left_open.any()
     assert len(branch.variable) > BINS if one.fine else len(branch.variable) == BINS
 
 

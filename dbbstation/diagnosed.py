@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.calibration.fit import default_sources
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
 from dbbstation.diagnosis.summary import diagnosis_summary
+from dbbstation.errors import ModelError
 from dbbstation.recorded import Recorded, load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
 
@@ -61,11 +62,16 @@ def diagnose_sessions(
         known: every error source by name; those of the package if None.
 
     Raises:
-        InputError: faults of files and traces, or a name that no source has.
+        InputError: faults of files and traces.
+        ModelError: a name that no source has, or that of a source that is no cause.
         CalibrationError: the kinematic model cannot be fitted.
     """
     known = known_sources() if known is None else known
     named = sources_named(default_candidates(known) if candidates is None else candidates, known)
+    for source in named:
+        if not source.candidate:
+            what = f"{source.name} is no cause: it only keeps in a model what a diagnosis left without a name"
+            raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
     recorded = load_sessions(paths, exclude)
     for warning in recorded.warnings:
         say(f"note: {warning}")

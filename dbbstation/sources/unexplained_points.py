@@ -18,6 +18,9 @@ TOLERANCE_UM = 10.0
 """Standard deviation of a value before anything is measured: the prior of every fit, which keeps points that no reading
 comes near at zero [µm]."""
 
+PLAUSIBLE_UM = 2.0 * TOLERANCE_UM
+"""An error that would matter, so much above the tolerance that no fit takes for lost what the tolerance bounds [µm]."""
+
 
 def values_at(points: NDArray[np.float64], unit: str) -> tuple[Parameter, ...]:
     """One value for each strut at each point, strut by strut."""
@@ -25,7 +28,7 @@ def values_at(points: NDArray[np.float64], unit: str) -> tuple[Parameter, ...]:
         Parameter(
             f"strut_{i + 1}_at_{number}_um",
             "µm",
-            TOLERANCE_UM,
+            PLAUSIBLE_UM,
             f"strut {i + 1} actual minus driven length at {place:g} {unit}, cause unknown",
             tolerance=TOLERANCE_UM,
         )

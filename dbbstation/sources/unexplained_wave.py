@@ -10,7 +10,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Owner, Parameter
-from dbbstation.sources.unexplained_points import MM_PER_UM, TOLERANCE_UM, texts
+from dbbstation.sources.unexplained_points import MM_PER_UM, PLAUSIBLE_UM, TOLERANCE_UM, texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,7 +40,7 @@ class UnexplainedWave(ErrorSource):
         for i in range(STRUTS):
             for wave in ("sine", "cosine"):
                 meaning = f"{wave} of strut {i + 1}, {middle}"
-                found += [Parameter(f"strut_{i + 1}_{wave}_um", "µm", TOLERANCE_UM, meaning, tolerance=TOLERANCE_UM)]
+                found += [Parameter(f"strut_{i + 1}_{wave}_um", "µm", PLAUSIBLE_UM, meaning, tolerance=TOLERANCE_UM)]
             period = f"strut_{i + 1}_period_mm"
             found += [Parameter(period, "mm", 20.0, f"period of the wave of strut {i + 1}", PERIODS_MM)]
         return tuple(found)

@@ -98,8 +98,8 @@ class LinearSession:
         return self._joined(columns)
 
     def by_strut(self, mechanism: Mechanism) -> FloatArray:
-        """`(m, 6)`: a mechanism of the strut lengths, strut by strut."""
-        return self._joined(lambda course: course.struts * _strut_mm(course, course.nominal, [mechanism]))
+        """`(m, 6)`: a mechanism of struts and their joints, strut by strut."""
+        return self._joined(lambda course: course.struts * _felt_mm(course, course.nominal, [mechanism]))
 
     def _joined(self, of: Callable[[Course], FloatArray]) -> FloatArray:
         return np.concatenate([of(course)[course.kept] for course in self.courses])
@@ -134,6 +134,18 @@ def _strut_mm(course: Course, platform: Platform, mechanisms: Sequence[Mechanism
     return driven_mm - motion.commanded_mm + grown_mm
 
 
+def _felt_mm(course: Course, platform: Platform, mechanisms: Sequence[Mechanism]) -> FloatArray:
+    """Strut lengths, and what comes to the same for the pose: joints moved along their struts `(n, 6)`."""
+    nominal, believed = course.nominal, course.motion.machine
+    base_mm = np.broadcast_to(platform.machine.base_joints_mm - believed.base_joints_mm, nominal.strut_mm.shape)
+    joints_mm = np.broadcast_to(platform.machine.platform_joints_mm - believed.platform_joints_mm, base_mm.shape)
+    for item in mechanisms:
+        base_mm = _plus(base_mm, item.base_shift_mm(course.motion, platform))
+        joints_mm = _plus(joints_mm, item.joint_shift_mm(course.motion, platform))
+    moved_mm = base_mm - joints_mm @ nominal.rotation.transpose(0, 2, 1)
+    return _strut_mm(course, platform, mechanisms) + np.einsum("nij,nij->ni", nominal.direction, moved_mm)
+
+
 def _change_mm(course: Course, mechanisms: Sequence[Mechanism]) -> FloatArray:
     motion, nominal = course.motion, course.nominal
     actual = built_machine(motion.machine, mechanisms)
@@ -146,19 +158,15 @@ def _change_mm(course: Course, mechanisms: Sequence[Mechanism]) -> FloatArray:
         actual,
     )
     platform.extra_loads = [lambda loaded, item=item: item.load(motion, loaded) for item in mechanisms]  # type: ignore[misc]
-    base_mm = np.broadcast_to(actual.base_joints_mm - motion.machine.base_joints_mm, (len(nominal.position_mm), 6, 3))
-    joints_mm = np.broadcast_to(actual.platform_joints_mm - motion.machine.platform_joints_mm, base_mm.shape)
     ball_mm = np.zeros_like(nominal.position_mm)
     tool_mm = np.zeros_like(ball_mm)
     for item in mechanisms:
-        base_mm = _plus(base_mm, item.base_shift_mm(motion, platform))
-        joints_mm = _plus(joints_mm, item.joint_shift_mm(motion, platform))
         ball_mm = _plus(ball_mm, item.fixed_ball_mm(motion, platform))
         tool_mm = _plus(tool_mm, item.tool_ball_mm(motion, platform))
-    moved_mm = base_mm - joints_mm @ nominal.rotation.transpose(0, 2, 1)
-    strut_mm = _strut_mm(course, platform, mechanisms) + np.einsum("nij,nij->ni", nominal.direction, moved_mm)
     in_machine_mm = (nominal.rotation @ tool_mm[:, :, None])[:, :, 0] - ball_mm
-    change_mm = np.einsum("ni,ni->n", course.struts, strut_mm) + np.einsum("ni,ni->n", course.along, in_machine_mm)
+    change_mm = np.einsum("ni,ni->n", course.struts, _felt_mm(course, platform, mechanisms)) + np.einsum(
+        "ni,ni->n", course.along, in_machine_mm
+    )
     for item in mechanisms:
         change_mm = _plus(change_mm, item.reading_mm(motion, platform, course.slot.path.path.radius_mm + change_mm))
     late_s = np.zeros(len(change_mm))

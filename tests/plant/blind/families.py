@@ -19,6 +19,8 @@ from tests.plant.mechanisms.warming import Warming
 from tests.plant.mechanisms.weights import BaseCompliance, StrutBending
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from tests.plant.arrays import FloatArray
     from tests.plant.linear import LinearSession
     from tests.plant.mechanisms.base import Mechanism
@@ -51,7 +53,7 @@ def families(session: LinearSession) -> dict[str, FloatArray]:
         ),
         "servo-lag": session.by_strut(ServoLag(EVEN)),
         "joint-friction": of(*joints),
-        "joint-runout": of(*(JointRunout(*_arms(k)) for k in range(36))),
+        "joint-runout": np.concatenate([session.by_strut(JointRunout(*arms)) for arms in _arms()], axis=1),
         "thermal": of(*(kind(law) for kind in (ThermalStruts, ThermalFrame, SpindleGrowth, BarDrift) for law in laws)),
         "jig": of(JigThermal(), *(JigDistortion(along_deg=angle) for angle in (0.0, 60.0, 120.0))),
         "tool-ball-offset": of(*(ToolBallOffset(tuple(row)) for row in np.eye(3))),  # type: ignore[arg-type]
@@ -62,8 +64,8 @@ def families(session: LinearSession) -> dict[str, FloatArray]:
     }
 
 
-def _arms(number: int) -> FloatArray:
-    """One of 36 eccentricities of the joints `(2, 6, 3)` [µm]: of the base, of the platform."""
-    arms_um = np.zeros(36)
-    arms_um[number] = 1.0
-    return arms_um.reshape(2, 6, 3)
+def _arms() -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Eccentricities of all joints along one axis [µm], of the base, then of the platform, `(6, 3)` each."""
+    for axis in np.eye(3):
+        yield np.tile(axis, (6, 1)), np.zeros((6, 3))
+        yield np.zeros((6, 3)), np.tile(axis, (6, 1))

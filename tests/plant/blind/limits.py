@@ -78,14 +78,13 @@ class Limits:
 
     def information(self, columns: FloatArray, beside: FloatArray | None = None) -> FloatArray:
         """`(d, d)` about the amplitudes of columns `(m, d)` [mm per unit], with those of others `(m, k)` fitted too."""
-        if beside is None:
-            return self._between(columns, columns)
-        across = self._between(beside, columns)
+        count = columns.shape[1]
+        seen = np.concatenate([columns, *([] if beside is None else [beside])], axis=1) * self._weight[:, None]
+        known = self._known.T @ seen
+        total = seen.T @ seen - known.T @ cho_solve(self._factor, known)
+        own, across, others = total[:count, :count], total[count:, :count], total[count:, count:]
         # Others that the fit cannot see by themselves take nothing away.
-        return (
-            self._between(columns, columns)
-            - across.T @ np.linalg.pinv(self._between(beside, beside), rcond=1e-10, hermitian=True) @ across
-        )
+        return own - across.T @ np.linalg.pinv(others, rcond=1e-10, hermitian=True) @ across
 
     def sigmas(self, signature: FloatArray, beside: FloatArray | None = None) -> float:
         """How many standard deviations a signature `(m,)` [mm] stands out."""
@@ -96,10 +95,6 @@ class Limits:
         seen = signature * self._weight
         left = seen - self._known @ cho_solve(self._factor, self._known.T @ seen)
         return 1000.0 * float(np.sqrt(np.mean((left / self._weight) ** 2)))
-
-    def _between(self, a: FloatArray, b: FloatArray) -> FloatArray:
-        a, b = a * self._weight[:, None], b * self._weight[:, None]
-        return a.T @ b - (self._known.T @ a).T @ cho_solve(self._factor, self._known.T @ b)
 
 
 def _edge_s(path: Path, rate_hz: float) -> float:

@@ -33,7 +33,9 @@ class Outcome:
     Attributes:
         session: name.
         seed: that it was made from.
-        recorded: how, in short: plan, sampling rate, whether with angles.
+        plan: what kind was measured.
+        rate_hz: samples per second.
+        angles: the recording has commanded angles.
         kind: `clean`, `single`, `pair`, `outside`, `concealed` or `not-a-candidate`.
         truth: names of what is hidden, listed or not.
         sizes: of each, in testable limits.
@@ -56,7 +58,9 @@ class Outcome:
 
     session: str
     seed: int
-    recorded: str
+    plan: str
+    rate_hz: float
+    angles: bool
     kind: str
     truth: tuple[str, ...]
     sizes: tuple[float, ...]
@@ -79,6 +83,11 @@ class Outcome:
     def given_a_name(self) -> bool:
         """Whether anything was named, alone or as an ambiguity."""
         return bool(self.identified or self.declared)
+
+    @property
+    def angles_from(self) -> str:
+        """Where the angles of the samples come from, and how finely the edges of a run were sampled if from these."""
+        return "recorded angles" if self.angles else f"angles from the edges, {self.rate_hz:g} Hz"
 
     @property
     def right(self) -> bool:
@@ -134,7 +143,9 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any]) -> Outcome:
     return Outcome(
         session=answer["session"],
         seed=answer["seed"],
-        recorded=_recorded(answer["circumstances"]),
+        plan=answer["circumstances"]["plan"],
+        rate_hz=answer["circumstances"]["rate_hz"],
+        angles=answer["circumstances"]["angles"],
         kind=kind,
         truth=tuple(effect["name"] for effect in effects),
         sizes=tuple(float(effect["size"]) for effect in effects),
@@ -197,6 +208,10 @@ def numbers(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "sessions": len(outcomes),
         "without_a_diagnosis": [o.session for o in outcomes if o.error],
         "shares": table,
+        "right_by_recording": {
+            label: _share([o for o in outcomes if o.angles_from == label], lambda o: o.right)
+            for label in sorted({o.angles_from for o in outcomes})
+        },
         "effects": _by_effect(single),
         "confusion": _confusion(outcomes),
         "parameters_in_sigma": _spread(deviations),
@@ -235,11 +250,6 @@ def _declared_closely(name: str, declared: Mapping[str, Sequence[str]], groups: 
     """Whether a name is in an ambiguity of few."""
     own = name in declared and len(declared[name]) < MOST_DECLARED
     return own or any(name in group and len(group) <= MOST_DECLARED for group in groups)
-
-
-def _recorded(circumstances: Mapping[str, Any]) -> str:
-    angles = "" if circumstances["angles"] else " no angles"
-    return f"{circumstances['plan']} {circumstances['rate_hz']:g} Hz{angles}"
 
 
 def _located(effects: Sequence[Mapping[str, Any]], summary: Mapping[str, Any]) -> bool:
@@ -353,7 +363,7 @@ def _failure(outcome: Outcome) -> dict[str, Any]:
     return {
         "session": outcome.session,
         "seed": outcome.seed,
-        "recorded": outcome.recorded,
+        "recorded": f"{outcome.plan}, {outcome.angles_from}",
         "kind": outcome.kind,
         "truth": [f"{name} {size:.1f}" for name, size in zip(outcome.truth, outcome.sizes, strict=True)],
         "said": outcome.said,

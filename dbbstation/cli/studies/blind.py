@@ -60,6 +60,8 @@ def _print(found: dict[str, Any]) -> None:
         of = f"{share['hits']} of {share['count']}"
         rows.append([title, of, f"{100 * share['share']:.0f} %", f"{low:.0f} to {high:.0f} %", share["target"]])
     print_table(["", "", "share", "95 % interval", "target"], rows)
+    click.echo("\nright answers of all kinds by how the samples got their angles")
+    print_table(["", ""], [[label, f"{s['hits']} of {s['count']}"] for label, s in found["right_by_recording"].items()])
     click.echo()
     rows = []
     for name, effect in found["effects"].items():

@@ -85,12 +85,15 @@ class Outlier:
     sure: bool = True
 
 
-def calibrate_robust(fit: Fit, observations: Sequence[Observation]) -> tuple[Calibration, tuple[Outlier, ...]]:
+def calibrate_robust(
+    fit: Fit, observations: Sequence[Observation], *, balls: bool = True
+) -> tuple[Calibration, tuple[Outlier, ...]]:
     """Fit, and fit again without what does not belong.
 
     Args:
         fit: calibrates runs.
         observations: all runs.
+        balls: look for balls off their place too, not only for runs that are no circle of this machine.
 
     Returns:
         The last fit, and what was found, in the order in which it stood out.
@@ -101,7 +104,7 @@ def calibrate_robust(fit: Fit, observations: Sequence[Observation]) -> tuple[Cal
     runs, found = list(observations), list[Outlier]()
     calibration = fit(runs)
     while len(found) < MOST:
-        step = _next(fit, calibration, runs)
+        step = _next(fit, calibration, runs, balls=balls)
         if step is None:
             break
         outlier, runs, calibration = step
@@ -109,11 +112,13 @@ def calibrate_robust(fit: Fit, observations: Sequence[Observation]) -> tuple[Cal
     return calibration, tuple(found)
 
 
-def _next(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
+def _next(fit: Fit, calibration: Calibration, runs: Sequence[Observation], *, balls: bool) -> Step | None:
     """Return what stands out most, the runs without its pull, and their fit; None where nothing does."""
     strange = _strange_test(calibration) or _strange_run(calibration)
     if strange:
         return _without(fit, runs, strange)
+    if not balls:
+        return None
     moved = _moved_between(calibration)
     if moved is not None:
         step = _moved(fit, runs, moved)

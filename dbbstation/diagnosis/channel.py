@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 SECTORS = 720
 """Samples per turn that a diagnosis works on, at the most: every half degree."""
 
+MANY, SIZES = 6, (1.0, 0.1)
+"""Amplitudes from which on a source is looked for at both sizes, in units of the plausible one: that all of many are
+small is likely when one of them is, and the plausible size alone would count it as a miracle."""
+
 FEWEST_PER_SECTOR = 2
 """Samples per sector below which sectors are made wider."""
 
@@ -84,7 +88,7 @@ class Channel:
         prior = np.concatenate([self.base.prior, np.full(self.columns - len(self.base.prior), np.inf)])
         for candidate in (*self.named, *self.unnamed):
             for variant in candidate.variants:
-                prior[variant.columns] = variant.prior
+                prior[variant.columns] = variant.plausible
         more = self.columns - len(self.base.prior)
         scale = np.concatenate([self.base.scale, prior[len(self.base.prior) :]])
         return Columns(prior, scale, np.concatenate([self.base.random, np.ones(more, dtype=bool)]))
@@ -205,7 +209,9 @@ class _Book:
             for (name, form), sets in self._sources.items():
                 columns = np.concatenate([columns for columns, _ in sets.values()])
                 prior = np.concatenate([prior for _, prior in sets.values()])
-                variants.setdefault(name, []).append(Variant(columns, prior, form))
+                usual = Variant(columns, prior, form)
+                sizes = SIZES if len(columns) >= MANY else SIZES[:1]
+                variants.setdefault(name, []).extend(usual.scaled(size) for size in sizes)
         else:
             for (variable, strut, _), (columns, wave) in self._shapes.items():
                 form = () if wave is None else (wave,)

@@ -200,7 +200,7 @@ class Diagnosis:
         sources: best first.
         unexplained: what is left.
         shifts: largest first.
-        next_test: None where nothing is to be asked.
+        next_tests: best first, each beside those before it; empty where nothing is to be asked.
     """
 
     mismatch: bool
@@ -215,4 +215,4 @@ class Diagnosis:
     sources: tuple[SourceFinding, ...]
     unexplained: Unexplained
     shifts: tuple[Shift, ...]
-    next_test: NextTest | None
+    next_tests: tuple[NextTest, ...]

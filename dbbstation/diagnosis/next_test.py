@@ -34,6 +34,10 @@ SAMPLES = 180
 TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0), (23.0, 0.0), (-23.0, 0.0), (0.0, 23.0))
 ELEVATIONS_DEG = (0.0, 10.0, -10.0)
 WAITS_S = (0.0, 3600.0)
+MOST_PROPOSED = 3
+WORTHWHILE = 0.99
+"""Share of the uncertainty that a further test must come below to be proposed."""
+
 SPACING_S = 200.0
 """From the start of a run to that of the next one [s]."""
 
@@ -49,9 +53,9 @@ class Proposal:
     @property
     def text(self) -> str:
         """What to do, in words."""
-        x, y, z = self.circle.ball_mm
+        x, y, z = (round(value) for value in self.circle.ball_mm)
         a, b, _ = self.circle.tilt_deg
-        parts = [f"a circle about the ball at X {x:.0f} Y {y:.0f} Z {z:.0f} mm, tilted A {a:g} B {b:g} degrees"]
+        parts = [f"a circle about the ball at X {x} Y {y} Z {z} mm, tilted A {a:g} B {b:g} degrees"]
         if self.circle.elevation_deg:
             parts.append(f"the bar raised by {self.circle.elevation_deg:g} degrees")
         parts.append("both directions")
@@ -61,47 +65,73 @@ class Proposal:
 
 
 def propose(
-    channel: Channel, source: ErrorSource, variant: Variant, others: Sequence[Variant], noise_mm: float
-) -> NextTest | None:
-    """Return the test that lowers the standard deviation of a source's first amplitude most.
+    channel: Channel, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float, most: int = MOST_PROPOSED
+) -> tuple[NextTest, ...]:
+    """Return the tests that lower the uncertainty of a source's amplitudes most, each beside those before it.
 
-    None where no circle is within reach, or where only the measurement itself shows what the source needs.
+    Empty where no circle is within reach, or where only the measurement itself shows what a source needs. The
+    uncertainty of several amplitudes is their root mean square, each in units of its plausible size.
 
     Args:
         channel: what was measured.
-        source: to reveal, or to tell apart from others.
-        variant: its columns.
-        others: of the sources that it must be told apart from.
+        asked: the source to reveal, with its columns; then those that it must be told apart from.
         noise_mm: of one sample [mm].
+        most: tests at the most.
     """
-    if not source.needs <= PROPOSED:
-        return None
+    if not all(source.needs <= PROPOSED for source, _ in asked):
+        return ()
+    source, variant = asked[0]
     known = channel.known
     first = len(channel.base.prior)
-    wanted = np.concatenate([np.arange(first), variant.columns, *(other.columns for other in others)])
+    wanted = np.concatenate([np.arange(first), *(v.columns for _, v in asked)])
     used = Columns(known.prior[wanted], known.scale[wanted], known.random[wanted])
-    covariance = solve(_thin(channel.blocks, wanted), used, noise_mm, channel.held).covariance
+    covariance = solve(_thin([channel.joined], wanted), used, noise_mm, channel.held).covariance
     ends_s = _ends_s(channel)
-    best: tuple[float, Proposal] | None = None
-    for proposal in _proposals(channel, timed=Need.TIME in source.needs):
-        rows = np.vstack(
-            [_rows(channel, source, variant, motion, len(wanted)) for motion in _motions(proposal, ends_s)]
+    looked = [
+        (
+            proposal,
+            np.vstack([_rows(channel, asked, motion, len(wanted)) for motion in _motions(proposal, ends_s)]),
         )
-        gain = rows @ covariance
-        answer = gain @ rows.T + noise_mm**2 * np.eye(len(rows))
-        after = covariance[first, first] - gain[:, first] @ np.linalg.solve(answer, gain[:, first])
-        if best is None or after < best[0]:
-            best = (float(after), proposal)
-    if best is None:
-        return None
-    after, proposal = best
+        for proposal in _proposals(channel, timed=any(Need.TIME in s.needs for s, _ in asked))
+    ]
+    own = slice(first, first + len(variant.columns))
+    found: list[NextTest] = []
+    while looked and len(found) < most:
+        before = _size(covariance[own, own], variant)
+        tried = [(_size(_told(covariance, rows, noise_mm, own), variant), k) for k, (_, rows) in enumerate(looked)]
+        after, k = min(tried)
+        if after > WORTHWHILE * before:
+            break
+        proposal, rows = looked.pop(k)
+        covariance = _told(covariance, rows, noise_mm, slice(None))
+        found.append(_in_words(channel, source, variant, proposal, before, after))
+    return tuple(found)
+
+
+def _told(
+    covariance: NDArray[np.float64], rows: NDArray[np.float64], noise_mm: float, own: slice
+) -> NDArray[np.float64]:
+    """Covariance of some columns once further rows have been measured."""
+    gain = rows @ covariance[:, own]
+    answer = rows @ covariance @ rows.T + noise_mm**2 * np.eye(len(rows))
+    return np.asarray(covariance[own, own] - gain.T @ np.linalg.solve(answer, gain), dtype=np.float64)
+
+
+def _size(covariance: NDArray[np.float64], variant: Variant) -> float:
+    """Root mean square uncertainty of amplitudes in units of their plausible sizes."""
+    return float(np.sqrt(np.mean(np.maximum(np.diag(covariance), 0.0) / variant.plausible**2)))
+
+
+def _in_words(
+    channel: Channel, source: ErrorSource, variant: Variant, proposal: Proposal, before: float, after: float
+) -> NextTest:
     parameter = next(p for p in source.parameters(channel.machine) if not p.shape)
+    unit = float(variant.plausible[0])
     x, y, z = proposal.circle.ball_mm
     a, b, _ = proposal.circle.tilt_deg
     circle = {"x_mm": x, "y_mm": y, "z_mm": z, "a_deg": a, "b_deg": b, "wait_s": proposal.wait_s}
     circle["elevation_deg"] = proposal.circle.elevation_deg
-    before = float(np.sqrt(covariance[first, first]))
-    return NextTest(proposal.text, circle, source.name, before, float(np.sqrt(max(after, 0.0))), parameter.unit)
+    return NextTest(proposal.text, circle, source.name, before * unit, after * unit, parameter.unit)
 
 
 def _proposals(channel: Channel, *, timed: bool) -> list[Proposal]:
@@ -163,21 +193,25 @@ def _motions(proposal: Proposal, ends_s: float) -> list[Motion]:
     return motions
 
 
-def _rows(channel: Channel, source: ErrorSource, variant: Variant, motion: Motion, columns: int) -> NDArray[np.float64]:
+def _rows(
+    channel: Channel, asked: Sequence[tuple[ErrorSource, Variant]], motion: Motion, columns: int
+) -> NDArray[np.float64]:
     """What a proposed run would say of all columns, compressed to few rows, shape (r, columns).
 
     Its mounting is new and tells nothing else, so what a shift of the ball could do is taken out of the rows.
     """
     reading = MachineModel(channel.machine).bar(motion)
-    parameters = source.parameters(channel.machine)
-    shaped = [k for k, p in enumerate(parameters) if p.shape]
-    amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
-    values = np.zeros(len(parameters))
-    values[shaped] = variant.shape
     rows = np.zeros((len(reading.length_mm), columns))
-    first = len(channel.base.prior)
-    derivative = reading.by_source(source, channel.machine, values)
-    rows[:, first : first + len(amplitudes)] = derivative[:, amplitudes]
+    place = len(channel.base.prior)
+    for source, variant in asked:
+        parameters = source.parameters(channel.machine)
+        amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
+        values = np.zeros(len(parameters))
+        values[[k for k, p in enumerate(parameters) if p.shape]] = variant.shape
+        derivative = reading.by_source(source, channel.machine, values)
+        # A source of the measurement has further sets, of other sessions and mountings, which this run does not touch.
+        rows[:, place : place + len(amplitudes)] = derivative[:, amplitudes]
+        place += len(variant.columns)
     for term in channel.layout.terms:
         if term.acts_on(motion):
             zero = channel.layout.nominal[term.columns]

@@ -163,10 +163,23 @@ def shapes(motion: Motion, machine: Machine, extent: Ranges, waves: NDArray[np.f
         drift = hats(values["time"], extent.low["time"], extent.high["time"])[:, 0]
         found.append(Shape("time of the reading", None, "", Effect(reading_mm=drift), HATS))
     if motion.setup is not None:
+        found.append(Shape("place of the platform", None, "", _leaning_table(motion), LEANING))
         theta = _angle_about_ball(motion)
         lobes = np.column_stack([f(k * theta) for k in LOBES for f in (np.cos, np.sin)])
         found.append(Shape("angle", None, "", Effect(reading_mm=lobes), lobes.shape[1]))
     return found
+
+
+LEANING = 6
+"""Each coordinate of the ball, with the platform's X and with its Y."""
+
+
+def _leaning_table(motion: Motion) -> Effect:
+    """A ball on the table that moves with the platform's place, as on a floor that gives way, per 100 mm."""
+    moved = np.zeros((len(motion), 3, LEANING))
+    for axis in range(3):
+        moved[:, axis, 2 * axis : 2 * axis + 2] = motion.poses[:, :2] / 100.0
+    return Effect(fixed_ball_mm=moved)
 
 
 def _angle_about_ball(motion: Motion) -> NDArray[np.float64]:

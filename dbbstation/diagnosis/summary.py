@@ -13,7 +13,7 @@ from dbbstation.trace.analysis import figures
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.diagnosis.findings import Diagnosis, Location, SourceFinding
+    from dbbstation.diagnosis.findings import Diagnosis, Location, NextTest, SourceFinding
 
 
 def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[str, Any]:
@@ -61,7 +61,8 @@ def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[
             }
             for shift in diagnosis.shifts
         ],
-        "next_test": _next_test(diagnosis),
+        "next_test": _next_test(diagnosis.next_tests[0]) if diagnosis.next_tests else None,
+        "further_tests": [_next_test(test) for test in diagnosis.next_tests[1:]],
     }
 
 
@@ -173,10 +174,7 @@ def _lacking(name: str, why: str) -> dict[str, Any]:
     }
 
 
-def _next_test(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    test = diagnosis.next_test
-    if test is None:
-        return None
+def _next_test(test: NextTest) -> dict[str, Any]:
     return {
         "text": test.text,
         **test.circle,

@@ -37,6 +37,12 @@ NAMED_EXPLAINS = 0.9
 """Share of what the best unnamed shape explains that named sources must explain to be believed: below it they are
 only the nearest names of something else."""
 
+FLEXIBLE = 16
+"""Amplitudes from which on a source may imitate what it is not: joints that may be off, or run out, everywhere."""
+
+MADE_UP_FOR = 0.2
+"""Share of its evidence below which what others bring beside a flexible source only makes up for its failings."""
+
 SHAPE_THRESHOLD = 10.0
 """Log evidence that an unnamed shape must bring."""
 
@@ -95,7 +101,7 @@ def judge(
             verdict = Verdict.RULED_OUT if seen else Verdict.NOT_TESTABLE
             verdict = Verdict.AMBIGUOUS if alike else verdict
             variant, _ = race.best_variant(candidate, [])
-            signature = concealment([channel.joined], machine_columns, variant.columns, variant.prior, free)
+            signature = concealment([channel.joined], machine_columns, variant.columns, variant.plausible, free)
         findings.append(
             SourceFinding(
                 name=candidate.name,
@@ -233,15 +239,16 @@ def unexplained(
         chosen: sources that were found.
         significant: probability below which a misfit counts.
     """
-    if left.probability >= significant:
-        return Rest(Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."), overrules=False)
     race, candidate, variant, gain = _best_shape(channel, left.noise)
     about = channel
     named = [choice.variant for choice in chosen]
+    imitated = bool(named) and _imitates(race, named, variant)
+    if left.probability >= significant and not imitated:
+        return Rest(Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."), overrules=False)
     # The first of the chosen explains most. Where even it falls short of one unnamed curve, the others were only
     # called in to make up for that.
     enough = NAMED_EXPLAINS * race.explained([variant])
-    overrules = bool(named) and min(race.explained(named[:1]), race.explained(named)) < enough
+    overrules = imitated or (bool(named) and min(race.explained(named[:1]), race.explained(named)) < enough)
     if named and not overrules:
         # The names stand; what is left beside them is looked at about the joint fit.
         about = joint
@@ -257,6 +264,22 @@ def unexplained(
     )
     curve = curve_of(about, race, candidate.name, variant)
     return Rest(Unexplained(rms_um, number, variable, gain, text, curve), overrules=overrules)
+
+
+def _imitates(race: Race, named: Sequence[Variant], shape: Variant) -> bool:
+    """Whether a source of many amplitudes only imitates an error that has no name.
+
+    It can follow nearly anything that is smooth in the pose. It has to bring more evidence than an unnamed curve of no
+    more amplitudes, and to leave nothing that others have to make up for: what they then bring is little beside it.
+    """
+    first = named[0]
+    if len(first.columns) < FLEXIBLE:
+        return False
+    alone = race.evidence([first])
+    if len(shape.columns) <= len(first.columns) and race.evidence([shape]) > alone:
+        return True
+    beside = race.evidence(named) - alone
+    return len(named) > 1 and beside < MADE_UP_FOR * alone
 
 
 def _best_shape(channel: Channel, noise_mm: float) -> tuple[Race, Candidate, Variant, float]:

@@ -8,7 +8,7 @@ punished by the evidence itself [MacKay, Bayesian interpolation, Neural Computat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,11 +34,23 @@ class Variant:
         columns: of the whole problem, shape (p,).
         prior: standard deviation of each amplitude, shape (p,).
         shape: values of the shape parameters, for reports.
+        scale: of the prior, against the amplitudes' plausible sizes: 1, or less where effects smaller than usual are
+            looked for. Many amplitudes that are all small would otherwise count as unlikely.
     """
 
     columns: NDArray[np.int64]
     prior: NDArray[np.float64]
     shape: tuple[float, ...] = ()
+    scale: float = 1.0
+
+    @property
+    def plausible(self) -> NDArray[np.float64]:
+        """Plausible sizes of the amplitudes, shape (p,)."""
+        return self.prior / self.scale
+
+    def scaled(self, scale: float) -> Variant:
+        """Return the same form for effects of another size."""
+        return replace(self, prior=self.plausible * scale, scale=scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +154,7 @@ class Race:
         Singular values of the signature in units of plausible sizes, base and others fitted: along each direction of
         the amplitudes the plausible size over its standard deviation.
         """
-        columns = self._left[:, variant.columns - self._first] * variant.prior
+        columns = self._left[:, variant.columns - self._first] * variant.plausible
         if others:
             beside = np.concatenate([other.columns for other in others]) - self._first
             prior = np.concatenate([other.prior for other in others])

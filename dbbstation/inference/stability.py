@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.race import Candidate, Race, Variant, select
+from dbbstation.inference.race import Candidate, Race, select
 from dbbstation.inference.square_root import Block, Columns
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def stability(
     place = {int(column): k for k, column in enumerate(wanted)}
     thin = [_thin(block, place) for block in blocks]
     moved = [
-        Candidate(c.name, tuple(Variant(_placed(v.columns, place), v.prior, v.shape) for v in c.variants))
+        Candidate(c.name, tuple(replace(v, columns=_placed(v.columns, place)) for v in c.variants))
         for c in candidates
     ]
     names = np.array(sorted(set(groups)))

@@ -26,9 +26,9 @@ SHORTEST_TURN = 0.3
 FEED_SEARCH = 0.2
 """Share of the overshoot arc by which the two passes of the overlap may be shifted against each other."""
 
-FEED_TOLERANCE = 3e-3
-"""Share of the feed that a recording may be off; one per thousand costs 0.3 µm at 100 µm of error per radian, and
-real overlaps, which friction and warming keep from agreeing exactly, scatter by half as much."""
+FEED_TOLERANCE = 4e-3
+"""Share of the feed that a recording may be off; one per thousand costs 0.3 µm at 100 µm of error per radian. Feeds are
+mistaken by percents; real overlaps, which friction, warming and a chiller keep from agreeing, scatter by thousandths."""
 
 FEED_SIGMAS = 6.0
 """A disagreement counts only where the overlap shows it this clearly above its noise."""

@@ -11,14 +11,33 @@ import click
 import pytest
 
 from dbbstation.cli import COMMANDS, DONE, cli
+from dbbstation.cli.study import STUDIES
 
 HEAVY = ("numba", "scipy", "textual", "matplotlib", "pydantic", "numpy")
 
 
-@pytest.fixture(params=sorted(COMMANDS))
-def command(request):
-    with click.Context(cli, info_name="dbbstation") as context:
-        return cli.get_command(context, request.param)
+LINES = [name for name in sorted(COMMANDS) if name != "study"] + [f"study {name}" for name in sorted(STUDIES)]
+"""Everything that can be called."""
+
+
+@pytest.fixture(params=LINES)
+def line(request):
+    return request.param.split()
+
+
+@pytest.fixture
+def command(line):
+    return found(line)[0]
+
+
+def found(words):
+    """Command that a line begins with, and the words that are left for it."""
+    group, context = cli, click.Context(cli, info_name="dbbstation")
+    while isinstance(group, click.Group):
+        name, *words = words
+        group = group.get_command(context, name)
+        assert group is not None, name
+    return group, words
 
 
 def examples(text):
@@ -27,10 +46,10 @@ def examples(text):
     return [line.strip() for line in joined.splitlines() if line.strip().startswith("dbbstation ")]
 
 
-def test_each_command_has_help_with_an_example(run, command):
-    outcome = run(command.name, "--help")
+def test_each_command_has_help_with_an_example(run, line):
+    outcome = run(*line, "--help")
     assert (outcome.code, outcome.err) == (DONE, "")
-    assert outcome.out.startswith(f"Usage: dbbstation {command.name}")
+    assert outcome.out.startswith(f"Usage: dbbstation {' '.join(line)}")
     assert re.search(r"^  Examples?:$", outcome.out, re.MULTILINE)
     assert r"\b" not in outcome.out
     assert examples(outcome.out)
@@ -39,9 +58,8 @@ def test_each_command_has_help_with_an_example(run, command):
 def test_examples_use_options_that_exist(command):
     for line in examples(command.help):
         # Comments and placeholders are for people.
-        arguments = [word for word in shlex.split(re.sub(r"   \(.*\)$| > .*$", "", line))[2:] if word != "..."]
-        assert shlex.split(line)[1] in COMMANDS, line
-        known = cli.get_command(click.Context(cli), shlex.split(line)[1])
+        words = [word for word in shlex.split(re.sub(r"   \(.*\)$| > .*$", "", line))[1:] if word != "..."]
+        known, arguments = found(words)
         known.make_context(known.name, arguments, resilient_parsing=True)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dbbstation.calibration.fit import calibrate, default_sources
-from dbbstation.diagnosis.diagnose import misfit_of
+from dbbstation.diagnosis.naming import misfit_of
 from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained, Verdict
 from dbbstation.files.plan_file import read_plan
 from dbbstation.files.shipped import shipped_folder
@@ -52,5 +52,5 @@ def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):
         else (),
         unexplained=unexplained or Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."),
         shifts=(),
-        next_test=None,
+        next_tests=(),
     )

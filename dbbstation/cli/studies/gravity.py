@@ -117,8 +117,8 @@ def _print_left(numbers: dict[str, Any]) -> None:
     print_table(["circularity without noise [µm]", *conditions], rows)
     tilt = numbers["tilt_left_urad"]
     click.echo(
-        f"the shifted path leaves the spindle's direction wrong by up to {tilt['position-only']:.0f} µrad, the commands "
-        f"in six degrees of freedom by {tilt['joint']:.0f} µrad; a ball at the tool tip sees neither"
+        f"The shifted path leaves the spindle's direction wrong by up to {tilt['position-only']:.0f} µrad, commands in six "
+        f"degrees of\nfreedom by {tilt['joint']:.0f} µrad; a ball at the tool tip sees neither."
     )
 
 

@@ -112,25 +112,30 @@ class Outcome:
         return 0.0 if self.right else loud + (100.0 if claimed else 0.0) + (50.0 if self.kind == "clean" else 0.0)
 
 
-def score(answers: Mapping[str, Mapping[str, Any]], verdicts: Mapping[str, Mapping[str, Any]]) -> list[Outcome]:
+def score(
+    answers: Mapping[str, Mapping[str, Any]],
+    verdicts: Mapping[str, Mapping[str, Any]],
+    candidates: Sequence[str] | None = None,
+) -> list[Outcome]:
     """Compare verdicts with answers, by session; sessions without a verdict are left out.
 
     Args:
         answers: as `blind.read_answers` gives them.
         verdicts: as `blind.judge_sessions` gives them.
+        candidates: names that were looked for; None for all that the list has.
     """
-    return [compare(answers[name], verdicts[name]) for name in sorted(answers) if name in verdicts]
+    return [compare(answers[name], verdicts[name], candidates) for name in sorted(answers) if name in verdicts]
 
 
-def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any]) -> Outcome:
-    """One session."""
+def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any], candidates: Sequence[str] | None = None) -> Outcome:
+    """Compare one session; arguments as of `score`."""
     effects = answer["effects"]
     summary = verdict.get("summary") or _NOTHING
     by_name = {source["name"]: source for source in summary["sources"]}
     identified = tuple(name for name, source in by_name.items() if source["verdict"] == "identified")
     declared = {n: tuple(s["ambiguous_with"]) for n, s in by_name.items() if s["verdict"] == "ambiguous"}
     listed = {effect["name"] for effect in effects if effect["listed"]}
-    kind = answer["kind"] if listed <= set(by_name) else NO_CANDIDATE
+    kind = answer["kind"] if candidates is None or listed <= set(candidates) else NO_CANDIDATE
     asked = listed if kind != "concealed" else {e["name"] for e in effects if e["testable"]}
     found = [name for name in asked if name in identified]
     groups = _hanging_together(declared)

@@ -89,7 +89,7 @@ def test_known_verdicts_make_a_known_table():
         # One of the list that was not looked for.
         "16": (answer("16", "single", effect("servo-lag", struts=[2])), verdict(left=(1.0, 2, "time"))),
     }
-    outcomes = score({k: a for k, (a, _) in said.items()}, {k: v for k, (_, v) in said.items()})
+    outcomes = score({k: a for k, (a, _) in said.items()}, {k: v for k, (_, v) in said.items()}, CANDIDATES)
     found = numbers(outcomes)
     hits = {title: (share["hits"], share["count"]) for title, share in found["shares"].items()}
     assert hits == {

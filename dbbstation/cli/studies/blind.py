@@ -43,7 +43,10 @@ def blind(*, folder: Path, candidates: str | None, jobs: int | None, again: bool
         verdicts = judge_sessions(
             folder, names, jobs or os.cpu_count() or 1, lambda done, _: advance(done), again=again
         )
-    found: dict[str, Any] = {"candidates": list(names), **numbers(score(read_answers(folder), verdicts))}
+    found: dict[str, Any] = {
+        "candidates": list(names),
+        **numbers(score(read_answers(folder), verdicts, names if candidates else None)),
+    }
     if as_json:
         print_json(found)
     else:

@@ -43,11 +43,13 @@ class WeakDirection:
 
     Attributes:
         text: in words.
-        uncertainty_um: how far the parameter that it moves most may be off along it, one standard deviation [µm].
+        uncertainty: how far the parameter that it moves most may be off along it, one standard deviation.
+        unit: of that; µm for lengths of the geometry.
     """
 
     text: str
-    uncertainty_um: float
+    uncertainty: float
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -132,11 +134,15 @@ def _weakest(calibration: Calibration) -> tuple[WeakDirection, ...]:
     scale = known.scale[fitted]
     scaled = calibration.solution.covariance[np.ix_(fitted, fitted)] / np.outer(scale, scale)
     variance, axes = np.linalg.eigh(scaled)
+    units = [parameter.unit for term in calibration.layout.terms for parameter in term.parameters]
     found = []
     for k in range(len(fitted) - 1, len(fitted) - 1 - min(WEAKEST, calibration.parameters_identified), -1):
         moved = scale * axes[:, k]
-        in_um = 1e3 * float(np.sqrt(variance[k]) * np.abs(moved).max())
-        found.append(WeakDirection(in_words(calibration.layout, axes[None, :, k])[0], in_um))
+        # Among parameters of several units, the one that moves most in units of its usual size.
+        most = int(np.argmax(np.abs(axes[:, k])))
+        size, unit = float(np.sqrt(variance[k]) * np.abs(moved[most])), units[fitted[most]]
+        size, unit = (1e3 * size, "µm") if unit == "mm" else (size, unit)
+        found.append(WeakDirection(in_words(calibration.layout, axes[None, :, k])[0], size, unit))
     return tuple(found)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.exclude import exclude_option
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     metavar="SOURCE.PARAMETER,...",
     help="Parameters to hold at nominal in place of the directions that the tests lose, as many as are lost.",
 )
-@click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
+@exclude_option
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
 @click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write a figure here, as SVG.")
 @click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
@@ -164,7 +165,7 @@ def _print(summary: Mapping[str, Any]) -> None:
     for text in summary["gaps"]:
         click.echo(f"  {text}")
     for weak in summary["observability"]["weak_directions"][:1]:
-        click.echo(f"least visible, to {weak['uncertainty_um']:.1f} µm: {weak['text']}")
+        click.echo(f"least visible, to {weak['uncertainty']:.1f} {weak['unit']}: {weak['text']}")
     for check in summary["scatter"]:
         _print_scatter(check)
     click.echo(f"nominal machine leaves   {summary['nominal_rms_um']:8.2f} µm rms")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.exclude import exclude_option
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("a", type=click.Path(path_type=Path), metavar="A")
 @click.argument("b", type=click.Path(path_type=Path), metavar="B")
-@click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
+@exclude_option
 @click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write a figure here, as SVG.")
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")

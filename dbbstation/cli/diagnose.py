@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.exclude import exclude_option
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
 @click.option("--sources", metavar="A,B,...", help="Sources to look for, in place of all that are known.")
 @source_file_option
-@click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
+@exclude_option
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
 @click.option(
     "--keep-unexplained",

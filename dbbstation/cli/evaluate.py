@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.exclude import exclude_option
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -17,7 +19,7 @@ from dbbstation.cli.source_files import source_file_option
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
 @click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
 @source_file_option
-@click.option("--exclude", multiple=True, metavar="TEST", help="Leave a test out; may be given more than once.")
+@exclude_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def evaluate(
     sessions: tuple[Path, ...], *, model: Path, source_files: tuple[Path, ...], exclude: tuple[str, ...], as_json: bool

@@ -59,8 +59,9 @@ def test_the_weakest_direction_is_as_uncertain_as_the_covariance_says(case):
     axis = np.linalg.eigh(covariance / np.outer(scale, scale))[1][:, -1]
     # Along an eigenvector of the scaled covariance a parameter moves by its share of the standard deviation.
     sigma = np.sqrt(axis @ (covariance / np.outer(scale, scale)) @ axis)
-    assert seen.weak[0].uncertainty_um == pytest.approx(1e3 * sigma * np.abs(scale * axis).max())
-    assert [w.uncertainty_um for w in seen.weak] == sorted((w.uncertainty_um for w in seen.weak), reverse=True)
+    assert seen.weak[0].uncertainty == pytest.approx(1e3 * sigma * np.abs(scale * axis).max())
+    assert {weak.unit for weak in seen.weak} == {"µm"}
+    assert [w.uncertainty for w in seen.weak] == sorted((w.uncertainty for w in seen.weak), reverse=True)
 
 
 def test_correlations_are_the_largest_of_the_covariance(case):

@@ -208,6 +208,10 @@ def test_nothing_to_fit(refused, sources):
     assert "none of the error sources named belongs to the machine" in refused("--sources", sources)
 
 
+def test_several_excluded_tests_in_one_word(refused):
+    assert refused("--exclude", "a,g").startswith("1 test cannot calibrate a machine")
+
+
 def test_unknown_excluded_test(refused):
     assert refused("--exclude", "z") == "SESSION: no session has a test z to exclude; tests are a, g, l\n"
 

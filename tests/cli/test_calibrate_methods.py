@@ -31,7 +31,7 @@ def test_the_jig_method_tells_everything_a_metrologist_asks(run, jig_session):
 
 def test_text_and_json_say_the_same(run, jig_session):
     text, data = run("calibrate", jig_session).out, run("calibrate", jig_session, "--json").data
-    assert f"least visible, to {data['observability']['weak_directions'][0]['uncertainty_um']:.1f} µm" in text
+    assert f"least visible, to {data['observability']['weak_directions'][0]['uncertainty']:.1f} µm" in text
     for check in data["scatter"]:
         assert f"scatter by {check['found_um']:.2f}" in text
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 KINEMATIC_SOURCES = ("strut-reference-length", "base-joints")
 """The 24 parameters of [CAL II-C]."""
 
-MEASUREMENT_SOURCES = ("mounting", "ball-coordinate", "bar-offset")
+MEASUREMENT_SOURCES = ("mounting", "ball-coordinate", "bar-offset", "run-start")
 """Random effects that every session has, with the sizes that plan and session state."""
 
 FEWEST_TESTS = 3

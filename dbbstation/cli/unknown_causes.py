@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
 def unknown_causes(model: MachineModel) -> list[str]:
     """Names of the sources of a model that describe an error without a cause."""
-    return [fitted.source.name for fitted in model.sources if not fitted.source.candidate and fitted.values.any()]
+    own = model.of_the_machine().sources
+    return [fitted.source.name for fitted in own if not fitted.source.candidate and fitted.values.any()]
 
 
 def say_unknown_causes(model: MachineModel) -> None:

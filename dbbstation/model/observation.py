@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,6 +58,8 @@ class Observation:
         A ball that was put up under the spindle is taken to have been put up just before the run.
         """
         raw, circle = self.raw, self.raw.circle
+        name = f"{self.setup.session}: {self.label}"
+        setup = replace(self.setup, run=name, start_uncertainty_deg=raw.start_uncertainty_deg)
         lead_in = self.lead_in_deg
         phi = np.concatenate([lead_in, raw.phi_deg])
         before = len(lead_in)
@@ -74,7 +76,7 @@ class Observation:
             time_s=time,
             temperature_degc={name: _held_back(values, before) for name, values in raw.temperature_degc.items()},
             motor_current_a=None if raw.motor_current_a is None else _held_back(raw.motor_current_a, before),
-            setup=self.setup,
+            setup=setup,
             put_up=None if self.setup.place_known else self._standing(None if time is None else time[0]),
             reading_mm=_held_back(raw.length_mm, before),
         )

@@ -81,6 +81,9 @@ class Setup:
             to stand then, and nobody knows where the ball is.
         set_up_errors: micrometer readings of such a ball; None where there are none.
         plate: jig plate that the ball stands on; None where it stands in no bore.
+        run: name of the run; empty where it has none.
+        start_uncertainty_deg: how well the beginning of its turn is known along the travel, one standard deviation;
+            zero where angles were recorded [deg].
     """
 
     session: str
@@ -94,6 +97,8 @@ class Setup:
     place_known: bool = True
     set_up_errors: SetUpErrors | None = None
     plate: Plate | None = None
+    run: str = ""
+    start_uncertainty_deg: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,8 @@ class RawCircle:
         length_mm: distance between the ball centres [mm].
         temperature_degc: by sensor [degC].
         motor_current_a: shape (n, 6), NaN for a motor that was not logged [A]; None where none was.
+        start_uncertainty_deg: how well the beginning of the turn is known, one standard deviation; zero where angles
+            were recorded [deg].
     """
 
     name: str
@@ -36,6 +38,7 @@ class RawCircle:
     length_mm: NDArray[np.float64]
     temperature_degc: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     motor_current_a: NDArray[np.float64] | None = None
+    start_uncertainty_deg: float = 0.0
 
     def __len__(self) -> int:
         return len(self.t_s)

@@ -200,7 +200,7 @@ def test_the_folder_of_the_model_is_missing(refused):
 
 def test_unknown_source(refused):
     told = refused("--sources", "strut-reference-length,base-joint")
-    assert told == "no error source is called 'base-joint'; did you mean base-joints?\n"
+    assert told.startswith("no error source is called 'base-joint'; did you mean base-joints?")
 
 
 @pytest.mark.parametrize("sources", ["mounting", ",", " "])

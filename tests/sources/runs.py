@@ -69,7 +69,7 @@ def circle(centre_mm, tilt_deg, theta_deg, radius_mm=150.0, **given) -> Motion:
     poses = np.zeros((len(theta), 6))
     poses[:, :3] = ball + radius_mm * np.column_stack([np.cos(theta), np.sin(theta), np.zeros(len(theta))])
     poses[:, 3:5] = tilt_deg
-    setup = Setup("session", "mounting", "ball", "bar", ball, 1e-3, 1e-3, 5e-4, plate=PLATE)
+    setup = Setup("session", "mounting", "ball", "bar", ball, 1e-3, 1e-3, 5e-4, plate=PLATE, run="run")
     return Motion(poses, setup=setup, **given)
 
 
@@ -121,7 +121,9 @@ def random_run(rng, count=300) -> Motion:
     s = np.linspace(0, 1, count)[:, None]
     waves = sum(rng.normal(0, 1 / k, 6) * np.sin(2 * np.pi * k * s + rng.uniform(0, 2 * np.pi, 6)) for k in range(1, 4))
     poses = np.array([0, 0, -1030, 0, 0, 0]) + waves * np.array([50, 50, 30, 4, 4, 2])
-    setup = Setup("session", "mounting", "ball", "bar", np.array([10.0, 20.0, -1150.0]), 1e-3, 1e-3, 5e-4, plate=PLATE)
+    setup = Setup(
+        "session", "mounting", "ball", "bar", np.array([10.0, 20.0, -1150.0]), 1e-3, 1e-3, 5e-4, plate=PLATE, run="run"
+    )
     time_s = np.sort(rng.uniform(0, 5000, count))
     reading = 150.0 + 0.05 * np.sin(6 * np.pi * s[:, 0])
     return Motion(

@@ -1,0 +1,90 @@
+"""Error source: where along its circle a run's turn begins, found from the edges of its feed-in and feed-out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from dbbstation.machine.kinematics import strut_lengths
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+USUAL_DEG = 0.05
+"""A fifth of a sample at ten readings a second."""
+
+FEWEST = 6
+"""Places that make a path; a machine that stands still while a ball is put up has one."""
+
+SAME_DEG = 1e-9
+"""Rows that are closer than this are one place."""
+
+
+class RunStart(ErrorSource):
+    """Every angle of one run is too small by d: the machine had gone on by d along its circle.
+
+    All six struts stood where the command had them at phi + d. About a ball in the circle's centre an exact machine
+    shows nothing of it; on a real one it turns the figure of its errors. Every run has its own d, with the size that
+    its sampling allows, so that it is a random effect of the fit and never a name: `time-skew` is what all runs share.
+    """
+
+    name = "run-start"
+    belongs_to = Owner.MOUNTING
+    needs = frozenset({Need.POSE, Need.PATH})
+    varies_with = "angle"
+    candidate = False
+    texts = Texts(
+        what="The turn was found to begin a little too early or too late along the circle.",
+        shows="The figure of one run is turned against that of the others, by a fraction of a sample's way.",
+        confirm="Record at a higher rate, or with the control's angles: it becomes smaller or goes away.",
+        cure="Record at 25 readings a second or more, or with `theta_deg`; make the feed-in longer.",
+        equation="reading(phi) is that of the pose at phi + d: strut error x(phi + d) - x(phi)",
+        origin="rounding of an edge to samples that stand apart: uniform within one of them",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """One angle per run."""
+        return (Parameter("late_deg", "deg", USUAL_DEG, "angle along the travel by which the turn began earlier"),)
+
+    def shared_by(self, motion: Motion) -> str:
+        """Every run has its own."""
+        return "" if motion.setup is None else motion.setup.run
+
+    def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:
+        """What the sampling of the run's edges leaves open [deg]; zero where angles were recorded."""
+        return np.array([0.0 if motion.setup is None else motion.setup.start_uncertainty_deg])
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """How far the struts had gone on."""
+        along, spline = self._along(motion, machine)
+        gone: NDArray[np.float64] = spline(along + float(values[0])) - spline(along)
+        return Effect(strut_mm=gone)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Strut lengths per degree of travel where the machine stood."""
+        along, spline = self._along(motion, machine)
+        slope: NDArray[np.float64] = spline(along + float(values[0]), 1)
+        return Effect(strut_mm=slope[:, :, None])
+
+    def _along(self, motion: Motion, machine: Machine) -> tuple[NDArray[np.float64], CubicSpline]:
+        """Angle travelled at each row, shape (n,) [deg], and commanded strut lengths over it [mm]."""
+        self.require(motion)
+        length = strut_lengths(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+        standing = np.zeros(len(motion)), CubicSpline([0.0, 1.0], np.tile(length[:1], (2, 1)))
+        if motion.setup is None:
+            return standing
+        away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]
+        if np.hypot(*np.ptp(away, axis=0)) < SAME_DEG:
+            return standing
+        theta = np.degrees(np.unwrap(np.arctan2(away[:, 1], away[:, 0])))
+        travelled = np.abs(theta - theta[0])
+        rising = np.append(True, np.diff(np.maximum.accumulate(travelled)) > SAME_DEG)
+        if np.count_nonzero(rising) < FEWEST:
+            return standing
+        return travelled, CubicSpline(travelled[rising], length[rising])

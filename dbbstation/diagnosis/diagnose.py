@@ -15,7 +15,7 @@ from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.naming import MOST_SOURCES, THRESHOLD, Round, best_look
 from dbbstation.diagnosis.next_test import propose
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
-from dbbstation.diagnosis.verdicts import doubted, judge, testable, unexplained
+from dbbstation.diagnosis.verdicts import crowded, doubted, judge, testable, unexplained
 from dbbstation.diagnosis.workspace import WorkspaceError, workspace_error
 from dbbstation.errors import ModelError
 from dbbstation.inference.held_out import HeldOut, held_out
@@ -75,7 +75,7 @@ def diagnose(
         chosen, after = (), before
         settled = Round((), before, first, settled.race)
         findings = tuple(rest.demoted(findings))
-    findings = doubted(findings, rest.finding, by_name)
+    findings = crowded(doubted(findings, rest.finding, by_name), chosen, settled.race)
     predicted = _held_out(channel, chosen, settled.left.noise)
     steady = _stability(channel, findings, settled)
     findings = tuple(replace(f, stability=steady.get(f.name)) for f in findings)

@@ -33,6 +33,9 @@ TESTABLE_SHARE = 0.5
 AS_GOOD = 5.0
 """Difference in log evidence below which one source explains the recordings about as well as another."""
 
+OWN_LAW = 0.05
+"""Share of its log evidence by which one source that grows with time must be better than another."""
+
 NAMED_EXPLAINS = 0.9
 """Share of what the best unnamed shape explains that named sources must explain to be believed: below it they are
 only the nearest names of something else."""
@@ -80,7 +83,7 @@ def judge(
     machine_columns = np.flatnonzero(~channel.base.random)
     free = free_directions(channel.base, machine_columns, channel.held)
     names = [choice.candidate.name for choice in chosen]
-    likes = _likenesses(race, chosen, channel)
+    likes = _likenesses(race, chosen, channel, sources)
     rest = joint.race(noise_mm)
     on_joint = {candidate.name: candidate for candidate in joint.named}
     findings = []
@@ -119,8 +122,14 @@ def judge(
     return tuple(sorted(findings, key=lambda f: (order.index(f.verdict), -f.gain)))
 
 
-def _likenesses(race: Race, chosen: Sequence[Choice], channel: Channel) -> dict[str, tuple[str, ...]]:
-    """Sources that would do about as well in the place of a chosen one, both ways round."""
+def _likenesses(
+    race: Race, chosen: Sequence[Choice], channel: Channel, sources: Mapping[str, ErrorSource]
+) -> dict[str, tuple[str, ...]]:
+    """Sources that would do about as well in the place of a chosen one, both ways round.
+
+    What grows with time follows a law of its own in every machine; how exactly one of the laws that are tried fits
+    does not tell one such source from another.
+    """
     likes: dict[str, list[str]] = {}
     names = {choice.candidate.name for choice in chosen}
     for choice in chosen:
@@ -130,14 +139,16 @@ def _likenesses(race: Race, chosen: Sequence[Choice], channel: Channel) -> dict[
             if rival.name in names:
                 continue
             _, theirs = race.best_variant(rival, others)
-            if own - theirs < AS_GOOD:
+            both = {sources[choice.candidate.name].varies_with, sources[rival.name].varies_with}
+            enough = max(AS_GOOD, OWN_LAW * own) if both == {"time"} else AS_GOOD
+            if own - theirs < enough:
                 likes.setdefault(choice.candidate.name, []).append(rival.name)
                 likes.setdefault(rival.name, []).append(choice.candidate.name)
     return {name: tuple(sorted(alike)) for name, alike in likes.items()}
 
 
 def _fitted_values(after: Calibration, name: str) -> dict[str, Value]:
-    sigma = np.sqrt(np.maximum(np.diag(after.solution.covariance), 0.0))
+    sigma = np.sqrt(np.maximum(np.diag(after.solution.covariance), 0.0) + _held_variance(after))
     values: dict[str, Value] = {}
     for term in after.layout.terms:
         if term.source.name == name:
@@ -146,6 +157,18 @@ def _fitted_values(after: Calibration, name: str) -> dict[str, Value]:
                 key = parameter.name if not values.get(parameter.name) else f"{parameter.name} ({term.shared})"
                 values[key] = Value(float(after.x[column]), float(sigma[column]), parameter.unit)
     return values
+
+
+def _held_variance(after: Calibration) -> NDArray[np.float64]:
+    """Variance of every column along the directions that were held at nominal: their plausible size, shape (k,).
+
+    Nobody knows more of them. A parameter that lies in such a direction would otherwise look well known at zero.
+    """
+    known = after.layout.known
+    fitted = np.flatnonzero(~known.random)
+    variance = np.zeros(len(known.random))
+    variance[fitted] = np.sum((after.solution.held * known.scale[fitted]) ** 2, axis=0)
+    return variance
 
 
 def _fitted_amplitudes(after: Calibration, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -224,6 +247,36 @@ def doubted(
         doubtful = replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text)
         told.append(doubtful if finding.name in of_it else finding)
     return tuple(told)
+
+
+def crowded(findings: Sequence[SourceFinding], chosen: Sequence[Choice], race: Race) -> tuple[SourceFinding, ...]:
+    """Findings where three causes or more were needed at once.
+
+    Two happen. Three that none of the others outweighs are more likely one that has no name, put together from what
+    has: each may be there, and none of them is sure. A first one that outweighs all others by far stands.
+    """
+    if len(chosen) < CROWD:
+        return tuple(findings)
+    variants = [choice.variant for choice in chosen]
+    sure = OUTWEIGHS * (race.evidence(variants) - race.evidence(variants[:1])) < race.evidence(variants[:1])
+    names = [choice.candidate.name for choice in chosen]
+    doubtful = set(names[1:] if sure else names)
+    told = []
+    for finding in findings:
+        if finding.name not in doubtful or finding.verdict is not Verdict.IDENTIFIED:
+            told.append(finding)
+            continue
+        others = tuple(sorted(doubtful - {finding.name}))
+        text = f"Several causes are needed together, with {', '.join(others)}: one without a name may be behind them."
+        told.append(replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=others, text=text))
+    return tuple(told)
+
+
+CROWD = 3
+"""Causes at once that are more than happens."""
+
+OUTWEIGHS = 10.0
+"""By how much a first cause must outweigh what all others bring, to stand beside them."""
 
 
 def unexplained(

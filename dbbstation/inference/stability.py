@@ -54,8 +54,7 @@ def stability(
     place = {int(column): k for k, column in enumerate(wanted)}
     thin = [_thin(block, place) for block in blocks]
     moved = [
-        Candidate(c.name, tuple(replace(v, columns=_placed(v.columns, place)) for v in c.variants))
-        for c in candidates
+        Candidate(c.name, tuple(replace(v, columns=_placed(v.columns, place)) for v in c.variants)) for c in candidates
     ]
     names = np.array(sorted(set(groups)))
     kept_groups = max(int(np.ceil(SHARE * len(names))), min(len(names), 2))

@@ -274,9 +274,7 @@ def _predicted(
     motion = observation.motion()
     reading = model.bar(motion)
     terms = [term for term in layout.terms if term.acts_on(motion)]
-    jacobian = np.hstack(
-        [np.zeros((len(observation.raw), 0))] + [reading.by_fitted(model, term.fitted(x)) for term in terms]
-    )
+    jacobian = np.hstack([np.zeros((len(observation.raw), 0))] + [reading.by_fitted(term.fitted(x)) for term in terms])
     return np.concatenate([np.r_[term.columns] for term in terms]), jacobian, reading.length_mm
 
 

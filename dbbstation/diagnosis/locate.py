@@ -71,11 +71,12 @@ def strut_contributions(calibration: Calibration, fitted: Sequence[Fitted]) -> l
     contributions: list[NDArray[np.float64] | None] = []
     for observation in calibration.observations:
         motion = observation.motion()
-        effect = MachineModel(model.machine, tuple(fitted)).effect(motion)
+        reading = model.bar(motion)
+        effect = MachineModel(model.machine, tuple(fitted)).effect(motion, reading.actual)
         if effect.strut_mm is None:
             contributions.append(None)
             continue
-        gain = model.bar(motion).sensitivity.response.per_strut
+        gain = reading.sensitivity.response.per_strut
         contributions.append((gain * _per_sample(effect, len(motion)))[motion.kept])
     return contributions
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.fit import Calibration
     from dbbstation.diagnosis.findings import Diagnosis
+    from dbbstation.model.machine_model import Actual
     from dbbstation.model.observation import Observation
 
 BINS = 14
@@ -112,7 +113,7 @@ def _curves(diagnosis: Diagnosis, name: str) -> SourceCurves:
     after = diagnosis.after
     wanted = _wanted(diagnosis, name)
     if name:
-        moves_struts = any(_strut_mm(after, name, o) is not None for o in after.observations)
+        moves_struts = any(_strut_mm(after.model.actual(o.motion()), name) is not None for o in after.observations)
     else:
         moves_struts = wanted not in OF_THE_READING
     signed, fine = "sign" in wanted, wanted == "strut-length wave"
@@ -155,11 +156,9 @@ def _drawn_over(wanted: str, observations: Sequence[Observation], *, moves_strut
     return "strut-force" if wanted == "strut-force" else "strut-length"
 
 
-def _strut_mm(calibration: Calibration, name: str, observation: Observation) -> NDArray[np.float64] | None:
+def _strut_mm(there: Actual, name: str) -> NDArray[np.float64] | None:
     """Strut-length errors by one source of a model over the whole motion, shape (6,) or (n, 6) [mm]."""
-    motion, model = observation.motion(), calibration.model
-    acting = [f for f in model.acting(motion) if f.source.name == name]
-    effects = [f.source.effect(motion, model.as_found, f.values).strut_mm for f in acting]
+    effects = [there.by(f).strut_mm for f in there.model.acting(there.motion) if f.source.name == name]
     return next((effect for effect in effects if effect is not None), None)
 
 
@@ -176,7 +175,7 @@ def _samples(
         added = bar.length_mm - without.bar(motion).length_mm
         ones = np.ones((len(added), 1))
         return _Samples(over[:, :1], ones, added[:, None], ones)
-    strut = _strut_mm(calibration, name, observation)
+    strut = _strut_mm(bar.actual, name)
     whole = np.broadcast_to(0.0 if strut is None else strut, (len(motion), STRUTS))
     return _Samples(
         over,

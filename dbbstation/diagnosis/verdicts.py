@@ -33,7 +33,7 @@ TESTABLE_SHARE = 0.5
 AS_GOOD = 5.0
 """Difference in log evidence below which one source explains the recordings about as well as another."""
 
-OWN_LAW = 0.05
+OWN_LAW = 0.01
 """Share of its log evidence by which one source that grows with time must be better than another."""
 
 NAMED_EXPLAINS = 0.9
@@ -135,12 +135,13 @@ def _likenesses(
     for choice in chosen:
         others = [c.variant for c in chosen if c is not choice]
         _, own = race.best_variant(choice.candidate, others)
+        beside = race.evidence(others)
         for rival in channel.named:
             if rival.name in names:
                 continue
             _, theirs = race.best_variant(rival, others)
             both = {sources[choice.candidate.name].varies_with, sources[rival.name].varies_with}
-            enough = max(AS_GOOD, OWN_LAW * own) if both == {"time"} else AS_GOOD
+            enough = max(AS_GOOD, OWN_LAW * (own - beside)) if both == {"time"} else AS_GOOD
             if own - theirs < enough:
                 likes.setdefault(choice.candidate.name, []).append(rival.name)
                 likes.setdefault(rival.name, []).append(choice.candidate.name)

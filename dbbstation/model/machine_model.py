@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.errors import KinematicsError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import (
     BarSensitivity,
@@ -21,12 +22,16 @@ from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, Fitted, Motion, Need, Owner
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Hexapod, Machine
     from dbbstation.sources.contract import ErrorSource
+
+AGREED_MM = 1e-9
+MOST_ROUNDS = 30
+"""Four or five bring weights and pose together; a machine that needs more is about to fold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,16 +51,26 @@ class MachineModel:
         """Return the model with the machine's own sources only: what holds for any program."""
         return replace(self, sources=tuple(f for f in self.sources if f.source.belongs_to is Owner.MACHINE))
 
-    def effect(self, motion: Motion) -> Effect:
+    def effect(self, motion: Motion, there: Actual | None = None) -> Effect:
         """All sources together, but for those of motor currents, which change nothing else.
+
+        Args:
+            motion: as commanded.
+            there: where weights pull at the machine; None: at the commanded poses of the nominal machine.
 
         Raises:
             ModelError: a source needs what the motion does not give.
         """
+        return self._together(self.acting(motion), motion, there)
+
+    def _together(self, several: Iterable[Fitted], motion: Motion, there: Actual | None) -> Effect:
         total = Effect()
-        for fitted in self.acting(motion):
+        for fitted in several:
             fitted.source.require(motion)
-            total += fitted.source.effect(motion, self.as_found, fitted.values)
+            here, machine = motion, self.as_found
+            if there is not None and fitted.source.weighs:
+                here, machine = there.seen_by(fitted.source, machine)
+            total += fitted.source.effect(here, machine, fitted.values)
         return total
 
     def acting(self, motion: Motion) -> tuple[Fitted, ...]:
@@ -68,23 +83,6 @@ class MachineModel:
         found = [f.source.found_compliance(self.machine, f.values) for f in self.sources]
         return next((replace(self.machine, compliance=one) for one in found if one is not None), self.machine)
 
-    def derivative(self, motion: Motion, fitted: Fitted) -> Effect:
-        """Derivative of `effect` by the parameters of one of the sources, shape (..., p).
-
-        Where that is the struts' compliance, the stretch that other sources count with it is in proportion to it.
-
-        Raises:
-            ModelError: the source needs what the motion does not give.
-        """
-        own = fitted.source.derivative(motion, self.as_found, fitted.values)
-        if fitted.source.found_compliance(self.machine, fitted.values) is None:
-            return own
-        stretch = Effect()
-        for other in self.acting(motion):
-            if other.source.loads_struts and other.values.any():
-                stretch += other.source.effect(motion, self.as_found, other.values)
-        return own if stretch.strut_mm is None else own + Effect(strut_mm=stretch.strut_mm[:, :, None] / fitted.values)
-
     def driven_mm(self, frames: Frames) -> NDArray[np.float64]:
         """Strut lengths that the controller drives to for commanded poses, shape (n, 6) [mm]."""
         return strut_lengths(self.machine.hexapod, frames) - self.machine.reference_length_error_mm
@@ -92,15 +90,39 @@ class MachineModel:
     def actual(self, motion: Motion) -> Actual:
         """Where the platform really goes: F^-1(driven + strut errors; actual joints) [CAL eq 2].
 
+        Weights bend the machine where it really is, and so have a say in where that is. Their effect is taken at the
+        commanded pose of the nominal machine first and then anew where that leads, until a picometre agrees: each round
+        leaves a thousandth of the change before it, a hundredth where the struts hardly hold the platform.
+
         Raises:
-            KinematicsError: names the first pose that the actual machine cannot take.
+            KinematicsError: names the first pose that the actual machine cannot take, or that its weights let it leave.
             ModelError: a source needs what the motion does not give.
         """
         commanded = Frames.from_poses(motion.poses, self.machine.hexapod.rotation)
-        effect = self.effect(motion)
-        hexapod = actual_hexapod(self.machine.hexapod, effect)
-        frames = forward(hexapod, self.driven_mm(commanded) + _strut_errors(effect), commanded)
-        return Actual(hexapod, frames, effect)
+        driven = self.driven_mm(commanded)
+        acting = self.acting(motion)
+        weights = tuple(f for f in acting if f.source.weighs)
+        firm = self._together((f for f in acting if not f.source.weighs), motion, None)
+
+        def reached(effect: Effect, near: Frames) -> Actual:
+            hexapod = actual_hexapod(self.machine.hexapod, effect)
+            return Actual(self, motion, hexapod, forward(hexapod, driven + _strut_errors(effect), near), effect)
+
+        bent = self._together(weights, motion, None)
+        there = reached(firm + bent, commanded)
+        if not weights:
+            return there
+        for _ in range(MOST_ROUNDS):
+            last, bent = bent, self._together(weights, motion, there)
+            change = _change_mm(bent, last)
+            if change.max() < AGREED_MM:
+                return there
+            there = reached(firm + bent, there.frames)
+        raise KinematicsError(
+            "the machine gives way under its weights without coming to rest",
+            where=f"pose {int(np.argmax(change)) + 1}",
+            remedy="check the masses and compliances of the machine file and of the model, and the commanded pose",
+        )
 
     def actual_poses(self, motion: Motion) -> NDArray[np.float64]:
         """Poses of the real tool tip, shape (n, 6) [mm, deg], for the rows that count."""
@@ -120,6 +142,7 @@ class MachineModel:
             others = replace(self, sources=tuple(f for f in self.sources if Need.READING not in f.source.needs))
             motion = replace(motion, reading_mm=others.bar(replace(motion, kept=slice(None))).length_mm)
         actual = self.actual(motion)
+        standing: Actual | None = None
         ball, tool = setup.fixed_ball_mm, actual.effect.tool_tip_mm
         ball_response: tuple[Response, ...] = ()
         if motion.put_up is not None:
@@ -135,16 +158,64 @@ class MachineModel:
         sensitivity = bar_sensitivity(actual.hexapod, actual.frames, ball, tool)
         reading = np.zeros(1) if actual.effect.reading_mm is None else actual.effect.reading_mm
         length = sensitivity.length_mm + reading
-        return BarReading(motion, length[motion.kept], sensitivity, ball_response)
+        return BarReading(actual, length[motion.kept], sensitivity, standing, ball_response)
 
 
 @dataclass(frozen=True, eq=False)
 class Actual:
-    """Joints, platform poses and effects of the real machine along a motion."""
+    """The real machine along a motion.
 
+    Attributes:
+        model: whose sources are at work.
+        motion: as commanded.
+        hexapod: its joints.
+        frames: of its platform.
+        effect: of all sources together.
+    """
+
+    model: MachineModel
+    motion: Motion
     hexapod: Hexapod
     frames: Frames
     effect: Effect
+
+    @cached_property
+    def placed(self) -> Motion:
+        """The motion at the poses that the platform really takes."""
+        return replace(self.motion, poses=self.frames.to_poses(self.hexapod.rotation))
+
+    @cached_property
+    def machine(self) -> Machine:
+        """The machine with the joints, and the compliance, that it really has."""
+        return replace(self.model.as_found, hexapod=self.hexapod)
+
+    def seen_by(self, source: ErrorSource, machine: Machine) -> tuple[Motion, Machine]:
+        """Motion and machine that a source acts on: weights pull where a machine really is, all others as commanded."""
+        return (self.placed, replace(machine, hexapod=self.hexapod)) if source.weighs else (self.motion, machine)
+
+    def by(self, fitted: Fitted) -> Effect:
+        """Effect of one of the model's sources."""
+        return fitted.source.effect(*self.seen_by(fitted.source, self.model.as_found), fitted.values)
+
+    def derivative(self, fitted: Fitted) -> Effect:
+        """Derivative of the effect by the parameters of one of the model's sources, shape (..., p).
+
+        Where that is the struts' compliance, the stretch that other sources count with it is in proportion to it.
+        That the machine then moves, and its weights with it, is left out: a thousandth of the derivative, a hundredth
+        where the struts hardly hold the platform. A fit takes more rounds for it and ends at the same values.
+
+        Raises:
+            ModelError: the source needs what the motion does not give.
+        """
+        source, values, found = fitted.source, fitted.values, self.model.as_found
+        own = source.derivative(*self.seen_by(source, found), values)
+        if source.found_compliance(self.model.machine, values) is None:
+            return own
+        stretch = Effect()
+        for other in self.model.acting(self.motion):
+            if other.source.loads_struts and other.values.any():
+                stretch += self.by(other)
+        return own if stretch.strut_mm is None else own + Effect(strut_mm=stretch.strut_mm[:, :, None] / values)
 
     def tool_frames(self) -> Frames:
         """Frames of the real tool tip: the platform's, shifted by what sits between platform and tip."""
@@ -160,38 +231,43 @@ class BarReading:
     """Predicted readings of one run.
 
     Attributes:
-        motion: the run.
+        actual: the real machine along the run.
         length_mm: predicted reading at the rows that count, shape (n,) [mm].
         sensitivity: at all rows of the motion.
+        standing: the real machine while a ball was put up under the spindle; None for a ball of known place.
         ball_response: how X, Y and Z of a ball that was put up under the spindle answer to the machine's errors, while
             it was put up.
     """
 
-    motion: Motion
+    actual: Actual
     length_mm: NDArray[np.float64]
     sensitivity: BarSensitivity
+    standing: Actual | None = None
     ball_response: tuple[Response, ...] = ()
 
     def by_source(self, source: ErrorSource, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivative of the reading by a source's parameters about their values, shape (p,): shape (n, p)."""
-        return self._by(lambda motion: source.derivative(motion, machine, values))
+        """Derivative of the reading by a source's parameters about their values, shape (p,): shape (n, p).
 
-    def by_fitted(self, model: MachineModel, fitted: Fitted) -> NDArray[np.float64]:
-        """Derivative by the parameters of a source of a model, with what it changes through others, shape (n, p)."""
-        return self._by(lambda motion: model.derivative(motion, fitted))
+        The source need not be one of the model's; a weight pulls where the model has the machine.
+        """
+        return self._by(lambda actual: source.derivative(*actual.seen_by(source, machine), values))
 
-    def _by(self, derivative: Callable[[Motion], Effect]) -> NDArray[np.float64]:
-        total = self.by_parameters(derivative(self.motion))
-        if self.motion.put_up is None:
+    def by_fitted(self, fitted: Fitted) -> NDArray[np.float64]:
+        """Derivative by the parameters of one of the model's sources, with what it changes through others, (n, p)."""
+        return self._by(lambda actual: actual.derivative(fitted))
+
+    def _by(self, derivative: Callable[[Actual], Effect]) -> NDArray[np.float64]:
+        total = self.by_parameters(derivative(self.actual))
+        if self.standing is None:
             return total
-        then = derivative(self.motion.put_up)
-        last = slice(len(self.motion.put_up) - 1, None)
+        then = derivative(self.standing)
+        last = slice(len(self.standing.motion) - 1, None)
         moved = [np.broadcast_to(by_parameters(then, r, last), (1, total.shape[1])) for r in self.ball_response]
-        return total - self.sensitivity.direction[self.motion.kept] @ np.vstack(moved)
+        return total - self.sensitivity.direction[self.actual.motion.kept] @ np.vstack(moved)
 
     def by_parameters(self, derivative: Effect) -> NDArray[np.float64]:
         """Derivative of the reading by p parameters, shape (n, p), from that of an effect; kept rows only."""
-        kept = self.motion.kept
+        kept = self.actual.motion.kept
         total = by_parameters(derivative, self.sensitivity.response, kept)
         if derivative.fixed_ball_mm is not None:
             total = total - _contract(self.sensitivity.direction[kept], _rows(derivative.fixed_ball_mm, 1, kept), 1)
@@ -244,3 +320,11 @@ def actual_hexapod(nominal: Hexapod, effect: Effect) -> Hexapod:
 
 def _strut_errors(effect: Effect) -> NDArray[np.float64]:
     return np.zeros(STRUTS) if effect.strut_mm is None else effect.strut_mm
+
+
+def _change_mm(bent: Effect, last: Effect) -> NDArray[np.float64]:
+    """Greatest change of a strut or a base joint from one effect of weights to another, shape (n,) [mm]."""
+    pairs = ((bent.strut_mm, last.strut_mm), (bent.base_joint_mm, last.base_joint_mm))
+    changes = [np.abs(new - old) for new, old in pairs if new is not None and old is not None]
+    greatest: NDArray[np.float64] = np.max([np.max(c.reshape(len(c), -1), axis=1) for c in changes], axis=0)
+    return greatest

@@ -14,8 +14,7 @@ from dbbstation.sources.weights import stated_loads
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.machine.geometry import Machine
-    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.model.machine_model import Actual, MachineModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,15 +24,13 @@ class MotorCurrents:
     Attributes:
         model: that predicts.
         driven: the run as commanded, with the loads of the motors.
-        placed: the run at the poses where the machine really is.
-        actual: machine with the joints that it really has.
+        there: where the machine really is.
         current_a: at the rows that count, shape (n, 6) [A].
     """
 
     model: MachineModel
     driven: Motion
-    placed: Motion
-    actual: Machine
+    there: Actual
     current_a: NDArray[np.float64]
 
     def by_parameters(self, fitted: Fitted) -> NDArray[np.float64] | None:
@@ -48,7 +45,7 @@ class MotorCurrents:
             return None if own is None else own[kept]
         if not fitted.source.loads_struts:
             return None
-        by_load = fitted.source.derivative(self.placed, self.actual, fitted.values).load_n
+        by_load = self.there.derivative(fitted).load_n
         if by_load is None:
             return None
         total = np.zeros_like(by_load)
@@ -68,22 +65,20 @@ def motor_currents(model: MachineModel, motion: Motion) -> MotorCurrents:
         ModelError: a source needs what the motion does not give; the machine file has no masses.
     """
     there = model.actual(motion)
-    actual = replace(model.as_found, hexapod=there.hexapod)
-    placed = replace(motion, poses=there.frames.to_poses(model.machine.hexapod.rotation))
     weighing = any(f.source.weighs_struts for f in model.sources)
-    stated = replace(actual, strut_masses=None) if weighing else actual
+    stated = replace(there.machine, strut_masses=None) if weighing else there.machine
     total = Effect(
         load_n=stated_loads("drive-friction", stated, there.frames, there.hexapod),
         current_a=np.zeros(STRUTS),
     )
     for fitted in model.acting(motion):
         if fitted.source.loads_struts:
-            total += Effect(load_n=fitted.source.effect(placed, actual, fitted.values).load_n)
+            total += Effect(load_n=there.by(fitted).load_n)
     driven = replace(motion, load_n=total.load_n)
     for drive in drives(model):
         total += drive.source.effect(driven, model.as_found, drive.values)
     current = np.broadcast_to(np.asarray(total.current_a), (len(motion), STRUTS))
-    return MotorCurrents(model, driven, placed, actual, current[motion.kept])
+    return MotorCurrents(model, driven, there, current[motion.kept])
 
 
 def drives(model: MachineModel) -> tuple[Fitted, ...]:

@@ -33,7 +33,7 @@ def position_uncertainty_mm(identified: IdentifiedModel, motion: Motion) -> NDAr
     count = len(motion.poses[motion.kept])
     sensitivity = np.zeros((3, count, len(row_of)))
     for fitted in model.acting(motion):
-        derivative = model.derivative(motion, fitted)
+        derivative = actual.derivative(fitted)
         names = [(fitted.source.name, fitted.shared, p.name) for p in fitted.source.parameters(model.machine)]
         columns = [row_of[name] for name in names if name in row_of]
         known = [k for k, name in enumerate(names) if name in row_of]

@@ -28,6 +28,7 @@ class BaseCompliance(LinearSource):
 
     name = "base-compliance"
     belongs_to = Owner.MACHINE
+    weighs = True
     texts = Texts(
         what="The frame above is elastic: the base joints move with the forces of their struts.",
         shows="Circles deformed like those of gravity, the same in both directions, growing with the tilt.",

@@ -28,6 +28,7 @@ class CogShift(LinearSource):
 
     name = "cog-shift"
     belongs_to = Owner.MACHINE
+    weighs = True
     loads_struts = True
     texts = Texts(
         what="The platform's centre of gravity is not where the machine file has it: another spindle, tool, hose or "

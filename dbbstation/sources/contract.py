@@ -249,6 +249,8 @@ class ErrorSource(ABC):
     needs: ClassVar[frozenset[Need]] = frozenset({Need.POSE})
     varies_with: ClassVar[str] = ""
     """Variable that organises its misfit, as printed beside a place; empty where there is no single one."""
+    weighs: ClassVar[bool] = False
+    """True for what weights do, which a model asks for at the poses and joints that the machine really has."""
     loads_struts: ClassVar[bool] = False
     """True for a weight: it has a `load_n`, and its `strut_mm` is counted with the compliance of the machine given."""
     weighs_struts: ClassVar[bool] = False

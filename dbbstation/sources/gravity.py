@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 class Gravity(LinearSource):
     """Struts under the platform's weight are longer or shorter than driven: dL_i = c(L_i) T_i [GRAV eq 1, 6, 7, 8].
 
-    The tensions T follow from the equilibrium of the platform at the commanded pose of the nominal machine. That it
-    hangs a little lower and joints sit a little elsewhere changes them by parts in a thousand; only close to poses
-    where the struts hardly hold it does the sag tell (1 % of the error at A = -25 degrees and Y = 100 mm).
+    The tensions T follow from the equilibrium of the platform at the pose and the joints given. A model gives those that
+    the machine really has: that it hangs a little lower and joints sit a little elsewhere changes the forces by parts in
+    a thousand, and close to poses where the struts hardly hold it by parts in a hundred (A = -25 degrees, Y = 100 mm).
     Tensions are signed: the same strut is pulled at one side of a tilted circle and pushed at the other.
     The compliance c(L) = c_1000 (1 - s + s L / 1000 mm) is one number for all struts; the share s that grows with
     length is the machine file's. Circles show the product of compliance and weight only: a platform 1 % heavier than
@@ -32,6 +32,7 @@ class Gravity(LinearSource):
 
     name = "gravity"
     belongs_to = Owner.MACHINE
+    weighs = True
     varies_with = "strut-force"
     texts = Texts(
         what="The struts are elastic: the platform's weight pulls some of them longer and pushes others shorter.",

@@ -35,6 +35,7 @@ class StrutWeight(LinearSource):
 
     name = "strut-weight"
     belongs_to = Owner.MACHINE
+    weighs = True
     loads_struts = True
     weighs_struts = True
     texts = Texts(

@@ -75,7 +75,7 @@ def compliance_from_profiles(kinematics: MachineModel, runs: Sequence[Observatio
 def _profile(model: MachineModel, run: Observation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Derivative of a run's profile by the compliance, and measured minus predicted profile, shape (n,) each."""
     reading = model.bar(run.motion())
-    rows = np.column_stack([reading.by_fitted(model, model.sources[-1])[:, 0], run.raw.length_mm - reading.length_mm])
+    rows = np.column_stack([reading.by_fitted(model.sources[-1])[:, 0], run.raw.length_mm - reading.length_mm])
     theta = np.radians(run.raw.theta_deg)
     circle, _ = np.linalg.qr(np.column_stack([np.cos(theta), np.sin(theta), np.ones(len(theta))]))
     rows -= circle @ (circle.T @ rows)

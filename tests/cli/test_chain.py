@@ -58,7 +58,12 @@ def test_calibrate_prints_json_and_nothing_else(calibrated):
     assert data["parameters_identified"] == 24
     assert data["directions_lost"] == []
     assert {source["name"] for source in data["sources"]} == {"strut-reference-length", "base-joints"}
-    assert {effect["name"] for effect in data["measurement_effects"]} == {"mounting", "ball-coordinate", "bar-offset"}
+    assert {effect["name"] for effect in data["measurement_effects"]} == {
+        "mounting",
+        "ball-coordinate",
+        "bar-offset",
+        "run-start",
+    }
     assert model.exists()
 
 

@@ -61,7 +61,7 @@ def test_a_model_puts_the_encoder_where_all_other_sources_put_it(reference, rng)
     reading = MachineModel(reference, (joints, Fitted(CYCLIC, sizes, "session"))).bar(motion)
     assert np.ptp(without) > 0.04
     assert np.allclose(1e3 * (reading.length_mm - without), wave_um(without, reference, *sizes), atol=1e-9)
-    assert len(reading.motion.reading_mm) == len(motion)
+    assert len(reading.actual.motion.reading_mm) == len(motion)
 
 
 def test_recordings_bring_the_readings():

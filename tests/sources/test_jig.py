@@ -137,7 +137,7 @@ def test_a_warm_plate_and_a_ball_off_the_tip_look_alike(reference):
         return np.vstack([r.by_parameters(d) for r, d in zip(readings, derivatives, strict=True)])
 
     def moved(reading):
-        return reading.sensitivity.direction[reading.motion.kept]
+        return reading.sensitivity.direction[reading.actual.motion.kept]
 
     covariance = 1e-4**2 * np.eye(sum(len(r.length_mm) for r in readings)) + 5e-4**2
     rows = np.split(np.arange(len(covariance)), len(runs) // 2)

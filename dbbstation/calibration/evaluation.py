@@ -86,8 +86,8 @@ def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evalua
             measured=figures(o.raw),
             before=before[k],
             after=after[k],
-            before_from_first_um=_apart_um(before[k], before[first[k]]),
-            after_from_first_um=_apart_um(after[k], after[first[k]]),
+            before_from_first_um=apart_um(before[k], before[first[k]]),
+            after_from_first_um=apart_um(after[k], after[first[k]]),
         )
         for k, o in enumerate(observations)
     )
@@ -159,5 +159,6 @@ def _first_in_direction(observations: Sequence[Observation], k: int) -> int:
     )
 
 
-def _apart_um(a: CircleFigures, b: CircleFigures) -> float:
+def apart_um(a: CircleFigures, b: CircleFigures) -> float:
+    """Distance of two circles' centres [µm]."""
     return 1e3 * float(np.hypot(a.centre_mm[0] - b.centre_mm[0], a.centre_mm[1] - b.centre_mm[1]))

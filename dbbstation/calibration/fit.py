@@ -138,7 +138,7 @@ def calibrate(
             convergence.
         ModelError: a source lacks what it needs.
     """
-    _check_raw(observations)
+    check_raw(observations)
     _check_enough(observations)
     layout = lay_out(machine, default_sources() if sources is None else sources, observations)
     if start:
@@ -320,8 +320,12 @@ def _usual_length(runs: Sequence[Observation | Nodes]) -> int:
     return poses // max(len(runs), 1)
 
 
-def _check_raw(observations: Sequence[Observation]) -> None:
-    """Refuse anything but raw circles: a removed centre is the machine's position error [CAL III-A]."""
+def check_raw(observations: Sequence[Observation]) -> None:
+    """Refuse anything but raw circles: a removed centre is the machine's position error [CAL III-A].
+
+    Raises:
+        CalibrationError: names the test of the first other one.
+    """
     for observation in observations:
         if not isinstance(observation.raw, RawCircle):
             raise CalibrationError(

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.calibration.fit import check_raw
 from dbbstation.errors import CalibrationError
 from dbbstation.machine.rotation import Frames
 from dbbstation.trace.analysis import figures
-from dbbstation.trace.circle import RawCircle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -67,8 +67,7 @@ def as_known(method: Method, machine: Machine, observations: Sequence[Observatio
     Raises:
         CalibrationError: a ball whose place the method needs and nobody knows; centred circles.
     """
-    for observation in observations:
-        _check_raw(observation)
+    check_raw(observations)
     if method is Method.JIG:
         _check_places(observations)
         _check_not_centred(observations)
@@ -98,16 +97,6 @@ def _under_spindle(observation: Observation, machine: Machine) -> Observation:
         size = np.sqrt(fixed**2 + turn**2 @ moving**2)
     setup = replace(observation.setup, mounting_repeatability_mm=size, ball_uncertainty_mm=0.0, place_known=False)
     return replace(observation, setup=setup)
-
-
-def _check_raw(observation: Observation) -> None:
-    """Refuse anything but raw circles: a removed centre is the machine's position error [CAL III-A]."""
-    if not isinstance(observation.raw, RawCircle):
-        raise CalibrationError(
-            "is a centred circle: its position on the machine is gone",
-            where=observation.test,
-            remedy="calibrate from the raw recording",
-        )
 
 
 def _check_places(observations: Sequence[Observation]) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.directions import in_words
+from dbbstation.inference.square_root import complement
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -101,7 +102,7 @@ def visibility(calibration: Calibration) -> Visibility:
         wide[:, place[block.columns[own]]] = block.triangle[:, own]
         rows.append(wide * scale)
     whole = np.vstack(rows)
-    free = _without(calibration.solution.held, len(fitted))
+    free = complement(calibration.solution.held)
     singular = np.asarray(np.linalg.svd(whole @ free.T, compute_uv=False), dtype=np.float64)
     singular = singular[singular > ROUNDING * singular[0]]  # circles see nothing of what moves currents only
     readings = sum(block.count for block in calibration.circle_blocks)
@@ -189,11 +190,3 @@ def _leverage(calibration: Calibration, fitted: NDArray[np.int64]) -> dict[str, 
         root = triangle[len(own) :, len(own) :]
         worth[test] = float(np.sum((root @ covariance) * root))
     return worth
-
-
-def _without(held: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Orthonormal rows of all directions but those held."""
-    if not len(held):
-        return np.eye(count)
-    _, _, vt = np.linalg.svd(held, full_matrices=True)
-    return vt[len(held) :]

@@ -46,6 +46,12 @@ FLEXIBLE = 16
 MADE_UP_FOR = 0.2
 """Share of its evidence below which what others bring beside a flexible source only makes up for its failings."""
 
+CROWD = 3
+"""Causes at once that are more than happens."""
+
+OUTWEIGHS = 10.0
+"""By how much a first cause must outweigh what all others bring, to stand beside them."""
+
 SHAPE_THRESHOLD = 10.0
 """Log evidence that an unnamed shape must bring."""
 
@@ -271,13 +277,6 @@ def crowded(findings: Sequence[SourceFinding], chosen: Sequence[Choice], race: R
         text = f"Several causes are needed together, with {', '.join(others)}: one without a name may be behind them."
         told.append(replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=others, text=text))
     return tuple(told)
-
-
-CROWD = 3
-"""Causes at once that are more than happens."""
-
-OUTWEIGHS = 10.0
-"""By how much a first cause must outweigh what all others bring, to stand beside them."""
 
 
 def unexplained(

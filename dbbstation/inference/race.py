@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import qr
 
+from dbbstation.inference.square_root import complement
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -274,5 +276,4 @@ def free_directions(base: Columns, fitted: NDArray[np.int64], held: NDArray[np.f
     """Fitted columns in units of their scales, along the directions that are not held, shape (f, free)."""
     if len(held) == 0:
         return np.diag(base.scale[fitted])
-    _, _, vt = np.linalg.svd(held, full_matrices=True)
-    return base.scale[fitted][:, None] * vt[len(held) :].T
+    return base.scale[fitted][:, None] * complement(held).T

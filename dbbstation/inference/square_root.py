@@ -152,7 +152,7 @@ def solve(
     seen = root[m:, m:] * scale
     directions = directions_of(seen)
     held = np.zeros((0, len(fitted))) if held is None else held
-    free = _complement(held)
+    free = complement(held)
     u, s, vt = np.linalg.svd(seen @ free.T, full_matrices=False)
     towards = free.T @ vt.T
     x = np.zeros(len(known.prior))
@@ -247,7 +247,7 @@ def _triangle(stacked: NDArray[np.float64]) -> NDArray[np.float64]:
     return triangle
 
 
-def _complement(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def complement(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Orthonormal rows of everything orthogonal to orthonormal rows."""
     if len(rows) == 0:
         return np.eye(rows.shape[1])

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.calibration.fit import default_sources
+from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.workspace import workspace
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Plan, PlannedTest
 from dbbstation.sources.contract import Fitted, Motion
-from dbbstation.sources.registry import known_sources
+from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.studies.virtual_session import draw_session
 from dbbstation.virtual.truth import random_kinematics
 
@@ -91,9 +91,7 @@ def platform_joints(
         progress(f"{len(plan.tests)} tests")
         # The same random numbers again: what was measured before stays as it was, new tests come behind.
         runs = draw_session(truth, plan, np.random.default_rng([seed, 10]), NOISE_MM, SAMPLES)
-        fitted = {s.name for s in default_sources()}
-        candidates = [s for name, s in known_sources().items() if name not in fitted and s.candidate]
-        usable, _ = usable_sources(machine, runs, candidates)
+        usable, _ = usable_sources(machine, runs, sources_named(default_candidates(known_sources())))
         found = diagnose(machine, runs, usable, progress)
         rounds.append(_round(found, truth, len(plan.tests), added))
         useful = rounds[-1].stated_um < rounds[-1].kinematic_um

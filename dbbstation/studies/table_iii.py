@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.calibration.evaluation import plane_figures
+from dbbstation.calibration.evaluation import apart_um, plane_figures
 from dbbstation.calibration.fit import calibrate
 from dbbstation.calibration.methods import Method, as_known
 from dbbstation.errors import CalibrationError
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.plan.plan import Plan
-    from dbbstation.trace.analysis import CircleFigures
 
 NOISE_MM = 0.0005
 MICROMETER_MM = 0.001
@@ -183,13 +182,9 @@ def _verify(truth: MachineModel, model: MachineModel, plan: Plan, rng: np.random
     plane = plane_figures(truth, PLANE_MM, model)
     origin = first[POSITIONS[0]]
     return Verified(
-        centre_deviation_um={place: _apart_um(first[place], origin) for place in POSITIONS},
+        centre_deviation_um={place: apart_um(first[place], origin) for place in POSITIONS},
         mean_radial_error_um={place: first[place].mean_radial_error_um for place in POSITIONS},
         circularity_um={place: first[place].circularity_um for place in POSITIONS},
         flatness_um=plane.flatness_um,
         parallelism_um=plane.parallelism_um,
     )
-
-
-def _apart_um(a: CircleFigures, b: CircleFigures) -> float:
-    return 1e3 * float(np.hypot(a.centre_mm[0] - b.centre_mm[0], a.centre_mm[1] - b.centre_mm[1]))

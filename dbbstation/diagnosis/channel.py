@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM
+from dbbstation.calibration.scatter import LEAST_STATED_MM
 from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Ranges, Shape, ranges, shapes, strongest_waves, variables
 from dbbstation.inference.race import Candidate, Race, Variant
 from dbbstation.inference.square_root import Block, Columns, compress, joined
@@ -20,11 +21,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
-    from dbbstation.calibration.layout import Layout
+    from dbbstation.calibration.layout import Layout, Term
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
-    from dbbstation.sources.contract import ErrorSource, Motion
+    from dbbstation.sources.contract import ErrorSource, Motion, Parameter
 
 SECTORS = 720
 """Samples per turn that a diagnosis works on, at the most: every half degree."""
@@ -32,6 +33,12 @@ SECTORS = 720
 MANY, SIZES = 6, (1.0, 0.1)
 """Amplitudes from which on a source is looked for at both sizes, in units of the plausible one: that all of many are
 small is likely when one of them is, and the plausible size alone would count it as a miracle."""
+
+SET_UP = ("mounting", "ball-coordinate", "bar-offset")
+"""Random effects of the base that may be far larger than stated."""
+
+OUTSIZE = 20.0
+"""Size of such an effect in units of the stated one, one standard deviation."""
 
 FEWEST_PER_SECTOR = 2
 """Samples per sector below which sectors are made wider."""
@@ -48,6 +55,7 @@ class Channel:
         held: base directions at nominal.
         columns: number of all columns.
         named: sources that have a name, as candidates.
+        set_up: balls and bars that are off by far more than stated, as candidates: a variant for each of them.
         unnamed: shapes, as candidates; their names are `variable | strut | form`.
         residual_mm: per run, what the base fit leaves, measurement's effects included [mm].
         extent: of the variables that shapes are curves of.
@@ -59,6 +67,7 @@ class Channel:
     held: NDArray[np.float64]
     columns: int
     named: tuple[Candidate, ...]
+    set_up: tuple[Candidate, ...]
     unnamed: tuple[Candidate, ...]
     residual_mm: tuple[NDArray[np.float64], ...]
     extent: Ranges
@@ -86,7 +95,7 @@ class Channel:
     def known(self) -> Columns:
         """Priors and scales of all columns; amplitudes of candidates are random with their plausible sizes."""
         prior = np.concatenate([self.base.prior, np.full(self.columns - len(self.base.prior), np.inf)])
-        for candidate in (*self.named, *self.unnamed):
+        for candidate in (*self.named, *self.set_up, *self.unnamed):
             for variant in candidate.variants:
                 prior[variant.columns] = variant.plausible
         more = self.columns - len(self.base.prior)
@@ -126,11 +135,17 @@ def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Chan
         [r.sensitivity.response.per_strut[m.kept] for r, m in zip(readings, motions, strict=True)],
         [variables(m, machine)["strut-length"][m.kept] for m in motions],
     )
+    outsize = _outsize(layout, observations)
     blocks = []
     for motion, reading, residual in zip(motions, readings, left, strict=True):
         terms = [term for term in layout.terms if term.acts_on(motion)]
         pieces = [reading.by_source(term.source, machine, calibration.x[term.columns]) for term in terms]
         columns = [np.r_[term.columns] for term in terms]
+        for term, piece in list(zip(terms, pieces, strict=True)):
+            seen = outsize.get((term.source.name, term.shared))
+            if seen is not None:
+                columns.append(book.set_up(term, OUTSIZE * layout.known.prior[term.columns][:seen]))
+                pieces.append(piece[:, :seen])
         for source in sources:
             for numbers, piece in _source_columns(source, motion, machine, reading, book):
                 columns.append(numbers)
@@ -150,10 +165,30 @@ def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Chan
         held=calibration.solution.held,
         columns=book.count,
         named=book.candidates(named=True),
+        set_up=book.of_the_set_up(),
         unnamed=book.candidates(named=False),
         residual_mm=tuple(left),
         extent=extent,
     )
+
+
+def _outsize(layout: Layout, observations: Sequence[Observation]) -> dict[tuple[str, str], int]:
+    """Random effects that may be larger than stated, by source and set, and how many of their parameters runs see.
+
+    A level bar does not see the height of its ball. A ball that was put up once only is no other matter than its
+    mounting, and one that was set free may stand anywhere as it is.
+    """
+    setups = [observation.setup for observation in observations]
+    put_up = {ball: {s.mounting for s in setups if s.ball == ball} for ball in {s.ball for s in setups}}
+    raised = {o.setup.mounting for o in observations if o.raw.circle.elevation_deg != 0.0}
+    found = {}
+    for term in layout.terms:
+        name, stated = term.source.name, layout.known.prior[term.columns]
+        mountings = put_up.get(term.shared, set()) if name == "ball-coordinate" else {term.shared}
+        once = name == "ball-coordinate" and len(mountings) == 1
+        if name in SET_UP and not once and np.all(stated < LEAST_STATED_MM):
+            found[name, term.shared] = min(len(stated), 3 if mountings & raised else 2)
+    return found
 
 
 def _source_columns(
@@ -170,10 +205,28 @@ def _source_columns(
         if shaped:
             values[shaped] = value
         derivative = reading.by_source(source, machine, values)[:, amplitudes]
-        prior = np.array([parameters[k].plausible for k in amplitudes])
         shape = tuple(float(values[k]) for k in shaped)
-        found.append((book.source(source, source.shared_by(motion), shape, prior), derivative))
+        numbers = book.source(source, source.shared_by(motion), shape, [parameters[k] for k in amplitudes])
+        found.append((numbers, derivative))
     return found
+
+
+def _forms(whole: Variant, struts: NDArray[np.int64]) -> list[Variant]:
+    """Forms in which a source is looked for: all its amplitudes, at one size or two, and those of each strut alone.
+
+    What wears or was made badly is often one strut only; all others free beside it would hide what is faint.
+
+    Args:
+        whole: all amplitudes.
+        struts: that each amplitude is of, 0 for none, shape (p,).
+    """
+    sizes = SIZES if len(whole.columns) >= MANY else SIZES[:1]
+    forms = [whole.scaled(size) for size in sizes]
+    single = np.unique(struts)
+    if len(single) > 1:
+        of = [struts == strut for strut in single]
+        forms += [replace(whole, columns=whole.columns[own], prior=whole.prior[own]) for own in of]
+    return forms
 
 
 class _Book:
@@ -182,18 +235,31 @@ class _Book:
     def __init__(self, first: int) -> None:
         self.count = first
         self._sources: dict[
-            tuple[str, tuple[float, ...]], dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
+            tuple[str, tuple[float, ...]], dict[str, tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]
         ] = {}
         self._shapes: dict[tuple[str, int | None, str], tuple[NDArray[np.int64], float | None]] = {}
+        self._set_up: dict[str, dict[str, Variant]] = {}
 
     def source(
-        self, source: ErrorSource, shared: str, shape: tuple[float, ...], prior: NDArray[np.float64]
+        self, source: ErrorSource, shared: str, shape: tuple[float, ...], amplitudes: Sequence[Parameter]
     ) -> NDArray[np.int64]:
         """Columns of one variant of a source for one set that shares its values."""
         sets = self._sources.setdefault((source.name, shape), {})
         if shared not in sets:
-            sets[shared] = (self._new(len(prior)), prior)
+            prior = np.array([p.plausible for p in amplitudes])
+            sets[shared] = (self._new(len(prior)), prior, np.array([p.strut or 0 for p in amplitudes]))
         return sets[shared][0]
+
+    def set_up(self, term: Term, prior: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Columns of a ball or bar that is off by far more than stated."""
+        sets = self._set_up.setdefault(term.source.name, {})
+        if term.shared not in sets:
+            sets[term.shared] = Variant(self._new(len(prior)), prior, of=term.shared)
+        return sets[term.shared].columns
+
+    def of_the_set_up(self) -> tuple[Candidate, ...]:
+        """Return balls and bars as candidates."""
+        return tuple(Candidate(name, tuple(sets.values())) for name, sets in self._set_up.items())
 
     def shape(self, shape: Shape) -> NDArray[np.int64]:
         """Columns of a shape."""
@@ -207,11 +273,10 @@ class _Book:
         variants: dict[str, list[Variant]] = {}
         if named:
             for (name, form), sets in self._sources.items():
-                columns = np.concatenate([columns for columns, _ in sets.values()])
-                prior = np.concatenate([prior for _, prior in sets.values()])
-                usual = Variant(columns, prior, form)
-                sizes = SIZES if len(columns) >= MANY else SIZES[:1]
-                variants.setdefault(name, []).extend(usual.scaled(size) for size in sizes)
+                columns = np.concatenate([columns for columns, _, _ in sets.values()])
+                prior = np.concatenate([prior for _, prior, _ in sets.values()])
+                struts = np.concatenate([struts for _, _, struts in sets.values()])
+                variants.setdefault(name, []).extend(_forms(Variant(columns, prior, form), struts))
         else:
             for (variable, strut, _), (columns, wave) in self._shapes.items():
                 form = () if wave is None else (wave,)

@@ -15,7 +15,7 @@ from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.naming import MOST_SOURCES, THRESHOLD, Round, best_look
 from dbbstation.diagnosis.next_test import propose
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
-from dbbstation.diagnosis.verdicts import crowded, doubted, judge, testable, unexplained
+from dbbstation.diagnosis.verdicts import beside_outliers, crowded, doubted, judge, testable, unexplained
 from dbbstation.diagnosis.workspace import WorkspaceError, workspace_error
 from dbbstation.errors import ModelError
 from dbbstation.inference.held_out import HeldOut, held_out
@@ -75,6 +75,7 @@ def diagnose(
         chosen, after = (), before
         settled = Round((), before, first, settled.race)
         findings = tuple(rest.demoted(findings))
+    findings = beside_outliers(findings, outliers)
     findings = crowded(doubted(findings, rest.finding, by_name), chosen, settled.race)
     predicted = _held_out(channel, chosen, settled.left.noise)
     steady = _stability(channel, findings, settled)
@@ -216,8 +217,8 @@ def _next_tests(
 
     A source that was named is open too, where the joint model is not `known` well enough to be of use elsewhere.
     """
-    variants = {c.name: settled.race.best_variant(c, [])[0] for c in channel.named}
-    chosen = {choice.candidate.name: choice.variant for choice in settled.chosen}
+    variants = {c.name: c.whole(settled.race.best_variant(c, [])[0]) for c in channel.named}
+    chosen = {choice.candidate.name: choice.candidate.whole(choice.variant) for choice in settled.chosen}
     for finding in findings:
         likes = [name for name in finding.ambiguous_with if name in variants]
         settled_name = finding.name in chosen and (known or len(chosen[finding.name].columns) == 1)

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.calibration.outliers import SOURCE_OF
 from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
 from dbbstation.diagnosis.unexplained_curve import curve_of
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.race import Race, free_directions
+from dbbstation.inference.race import AS_GOOD, Race, as_good, free_directions, worth_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.outliers import Outlier
     from dbbstation.diagnosis.channel import Channel
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.race import Candidate, Choice, Variant
@@ -29,9 +31,6 @@ TESTABLE_SIGMA = 5.0
 
 TESTABLE_SHARE = 0.5
 """Share of the combinations of a source's amplitudes that must be seen for the source to be ruled out."""
-
-AS_GOOD = 5.0
-"""Difference in log evidence below which one source explains the recordings about as well as another."""
 
 OWN_LAW = 0.01
 """Share of its log evidence by which one source that grows with time must be better than another."""
@@ -104,12 +103,14 @@ def judge(
             values = _fitted_values(after, candidate.name)
             verdict = Verdict.AMBIGUOUS if alike else Verdict.IDENTIFIED
         else:
-            variant, gain = rest.best_variant(on_joint[candidate.name], [])
+            beside = on_joint[candidate.name]
+            variant, gain = rest.best_variant(beside, [])
+            variant = beside.whole(variant)
             values = _best_values(source, channel.machine, rest, variant)
             seen = testable(rest, variant, [])
             verdict = Verdict.RULED_OUT if seen else Verdict.NOT_TESTABLE
             verdict = Verdict.AMBIGUOUS if alike else verdict
-            variant, _ = race.best_variant(candidate, [])
+            variant = candidate.whole(race.best_variant(candidate, [])[0])
             signature = concealment([channel.joined], machine_columns, variant.columns, variant.plausible, free)
         findings.append(
             SourceFinding(
@@ -137,20 +138,16 @@ def _likenesses(
     does not tell one such source from another.
     """
     likes: dict[str, list[str]] = {}
-    names = {choice.candidate.name for choice in chosen}
     for choice in chosen:
-        others = [c.variant for c in chosen if c is not choice]
-        _, own = race.best_variant(choice.candidate, others)
-        beside = race.evidence(others)
-        for rival in channel.named:
-            if rival.name in names:
-                continue
-            _, theirs = race.best_variant(rival, others)
-            both = {sources[choice.candidate.name].varies_with, sources[rival.name].varies_with}
-            enough = max(AS_GOOD, OWN_LAW * (own - beside)) if both == {"time"} else AS_GOOD
-            if own - theirs < enough:
-                likes.setdefault(choice.candidate.name, []).append(rival.name)
-                likes.setdefault(rival.name, []).append(choice.candidate.name)
+        own = choice.candidate.name
+        lawful = [c for c in channel.named if {sources[own].varies_with, sources[c.name].varies_with} == {"time"}]
+        others = [c for c in channel.named if c not in lawful]
+        alike = as_good(race, chosen, choice, others, AS_GOOD)
+        if lawful:
+            alike += as_good(race, chosen, choice, lawful, max(AS_GOOD, OWN_LAW * worth_of(race, chosen, choice)))
+        for rival in alike:
+            likes.setdefault(own, []).append(rival)
+            likes.setdefault(rival, []).append(own)
     return {name: tuple(sorted(alike)) for name, alike in likes.items()}
 
 
@@ -253,6 +250,19 @@ def doubted(
         text = f"What is left follows {variable} too, so it may only make up for another law of {', '.join(alike)}."
         doubtful = replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text)
         told.append(doubtful if finding.name in of_it else finding)
+    return tuple(told)
+
+
+def beside_outliers(findings: Sequence[SourceFinding], outliers: Sequence[Outlier]) -> tuple[SourceFinding, ...]:
+    """Findings where a ball or bar that was set free might be one of the sources as well: neither is sure then."""
+    told = []
+    for finding in findings:
+        alike = tuple(SOURCE_OF[o.kind] for o in outliers if finding.name in o.alike)
+        if alike and finding.verdict in {Verdict.RULED_OUT, Verdict.NOT_TESTABLE}:
+            text = f"These tests cannot tell it from {', '.join(alike)}."
+            told.append(replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text))
+        else:
+            told.append(finding)
     return tuple(told)
 
 

@@ -8,6 +8,7 @@ current.
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
@@ -170,6 +171,12 @@ class Parameter:
     meaning: str
     shape: tuple[float, ...] = ()
     tolerance: float | None = None
+
+    @property
+    def strut(self) -> int | None:
+        """Strut that it is of, 1 to 6, as `strut_3_um` and `joint_3_x_mm` say; None where it is of none."""
+        named = re.match(r"(?:strut|joint)_([1-6])_", self.name)
+        return int(named.group(1)) if named else None
 
 
 @dataclass(frozen=True)

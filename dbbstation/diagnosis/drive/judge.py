@@ -11,9 +11,9 @@ from dbbstation.diagnosis.drive.design import BASE
 from dbbstation.diagnosis.drive.findings import DriveFinding, Rest
 from dbbstation.diagnosis.drive.fit import fit, term_of
 from dbbstation.diagnosis.findings import Value, Verdict
-from dbbstation.diagnosis.verdicts import AS_GOOD, NAMED_EXPLAINS, SHAPE_THRESHOLD, testable
+from dbbstation.diagnosis.verdicts import NAMED_EXPLAINS, SHAPE_THRESHOLD, testable
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.race import worth_of
+from dbbstation.inference.race import AS_GOOD, worth_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

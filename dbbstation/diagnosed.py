@@ -51,6 +51,7 @@ def diagnose_sessions(
     exclude: Sequence[str],
     say: Callable[[str], None],
     known: Mapping[str, ErrorSource] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosed:
     """Read sessions of one machine and find what a kinematic calibration of them leaves out.
 
@@ -58,8 +59,9 @@ def diagnose_sessions(
         paths: session folders or session files.
         candidates: names of the error sources to look for; all that are known if None.
         exclude: names of tests to leave out.
-        say: told what was noticed in the files and what is being done.
+        say: told what was noticed in the files.
         known: every error source by name; those of the package if None.
+        progress: told each stage of the work as it begins.
 
     Raises:
         InputError: faults of files and traces.
@@ -76,5 +78,5 @@ def diagnose_sessions(
     for warning in recorded.warnings:
         say(f"note: {warning}")
     usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
-    found = diagnose(recorded.machine, recorded.observations, usable, lambda text: say(f"... {text}"))
+    found = diagnose(recorded.machine, recorded.observations, usable, progress)
     return Diagnosed(recorded, found, lacking)

@@ -16,6 +16,16 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.diagnosis.unexplained_model import Kept
 
+STAGES = {
+    "kinematic calibration": 0,
+    "candidates": 10,
+    "joint fit": 45,
+    "verdicts": 75,
+    "held-out tests": 77,
+    "next test": 80,
+}
+"""Stages that a diagnosis tells, and how much of its time has passed about then [%]; joint fits are none or several."""
+
 
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
@@ -61,6 +71,7 @@ def diagnose(
     from dbbstation.calibration.summary import calibration_summary, identified_model
     from dbbstation.cli.calibrate import ELSEWHERE_IN_MODEL
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.diagnosed import diagnose_sessions
     from dbbstation.files.atomic import refuse_existing, write_bytes
@@ -72,7 +83,9 @@ def diagnose(
     for path in filter(None, (out, figure)):
         refuse_existing(path, force=force)
     candidates = [name.strip() for name in sources.split(",")] if sources else None
-    diagnosed = diagnose_sessions(sessions, candidates, exclude, say, every_source(source_files))
+    known = every_source(source_files)
+    with stage_bar("diagnosis", STAGES, plain=as_json) as progress:
+        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress)
     found, summary = diagnosed.diagnosis, diagnosed.summary()
     if out is not None:
         unnamed = _kept(found) if keep_unexplained else None

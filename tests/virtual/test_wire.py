@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import statistics
 import time
 from itertools import pairwise
@@ -17,6 +16,7 @@ from dbbstation.instrument.library import load_instrument
 from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock
 from tests.instrument.leaks import nothing_left_open
+from tests.virtual.clocks import HandClock, LeapingClock
 
 if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
@@ -45,44 +45,63 @@ def test_the_display_answers_byte_for_byte(pty: bool) -> None:  # noqa: FBT001 (
 
 
 def test_the_display_takes_its_time() -> None:
-    with VirtualInstrument(ND, lambda _: 150.0) as virtual, serial.Serial(virtual.port, 9600, timeout=1) as port:
-        asked_s = time.monotonic()
+    """Request 1.1458 ms, latency 51 ms, then 17 characters of 1.1458 ms."""
+    clock = HandClock()
+    with (
+        VirtualInstrument(ND, lambda _: 150.0, clock=clock) as virtual,
+        serial.Serial(virtual.port, 9600, timeout=1) as port,
+    ):
         port.write(b"\x02")
-        port.read(1)
-        first_s = time.monotonic() - asked_s
-        port.read(16)
-        last_s = time.monotonic() - asked_s
-    # Request 1.15 ms, latency 51 ms, then 17 characters of 1.15 ms. A loaded computer may be later, and then hands over
-    # the last few characters at once: up to four of them have been seen to come early.
-    assert first_s > 0.0525
-    assert last_s > 0.0714 - 4 * 0.00115
-    assert last_s - first_s > 0.010
+        give_up_s = time.monotonic() + 10.0
+        while not virtual._outgoing and time.monotonic() < give_up_s:
+            time.sleep(0.001)
+        came = b""
+        for now_s, characters in ((0.0532, 0), (0.0534, 1), (0.0631, 9), (0.0716, 16), (0.0718, 17)):
+            clock.now_s = now_s
+            came += port.read(characters - len(came))
+            assert len(came) == characters
+            port.timeout = 0.03
+            assert port.read(1) == b""
+            port.timeout = 1
+    assert came == b"+  150.0000    \r\n"
 
 
-@pytest.mark.parametrize(("scale", "slack"), [(1.0, 0.25), (10.0, 0.6)])
-def test_fourteen_readings_per_second_at_9600_baud(scale: float, slack: float) -> None:
-    clock = ScaledClock(scale)
+def test_fourteen_readings_per_second_at_9600_baud() -> None:
+    """The request and the 17 characters of its answer have 11 bits each, the display takes 51 ms between them."""
+    clock = LeapingClock()
     with (
         VirtualInstrument(ND, lambda _: 150.0, clock=clock) as virtual,
         Instrument(ND, virtual.port, clock=clock) as driver,
     ):
-        times_s = [reading.t_s for reading in driver.readings(1 + round(10 * min(scale, 4)))]
-    # The median, because a loaded computer wakes late now and then.
-    rate_hz = 1.0 / statistics.median(later - earlier for earlier, later in pairwise(times_s))
-    assert 13.97 * (1 - slack) < rate_hz < 14.0
+        times_s = [reading.t_s for reading in driver.readings(41)]
+    assert 40 / (times_s[-1] - times_s[0]) == pytest.approx(1.0 / (0.051 + 18 * 11 / 9600), rel=1e-4)
+
+
+@pytest.mark.parametrize("scale", [1.0, 10.0])
+def test_no_faster_than_the_line_on_scaled_time(scale: float) -> None:
+    clock = ScaledClock(scale)
+    with (
+        VirtualInstrument(ND, lambda t_s: 100.0 + t_s, clock=clock) as virtual,
+        Instrument(ND, virtual.port, clock=clock) as driver,
+    ):
+        taken_s = [reading.length_mm for reading in driver.readings(1 + round(10 * min(scale, 4)))]
+    # How much slower is up to the computer.
+    assert all(later - earlier > 1.0 / 14.0 for earlier, later in pairwise(taken_s))
 
 
 @LINES
 def test_the_stream_loses_nothing(pty: bool) -> None:  # noqa: FBT001 (a parameter of the test)
     clock = ScaledClock(10)
+    # The length tells by the instrument's clock when it was taken, whenever the computer gets round to reading it.
     with (
-        VirtualInstrument(ENCODER, math.sin, clock=clock, pty=pty) as virtual,
+        VirtualInstrument(ENCODER, lambda t_s: 100.0 + t_s, clock=clock, pty=pty) as virtual,
         Instrument(ENCODER, virtual.port, clock=clock) as driver,
     ):
         readings = list(driver.readings(2500))
     assert driver.tally.lost == driver.tally.garbage_bytes == 0
-    rate_hz = (len(readings) - 1) / (readings[-1].t_s - readings[0].t_s)
-    assert rate_hz == pytest.approx(250.0, rel=0.05)
+    assert [one.length_mm - readings[0].length_mm for one in readings] == pytest.approx(
+        [n / 250.0 for n in range(2500)], abs=2e-5
+    )
     assert [(one.counter - readings[0].counter) % 100_000 for one in readings] == list(range(2500))
 
 
@@ -112,12 +131,12 @@ def test_nobody_listening_is_no_backlog() -> None:
 def test_other_baud_rates_are_other_speeds() -> None:
     assert ND.fastest_hz(1200) < ND.fastest_hz() < ND.fastest_hz(38400) < 20
     with (
-        VirtualInstrument(ENCODER, lambda _: 1.0, baud=9600) as virtual,
+        VirtualInstrument(ENCODER, lambda t_s: 100.0 + t_s, baud=9600) as virtual,
         Instrument(ENCODER, virtual.port, baud=9600) as driver,
     ):
-        times_s = [reading.t_s for reading in driver.readings(20)]
+        taken_s = [reading.length_mm for reading in driver.readings(20)]
     # 21 characters of 10 bits: the line carries 45.7 lines per second, not 250.
-    assert 19 / (times_s[-1] - times_s[0]) == pytest.approx(45.7, rel=0.1)
+    assert 19 / (taken_s[-1] - taken_s[0]) == pytest.approx(9600 / 210, rel=1e-3)
 
 
 def test_an_error_in_the_length_comes_out() -> None:

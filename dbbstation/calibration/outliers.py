@@ -87,6 +87,8 @@ class Outlier:
         sure: False where a badly seated ball cannot be told from a wrong CMM row: it was put up once only.
         uncertainty_um: standard uncertainty of the size; None for a run [µm].
         alike: error sources that would explain the recordings about as well in its place.
+        freed: names of the mountings that may stand anywhere, or of the session whose bar may have any length.
+        why: end of the text, what it may come from.
     """
 
     kind: Kind
@@ -98,6 +100,8 @@ class Outlier:
     sure: bool = True
     uncertainty_um: float | None = None
     alike: tuple[str, ...] = ()
+    freed: tuple[str, ...] = ()
+    why: str = ""
 
 
 def calibrate_robust(
@@ -297,34 +301,15 @@ def free_ball(fit: Fit, runs: Sequence[Observation], mounting: str, seats: Seque
     together = bool(alike) and all(_same(seat, worst) for seat in alike)
     names = {worst.mounting} | ({seat.mounting for seat in alike} if together else set())
     freed = [_freed(run) if run.setup.mounting in names else run for run in runs]
-    again = fit(freed)
-    seat = next(seat for seat in seats_of(again) if seat.mounting == worst.mounting)
-    shift = seat.shift_mm
-    of = [run for run in runs if run.setup.mounting in names]
-    which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {_tests(of)}"
-    where = f"the ball {which} stands {_towards(shift)} from its place"
     if together:
-        what = f"{where}, in all {len(names)} mountings alike: its CMM row, or it is another ball or holder"
+        why = f", in all {len(names)} mountings alike: its CMM row, or it is another ball or holder"
     elif alike:
-        what = f"{where}, but not when it was put up again: badly seated"
+        why = ", but not when it was put up again: badly seated"
     else:
-        what = f"{where}: badly seated, or its CMM row is wrong; put it up again to tell"
-    distance = float(np.hypot(*shift[:2]))
-    along = shift[:2] / max(distance, 1e-12)
-    return (
-        Outlier(
-            kind=Kind.BALL if together else Kind.MOUNTING,
-            test=of[0].test,
-            run=", ".join(run.label for run in of),
-            size_um=1e3 * distance,
-            shift_um=_um(shift),
-            text=what,
-            sure=bool(alike),
-            uncertainty_um=1e3 * float(np.sqrt(along @ seat.spread_mm2[:2, :2] @ along)),
-        ),
-        freed,
-        again,
-    )
+        why = ": badly seated, or its CMM row is wrong; put it up again to tell"
+    kind = Kind.BALL if together else Kind.MOUNTING
+    again = fit(freed)
+    return _ball(again, kind, (mounting, *sorted(names - {mounting})), why, sure=bool(alike)), freed, again
 
 
 def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
@@ -339,29 +324,64 @@ def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
         What was found, the runs without its pull, and their fit.
     """
     of = [run for run in runs if run.setup.session == session]
-    stated = of[0].setup.bar_uncertainty_mm
+    why = f", and ± {1e3 * of[0].setup.bar_uncertainty_mm:.2f} was stated: put it on its calibrator again"
     freed = [
         replace(run, setup=replace(run.setup, bar_uncertainty_mm=UNKNOWN_BAR_MM)) if run in of else run for run in runs
     ]
     again = fit(freed)
-    term = next(t for t in again.layout.terms if (t.source.name, t.shared) == ("bar-offset", session))
-    column = term.columns.start
-    offset, sigma = again.x[column], np.sqrt(again.solution.covariance[column, column])
-    longer = "long" if offset > 0.0 else "short"
-    text = (
-        f"the bar of {session} reads {1e3 * abs(offset):.2f} ± {1e3 * sigma:.2f} µm too {longer}, and ± "
-        f"{1e3 * stated:.2f} was stated: put it on its calibrator again"
+    return _bar(again, session, why), freed, again
+
+
+def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
+    """What was set free as another fit finds it, such as one with the physics that pulled it; others as they are."""
+    if outlier.kind is Kind.BAR:
+        found = _bar(calibration, outlier.freed[0], outlier.why)
+    elif outlier.freed:
+        found = _ball(calibration, outlier.kind, outlier.freed, outlier.why, sure=outlier.sure)
+    else:
+        return outlier
+    return replace(found, alike=outlier.alike)
+
+
+def _ball(calibration: Calibration, kind: Kind, freed: tuple[str, ...], why: str, *, sure: bool) -> Outlier:
+    """A ball that may stand anywhere, as a fit finds it in the first of its mountings."""
+    seat = next(seat for seat in seats_of(calibration) if seat.mounting == freed[0])
+    of = [run for run in calibration.observations if run.setup.mounting in freed]
+    which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {_tests(of)}"
+    distance = float(np.hypot(*seat.shift_mm[:2]))
+    along = seat.shift_mm[:2] / max(distance, 1e-12)
+    return Outlier(
+        kind=kind,
+        test=of[0].test,
+        run=", ".join(run.label for run in of),
+        size_um=1e3 * distance,
+        shift_um=_um(seat.shift_mm),
+        text=f"the ball {which} stands {_towards(seat.shift_mm)} from its place{why}",
+        sure=sure,
+        uncertainty_um=1e3 * float(np.sqrt(along @ seat.spread_mm2[:2, :2] @ along)),
+        freed=freed,
+        why=why,
     )
-    outlier = Outlier(
+
+
+def _bar(calibration: Calibration, session: str, why: str) -> Outlier:
+    """A bar that may have any length, as a fit finds it."""
+    terms = {(term.source.name, term.shared): term for term in calibration.layout.terms}
+    column = terms["bar-offset", session].columns.start
+    offset = 1e3 * float(calibration.x[column])
+    sigma = 1e3 * float(np.sqrt(calibration.solution.covariance[column, column]))
+    longer = "long" if offset > 0.0 else "short"
+    return Outlier(
         kind=Kind.BAR,
         test=session,
         run="all runs",
-        size_um=1e3 * float(offset),
+        size_um=offset,
         shift_um=None,
-        text=text,
-        uncertainty_um=1e3 * float(sigma),
+        text=f"the bar of {session} reads {abs(offset):.2f} ± {sigma:.2f} µm too {longer}{why}",
+        uncertainty_um=sigma,
+        freed=(session,),
+        why=why,
     )
-    return outlier, freed, again
 
 
 UNKNOWN_BAR_MM = 0.1

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration
+from dbbstation.calibration.outliers import beside
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
 from dbbstation.diagnosis.locate import locate, strut_contributions
@@ -91,7 +92,7 @@ def diagnose(
         before=before,
         after=after,
         held_out=predicted,
-        outliers=outliers,
+        outliers=tuple(beside(outlier, after) for outlier in outliers),
         workspace=elsewhere,
         locations=_locations(before, after, found, first, rest.finding.variable) if mismatch else (),
         sources=findings,

@@ -1,4 +1,4 @@
-"""The channel of bar readings as the inference sees it: blocks of columns for base, named sources and shapes."""
+"""The channel of bar readings as the inference sees it: blocks of columns for base and named sources."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM
-from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Ranges, Shape, ranges, shapes, strongest_waves, variables
 from dbbstation.inference.race import Candidate, Race, Variant
 from dbbstation.inference.square_root import Block, Columns, compress, joined
 from dbbstation.trace.average import averaged, means, sector_of
@@ -48,9 +47,7 @@ class Channel:
         held: base directions at nominal.
         columns: number of all columns.
         named: sources that have a name, as candidates.
-        unnamed: shapes, as candidates; their names are `variable | strut | form`.
         residual_mm: per run, what the base fit leaves, measurement's effects included [mm].
-        extent: of the variables that shapes are curves of.
     """
 
     observations: tuple[Observation, ...]
@@ -59,9 +56,7 @@ class Channel:
     held: NDArray[np.float64]
     columns: int
     named: tuple[Candidate, ...]
-    unnamed: tuple[Candidate, ...]
     residual_mm: tuple[NDArray[np.float64], ...]
-    extent: Ranges
 
     @cached_property
     def joined(self) -> Block:
@@ -86,7 +81,7 @@ class Channel:
     def known(self) -> Columns:
         """Priors and scales of all columns; amplitudes of candidates are random with their plausible sizes."""
         prior = np.concatenate([self.base.prior, np.full(self.columns - len(self.base.prior), np.inf)])
-        for candidate in (*self.named, *self.unnamed):
+        for candidate in self.named:
             for variant in candidate.variants:
                 prior[variant.columns] = variant.plausible
         more = self.columns - len(self.base.prior)
@@ -106,54 +101,46 @@ def thinned(observation: Observation) -> Observation:
 
 
 def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Channel:
-    """Lay out base, sources and shapes over a calibrated set of runs.
+    """Lay out base and sources over a calibrated set of runs.
 
     Args:
         calibration: the base model, fitted; its runs as thinned.
         sources: named candidates; each must be given what it needs by every run.
     """
-    layout, machine = calibration.layout, calibration.layout.machine
-    observations = calibration.observations
-    motions = [observation.motion() for observation in observations]
-    extent = ranges(motions, machine)
-    model = calibration.model
-    count = len(layout.known.prior)
-    book = _Book(count)
+    machine, model = calibration.layout.machine, calibration.model
+    motions = [observation.motion() for observation in calibration.observations]
+    book = _Book(len(calibration.layout.known.prior))
     readings = [model.bar(motion) for motion in motions]
-    left = [o.raw.length_mm - reading.length_mm for o, reading in zip(observations, readings, strict=True)]
-    waves = strongest_waves(
-        left,
-        [r.sensitivity.response.per_strut[m.kept] for r, m in zip(readings, motions, strict=True)],
-        [variables(m, machine)["strut-length"][m.kept] for m in motions],
-    )
-    blocks = []
-    for motion, reading, residual in zip(motions, readings, left, strict=True):
-        terms = [term for term in layout.terms if term.acts_on(motion)]
-        pieces = [reading.by_source(term.source, machine, calibration.x[term.columns]) for term in terms]
-        columns = [np.r_[term.columns] for term in terms]
+    left, blocks = [], []
+    for observation, motion, reading in zip(calibration.observations, motions, readings, strict=True):
+        numbers, jacobian = base_columns(calibration, motion, reading)
+        left.append(observation.raw.length_mm - reading.length_mm)
+        columns, pieces = [numbers], [jacobian]
         for source in sources:
-            for numbers, piece in _source_columns(source, motion, machine, reading, book):
-                columns.append(numbers)
+            for own, piece in _source_columns(source, motion, machine, reading, book):
+                columns.append(own)
                 pieces.append(piece)
-        for shape in shapes(motion, machine, extent, waves):
-            columns.append(book.shape(shape))
-            pieces.append(reading.by_parameters(shape.columns))
-        numbers = np.concatenate(columns)
-        jacobian = np.hstack(pieces)
-        base = numbers < count
-        target = residual + jacobian[:, base] @ (calibration.x - layout.nominal)[numbers[base]]
-        blocks.append(compress(numbers, jacobian, target))
+        target = left[-1] + jacobian @ (calibration.x - calibration.layout.nominal)[numbers]
+        blocks.append(compress(np.concatenate(columns), np.hstack(pieces), target))
     return Channel(
-        observations=observations,
+        observations=calibration.observations,
         blocks=tuple(blocks),
-        layout=layout,
+        layout=calibration.layout,
         held=calibration.solution.held,
         columns=book.count,
-        named=book.candidates(named=True),
-        unnamed=book.candidates(named=False),
+        named=book.candidates(),
         residual_mm=tuple(left),
-        extent=extent,
     )
+
+
+def base_columns(
+    calibration: Calibration, motion: Motion, reading: BarReading
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Numbers and values of the columns of a fit that act on one run, shapes (k,) and (n, k)."""
+    machine = calibration.layout.machine
+    terms = [term for term in calibration.layout.terms if term.acts_on(motion)]
+    pieces = [reading.by_source(term.source, machine, calibration.x[term.columns]) for term in terms]
+    return np.concatenate([np.r_[term.columns] for term in terms]), np.hstack(pieces)
 
 
 def _source_columns(
@@ -184,7 +171,6 @@ class _Book:
         self._sources: dict[
             tuple[str, tuple[float, ...]], dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
         ] = {}
-        self._shapes: dict[tuple[str, int | None, str], tuple[NDArray[np.int64], float | None]] = {}
 
     def source(
         self, source: ErrorSource, shared: str, shape: tuple[float, ...], prior: NDArray[np.float64]
@@ -195,28 +181,15 @@ class _Book:
             sets[shared] = (self._new(len(prior)), prior)
         return sets[shared][0]
 
-    def shape(self, shape: Shape) -> NDArray[np.int64]:
-        """Columns of a shape."""
-        key = (shape.variable, shape.strut, shape.form)
-        if key not in self._shapes:
-            self._shapes[key] = (self._new(shape.count), shape.wave)
-        return self._shapes[key][0]
-
-    def candidates(self, *, named: bool) -> tuple[Candidate, ...]:
+    def candidates(self) -> tuple[Candidate, ...]:
         """Return the candidates with their variants."""
         variants: dict[str, list[Variant]] = {}
-        if named:
-            for (name, form), sets in self._sources.items():
-                columns = np.concatenate([columns for columns, _ in sets.values()])
-                prior = np.concatenate([prior for _, prior in sets.values()])
-                usual = Variant(columns, prior, form)
-                sizes = SIZES if len(columns) >= MANY else SIZES[:1]
-                variants.setdefault(name, []).extend(usual.scaled(size) for size in sizes)
-        else:
-            for (variable, strut, _), (columns, wave) in self._shapes.items():
-                form = () if wave is None else (wave,)
-                prior = np.full(len(columns), PLAUSIBLE_MM)
-                variants.setdefault(f"{variable} | {strut or ''}", []).append(Variant(columns, prior, form))
+        for (name, form), sets in self._sources.items():
+            columns = np.concatenate([columns for columns, _ in sets.values()])
+            prior = np.concatenate([prior for _, prior in sets.values()])
+            usual = Variant(columns, prior, form)
+            sizes = SIZES if len(columns) >= MANY else SIZES[:1]
+            variants.setdefault(name, []).extend(usual.scaled(size) for size in sizes)
         return tuple(Candidate(name, tuple(forms)) for name, forms in variants.items())
 
     def _new(self, size: int) -> NDArray[np.int64]:

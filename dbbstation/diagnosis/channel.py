@@ -1,4 +1,4 @@
-"""The channel of bar readings as the inference sees it: blocks of columns for base, named sources and shapes."""
+"""The channel of bar readings as the inference sees it: blocks of columns for base and named sources."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM
 from dbbstation.calibration.scatter import LEAST_STATED_MM
-from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Ranges, Shape, ranges, shapes, strongest_waves, variables
 from dbbstation.inference.race import Candidate, Race, Variant
 from dbbstation.inference.square_root import Block, Columns, compress, joined
 from dbbstation.trace.average import averaged, means, sector_of
@@ -56,9 +55,7 @@ class Channel:
         columns: number of all columns.
         named: sources that have a name, as candidates.
         set_up: balls and bars that are off by far more than stated, as candidates: a variant for each of them.
-        unnamed: shapes, as candidates; their names are `variable | strut | form`.
         residual_mm: per run, what the base fit leaves, measurement's effects included [mm].
-        extent: of the variables that shapes are curves of.
     """
 
     observations: tuple[Observation, ...]
@@ -68,9 +65,7 @@ class Channel:
     columns: int
     named: tuple[Candidate, ...]
     set_up: tuple[Candidate, ...]
-    unnamed: tuple[Candidate, ...]
     residual_mm: tuple[NDArray[np.float64], ...]
-    extent: Ranges
 
     @cached_property
     def joined(self) -> Block:
@@ -95,7 +90,7 @@ class Channel:
     def known(self) -> Columns:
         """Priors and scales of all columns; amplitudes of candidates are random with their plausible sizes."""
         prior = np.concatenate([self.base.prior, np.full(self.columns - len(self.base.prior), np.inf)])
-        for candidate in (*self.named, *self.set_up, *self.unnamed):
+        for candidate in (*self.named, *self.set_up):
             for variant in candidate.variants:
                 prior[variant.columns] = variant.plausible
         more = self.columns - len(self.base.prior)
@@ -115,65 +110,47 @@ def thinned(observation: Observation) -> Observation:
 
 
 def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Channel:
-    """Lay out base, sources and shapes over a calibrated set of runs.
+    """Lay out base and sources over a calibrated set of runs.
 
     Args:
         calibration: the base model, fitted; its runs as thinned.
         sources: named candidates; each must be given what it needs by every run.
     """
-    layout, machine = calibration.layout, calibration.layout.machine
-    observations = calibration.observations
-    motions = [observation.motion() for observation in observations]
-    extent = ranges(motions, machine)
-    model = calibration.model
-    count = len(layout.known.prior)
-    book = _Book(count)
+    machine, model = calibration.layout.machine, calibration.model
+    motions = [observation.motion() for observation in calibration.observations]
+    book = _Book(len(calibration.layout.known.prior))
     readings = [model.bar(motion) for motion in motions]
-    left = [o.raw.length_mm - reading.length_mm for o, reading in zip(observations, readings, strict=True)]
-    waves = strongest_waves(
-        left,
-        [r.sensitivity.response.per_strut[m.kept] for r, m in zip(readings, motions, strict=True)],
-        [variables(m, machine)["strut-length"][m.kept] for m in motions],
-    )
-    outsize = _outsize(layout, observations)
-    blocks = []
-    for motion, reading, residual in zip(motions, readings, left, strict=True):
-        terms = [term for term in layout.terms if term.acts_on(motion)]
-        pieces = [reading.by_source(term.source, machine, calibration.x[term.columns]) for term in terms]
-        columns = [np.r_[term.columns] for term in terms]
-        for term, piece in list(zip(terms, pieces, strict=True)):
-            seen = outsize.get((term.source.name, term.shared))
-            if seen is not None:
-                columns.append(book.set_up(term, OUTSIZE * layout.known.prior[term.columns][:seen]))
-                pieces.append(piece[:, :seen])
+    outsize = _outsize(calibration.layout, calibration.observations)
+    left, blocks = [], []
+    for observation, motion, reading in zip(calibration.observations, motions, readings, strict=True):
+        numbers, jacobian = base_columns(calibration, motion, reading)
+        left.append(observation.raw.length_mm - reading.length_mm)
+        columns, pieces = [numbers], [jacobian]
+        for term, seen in outsize:
+            if term.acts_on(motion):
+                own = np.arange(term.columns.start, term.columns.start + seen)
+                columns.append(book.set_up(term, OUTSIZE * calibration.layout.known.prior[own]))
+                pieces.append(jacobian[:, np.searchsorted(numbers, own)])
         for source in sources:
-            for numbers, piece in _source_columns(source, motion, machine, reading, book):
-                columns.append(numbers)
+            for own, piece in _source_columns(source, motion, machine, reading, book):
+                columns.append(own)
                 pieces.append(piece)
-        for shape in shapes(motion, machine, extent, waves):
-            columns.append(book.shape(shape))
-            pieces.append(reading.by_parameters(shape.columns))
-        numbers = np.concatenate(columns)
-        jacobian = np.hstack(pieces)
-        base = numbers < count
-        target = residual + jacobian[:, base] @ (calibration.x - layout.nominal)[numbers[base]]
-        blocks.append(compress(numbers, jacobian, target))
+        target = left[-1] + jacobian @ (calibration.x - calibration.layout.nominal)[numbers]
+        blocks.append(compress(np.concatenate(columns), np.hstack(pieces), target))
     return Channel(
-        observations=observations,
+        observations=calibration.observations,
         blocks=tuple(blocks),
-        layout=layout,
+        layout=calibration.layout,
         held=calibration.solution.held,
         columns=book.count,
-        named=book.candidates(named=True),
+        named=book.candidates(),
         set_up=book.of_the_set_up(),
-        unnamed=book.candidates(named=False),
         residual_mm=tuple(left),
-        extent=extent,
     )
 
 
-def _outsize(layout: Layout, observations: Sequence[Observation]) -> dict[tuple[str, str], int]:
-    """Random effects that may be larger than stated, by source and set, and how many of their parameters runs see.
+def _outsize(layout: Layout, observations: Sequence[Observation]) -> list[tuple[Term, int]]:
+    """Random effects that may be larger than stated, as terms, and how many of their parameters runs see.
 
     A level bar does not see the height of its ball. A ball that was put up once only is no other matter than its
     mounting, and one that was set free may stand anywhere as it is.
@@ -181,14 +158,24 @@ def _outsize(layout: Layout, observations: Sequence[Observation]) -> dict[tuple[
     setups = [observation.setup for observation in observations]
     put_up = {ball: {s.mounting for s in setups if s.ball == ball} for ball in {s.ball for s in setups}}
     raised = {o.setup.mounting for o in observations if o.raw.circle.elevation_deg != 0.0}
-    found = {}
+    found = []
     for term in layout.terms:
         name, stated = term.source.name, layout.known.prior[term.columns]
         mountings = put_up.get(term.shared, set()) if name == "ball-coordinate" else {term.shared}
         once = name == "ball-coordinate" and len(mountings) == 1
         if name in SET_UP and not once and np.all(stated < LEAST_STATED_MM):
-            found[name, term.shared] = min(len(stated), 3 if mountings & raised else 2)
+            found.append((term, min(len(stated), 3 if mountings & raised else 2)))
     return found
+
+
+def base_columns(
+    calibration: Calibration, motion: Motion, reading: BarReading
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Numbers and values of the columns of a fit that act on one run, shapes (k,) and (n, k)."""
+    machine = calibration.layout.machine
+    terms = [term for term in calibration.layout.terms if term.acts_on(motion)]
+    pieces = [reading.by_source(term.source, machine, calibration.x[term.columns]) for term in terms]
+    return np.concatenate([np.r_[term.columns] for term in terms]), np.hstack(pieces)
 
 
 def _source_columns(
@@ -237,7 +224,6 @@ class _Book:
         self._sources: dict[
             tuple[str, tuple[float, ...]], dict[str, tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]
         ] = {}
-        self._shapes: dict[tuple[str, int | None, str], tuple[NDArray[np.int64], float | None]] = {}
         self._set_up: dict[str, dict[str, Variant]] = {}
 
     def source(
@@ -261,27 +247,14 @@ class _Book:
         """Return balls and bars as candidates."""
         return tuple(Candidate(name, tuple(sets.values())) for name, sets in self._set_up.items())
 
-    def shape(self, shape: Shape) -> NDArray[np.int64]:
-        """Columns of a shape."""
-        key = (shape.variable, shape.strut, shape.form)
-        if key not in self._shapes:
-            self._shapes[key] = (self._new(shape.count), shape.wave)
-        return self._shapes[key][0]
-
-    def candidates(self, *, named: bool) -> tuple[Candidate, ...]:
+    def candidates(self) -> tuple[Candidate, ...]:
         """Return the candidates with their variants."""
         variants: dict[str, list[Variant]] = {}
-        if named:
-            for (name, form), sets in self._sources.items():
-                columns = np.concatenate([columns for columns, _, _ in sets.values()])
-                prior = np.concatenate([prior for _, prior, _ in sets.values()])
-                struts = np.concatenate([struts for _, _, struts in sets.values()])
-                variants.setdefault(name, []).extend(_forms(Variant(columns, prior, form), struts))
-        else:
-            for (variable, strut, _), (columns, wave) in self._shapes.items():
-                form = () if wave is None else (wave,)
-                prior = np.full(len(columns), PLAUSIBLE_MM)
-                variants.setdefault(f"{variable} | {strut or ''}", []).append(Variant(columns, prior, form))
+        for (name, form), sets in self._sources.items():
+            columns = np.concatenate([columns for columns, _, _ in sets.values()])
+            prior = np.concatenate([prior for _, prior, _ in sets.values()])
+            struts = np.concatenate([struts for _, _, struts in sets.values()])
+            variants.setdefault(name, []).extend(_forms(Variant(columns, prior, form), struts))
         return tuple(Candidate(name, tuple(forms)) for name, forms in variants.items())
 
     def _new(self, size: int) -> NDArray[np.int64]:

@@ -15,8 +15,9 @@ from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
 from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.naming import MOST_SOURCES, THRESHOLD, Round, best_look
 from dbbstation.diagnosis.next_test import propose
+from dbbstation.diagnosis.unexplained import unexplained
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
-from dbbstation.diagnosis.verdicts import beside_outliers, crowded, doubted, judge, testable, unexplained
+from dbbstation.diagnosis.verdicts import beside_outliers, crowded, doubted, judge, testable
 from dbbstation.diagnosis.workspace import WorkspaceError, workspace_error
 from dbbstation.errors import ModelError
 from dbbstation.inference.held_out import HeldOut, held_out
@@ -33,8 +34,8 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
-SIGNIFICANT = 1e-3
-"""Probability below which a misfit counts as one."""
+SIGNIFICANT = 1e-4
+"""Probability below which a misfit that no source and no curve organises counts as one."""
 
 RIVALS, DRAWS = 6, 20
 """Best sources that compete in each draw of a part of the tests, and draws."""
@@ -69,7 +70,7 @@ def diagnose(
     progress("verdicts")
     joint = channel_of(after, sources) if chosen else channel
     findings = judge(channel, settled.race, joint, settled.left.noise, chosen, by_name, after)
-    rest = unexplained(channel, joint, first, settled.left, chosen, significant=SIGNIFICANT)
+    rest = unexplained(before, after, settled.race, first, settled.left, chosen, significant=SIGNIFICANT)
     progress("held-out tests")
     if rest.overrules:
         # Nothing has a name then: what is left, and what could be asked next, is that of the base model.
@@ -83,7 +84,7 @@ def diagnose(
     findings = tuple(replace(f, stability=steady.get(f.name)) for f in findings)
     elsewhere = workspace_error(before, after) if chosen else None
     progress("next test")
-    mismatch = first.probability < SIGNIFICANT or bool(chosen) or bool(outliers)
+    mismatch = first.probability < SIGNIFICANT or bool(chosen) or bool(outliers) or rest.found
     found = [by_name[choice.candidate.name] for choice in chosen]
     return Diagnosis(
         mismatch=mismatch,

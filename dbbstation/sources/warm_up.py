@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
     from dbbstation.sources.contract import Motion
 
-TIME_CONSTANTS_S = tuple(float(f"{tau:.3g}") for tau in np.geomspace(300.0, 14400.0, 9))
-"""Time constants worth trying: five minutes to four hours, each 1.6 times the one before [s]."""
+TIME_CONSTANTS_S = tuple(float(f"{tau:.3g}") for tau in np.geomspace(300.0, 14400.0, 13))
+"""Time constants worth trying: five minutes to four hours, each 1.4 times the one before [s]."""
 
 PAUSE_S = 600.0
 """Time without a run from which on it is a pause. A ball is put up, a bar changed in less: that belongs to the work."""

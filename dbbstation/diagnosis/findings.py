@@ -168,7 +168,7 @@ class NextTest:
 
     Attributes:
         text: what to measure, in words.
-        circle: ball and bar: x_mm, y_mm, z_mm, a_deg, b_deg, elevation_deg.
+        circle: ball, bar and path: x_mm, y_mm, z_mm, a_deg, b_deg, elevation_deg, feed_mm_min, wait_s.
         source: what it is to reveal or to tell apart.
         sigma_before: standard deviation of its first amplitude now.
         sigma_after: with the test.

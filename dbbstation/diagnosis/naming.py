@@ -136,21 +136,26 @@ def _look(
         channel = channel_of(before, list(sources.values()))
         first = misfit_of(before)
         settled = _settle(channel, before, first, sources, progress)
-        if settled.off is None or len(outliers) >= MOST:
+        if settled.off is None:
             return Look(before, outliers, channel, first, settled)
-        step = _set_free(fit, before, settled.off)
-        progress(step[0].text)
+        step = _set_free(fit, before, settled.off) if len(outliers) < MOST else None
+        if step is None:
+            channel = replace(channel, set_up=())
+            return Look(before, outliers, channel, first, _settle(channel, before, first, sources, progress))
         outliers = (*outliers, replace(step[0], alike=settled.alike))
         before = step[2]
 
 
-def _set_free(fit: Fit, before: Calibration, off: Choice) -> Step:
-    """Ball or bar that may be anything from here on."""
+def _set_free(fit: Fit, before: Calibration, off: Choice) -> Step | None:
+    """Ball or bar that may be anything from here on; None where the runs cannot be fitted without knowing it."""
     runs, name = before.observations, off.variant.of
-    if off.candidate.name == "bar-offset":
-        return free_bar(fit, runs, name)
-    of_the_ball = {o.setup.mounting for o in runs if name in {o.setup.mounting, o.setup.ball}}
-    return free_ball(fit, runs, min(of_the_ball), seats_of(before))
+    try:
+        if off.candidate.name == "bar-offset":
+            return free_bar(fit, runs, name)
+        of_the_ball = {o.setup.mounting for o in runs if name in {o.setup.mounting, o.setup.ball}}
+        return free_ball(fit, runs, min(of_the_ball), seats_of(before))
+    except CalibrationError:
+        return None
 
 
 def misfit_of(calibration: Calibration) -> Misfit:

@@ -34,6 +34,9 @@ SAMPLES = 180
 TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0), (23.0, 0.0), (-23.0, 0.0), (0.0, 23.0))
 ELEVATIONS_DEG = (0.0, 10.0, -10.0)
 WAITS_S = (0.0, 3600.0)
+FEEDS = (0.5, 2.0)
+"""Of what was measured, for sources that act while the machine moves; tried on upright circles with a level bar."""
+
 MOST_PROPOSED = 3
 WORTHWHILE = 0.99
 """Share of the uncertainty that a further test must come below to be proposed."""
@@ -59,6 +62,8 @@ class Proposal:
         if self.circle.elevation_deg:
             parts.append(f"the bar raised by {self.circle.elevation_deg:g} degrees")
         parts.append("both directions")
+        if self.circle.feed_mm_min != self.observation.raw.circle.feed_mm_min:
+            parts.append(f"at {self.circle.feed_mm_min:g} mm/min")
         if self.wait_s:
             parts.append(f"{self.wait_s / 3600:.0f} h after the last run")
         return ", ".join(parts)
@@ -92,7 +97,7 @@ def propose(
             proposal,
             np.vstack([_rows(channel, asked, motion, len(wanted)) for motion in _motions(proposal, ends_s)]),
         )
-        for proposal in _proposals(channel, timed=any(Need.TIME in s.needs for s, _ in asked))
+        for proposal in _proposals(channel, frozenset[Need]().union(*(s.needs for s, _ in asked)))
     ]
     own = slice(first, first + len(variant.columns))
     found: list[NextTest] = []
@@ -131,15 +136,17 @@ def _in_words(
     a, b, _ = proposal.circle.tilt_deg
     circle = {"x_mm": x, "y_mm": y, "z_mm": z, "a_deg": a, "b_deg": b, "wait_s": proposal.wait_s}
     circle["elevation_deg"] = proposal.circle.elevation_deg
+    circle["feed_mm_min"] = proposal.circle.feed_mm_min
     return NextTest(proposal.text, circle, source.name, before * unit, after * unit, parameter.unit)
 
 
-def _proposals(channel: Channel, *, timed: bool) -> list[Proposal]:
-    """Circles about the balls of the plan at other tilts and elevations, now and later, that the machine can run."""
+def _proposals(channel: Channel, needs: frozenset[Need]) -> list[Proposal]:
+    """Circles about the balls of the plan that the machine can run: at other tilts and elevations, feeds and times."""
     seen: dict[str, Observation] = {}
     for observation in channel.observations:
         seen.setdefault(observation.setup.ball, observation)
-    waits = WAITS_S if timed else WAITS_S[:1]
+    waits = WAITS_S if Need.TIME in needs else WAITS_S[:1]
+    feeds = FEEDS if {Need.TIME, Need.PATH} <= needs else ()
     found = []
     for observation in seen.values():
         circle = observation.raw.circle
@@ -156,6 +163,11 @@ def _proposals(channel: Channel, *, timed: bool) -> list[Proposal]:
                 )
                 if _reachable(channel.machine, tried):
                     found += [Proposal(tried, wait, observation) for wait in waits]
+        upright = replace(circle, tilt_deg=(0.0, 0.0, 0.0), elevation_deg=0.0, centre_mm=(x, y, z))
+        for share in feeds:
+            tried = replace(upright, feed_mm_min=share * circle.feed_mm_min, direction=Direction.CCW)
+            if _reachable(channel.machine, tried):
+                found.append(Proposal(tried, waits[0], observation))
     return found
 
 

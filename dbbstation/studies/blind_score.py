@@ -17,7 +17,7 @@ MOST_DECLARED = 3
 """An ambiguity of more names than this is no answer."""
 
 HELD_OUT = (0.8, 1.3)
-"""Held-out residual over noise that a right model has."""
+"""Residual of left-out tests that a right model has, in units of its predicted covariance."""
 
 SIZES = ((0.0, 2.0), (2.0, 5.0), (5.0, np.inf))
 """Classes of size, in testable limits."""
@@ -51,7 +51,7 @@ class Outcome:
         quiet: none of the hidden effects is claimed at a size that it has not (for what nobody can see).
         deviations: by parameter, estimate minus truth in standard deviations, of rightly named effects.
         pulls: the same of strut lengths and base joints, where anything was named.
-        held_out: residual of left-out tests over noise, with what was found.
+        held_out: residual of left-out tests in units of their predicted covariance, with what was found.
         gain: residual of left-out tests before over after.
         said: the answer in short.
     """
@@ -170,7 +170,7 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any], candidates: S
             for key, z in _deviations(effect["amplitudes"], by_name[effect["name"]]).items()
         },
         pulls=_pulls(answer, summary),
-        held_out=after / summary["noise_um"] if summary["noise_um"] else float("nan"),
+        held_out=summary["held_out_normalised"]["after"],
         gain=before / after if after else float("nan"),
         said=_said(identified, groups, unexplained, verdict),
     )
@@ -222,7 +222,7 @@ def numbers(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "parameters_in_sigma": _spread(deviations),
         "kinematics_in_sigma": _spread(pulls),
         "held_out": {
-            "over_noise": _percentiles([o.held_out for o in right]),
+            "normalised": _percentiles([o.held_out for o in right]),
             "inside": _share(right, lambda o: HELD_OUT[0] <= o.held_out <= HELD_OUT[1]),
             "gain": _percentiles([o.gain for o in right]),
         },
@@ -236,6 +236,7 @@ _NOTHING: dict[str, Any] = {
     "unexplained": {"rms_um": 0.0, "strut": None, "variable": None},
     "locations": [],
     "held_out_rms_um": {"before": 0.0, "after": 0.0},
+    "held_out_normalised": {"before": float("nan"), "after": float("nan")},
     "noise_um": 0.0,
     "parameter_shift": [],
 }

@@ -57,6 +57,7 @@ def verdict(*identified, declared=None, mismatch=None, left=(0.0, None, None), p
         "unexplained": {"rms_um": left[0], "strut": left[1], "variable": left[2]},
         "locations": [],
         "held_out_rms_um": {"before": 4.0, "after": 0.5},
+        "held_out_normalised": {"before": 8.0, "after": 1.0},
         "noise_um": 0.5,
         "parameter_shift": [{"parameter": p, "after_um": a, "uncertainty_um": u} for p, a, u in shift],
     }

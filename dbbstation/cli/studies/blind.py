@@ -81,10 +81,10 @@ def _print(found: dict[str, Any]) -> None:
         if spread:
             share = f"{100 * spread['inside_95']:.0f} % of {spread['count']} inside their 95 % intervals"
             click.echo(f"{title}: {share}, {spread['rms']:.2f} sigma rms, worst {spread['worst']:.1f}")
-    over, gain, inside = (found["held_out"][key] for key in ("over_noise", "gain", "inside"))
+    over, gain, inside = (found["held_out"][key] for key in ("normalised", "gain", "inside"))
     if over:
         click.echo(
-            f"left-out tests, where rightly named: {over[1]:.2f} of the noise ({over[0]:.2f} to {over[2]:.2f}; "
+            f"left-out tests, where rightly named: {over[1]:.2f} of what is predicted ({over[0]:.2f} to {over[2]:.2f}; "
             f"{inside['hits']} of {inside['count']} between 0.8 and 1.3), {gain[1]:.1f} times less than before"
         )
     if found["failures"]:

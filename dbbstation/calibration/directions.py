@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 RECOGNISED = 0.02
 """Share of a known pattern that may lie outside the lost directions for it to count as lost."""
 
+ALONE = 1e-6
+"""How far below 1 a parameter's part of a direction may be for the direction to be that parameter."""
 
 SHOWS_IN_CIRCLES = 0.1
 """Part of a direction outside the drives' parameters from which it says something of circles."""
@@ -127,9 +129,12 @@ def _strut_axes(layout: Layout) -> NDArray[np.float64]:
 
 
 def _largest_parts(row: NDArray[np.float64], names: list[tuple[str, str, str]]) -> str:
-    """Describe a direction without a name by its three largest parts."""
+    """Describe a direction without a name by its three largest parts, or by the parameter that it is alone."""
     largest = np.argsort(-np.abs(row))[:3]
-    parts = [f"{row[k]:+.2f} {names[k][0]} {names[k][2].removesuffix('_mm').replace('_', ' ')}" for k in largest]
+    called = [f"{names[k][0]} {names[k][2].removesuffix('_mm').replace('_', ' ')}" for k in largest]
+    if np.abs(row[largest[0]]) > 1.0 - ALONE:
+        return called[0]
+    parts = [f"{row[k]:+.2f} {name}" for k, name in zip(largest, called, strict=True)]
     return "a combination, mostly " + ", ".join(parts)
 
 

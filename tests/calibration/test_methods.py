@@ -170,6 +170,7 @@ def test_what_no_run_depends_on_is_prescribed_itself(machine, on_jig):
     sources = [*default_sources(), known_sources()["thermal-frame"]]
     calibration = calibrate(machine, on_jig, sources, prescribe=())
     assert ("thermal-frame", "pause_loss_um_m") in calibration.prescribed
+    assert "thermal-frame pause loss um m" in calibration.directions_lost
     assert len(calibration.prescribed) == len(calibration.directions_lost)
 
 

@@ -38,6 +38,9 @@ FEEDS = (0.5, 2.0)
 """Of what was measured, for sources that act while the machine moves; tried on upright circles with a level bar."""
 
 MOST_PROPOSED = 3
+CLOSER_LOOK = 40
+"""Proposals that are looked at in both directions, beside those already chosen."""
+
 WORTHWHILE = 0.99
 """Share of the uncertainty that a further test must come below to be proposed."""
 
@@ -92,18 +95,23 @@ def propose(
     used = Columns(known.prior[wanted], known.scale[wanted], known.random[wanted])
     covariance = solve(_thin([channel.joined], wanted), used, noise_mm, channel.held).covariance
     ends_s = _ends_s(channel)
-    looked = [
-        (
-            proposal,
-            np.vstack([_rows(channel, asked, motion, len(wanted)) for motion in _motions(proposal, ends_s)]),
-        )
-        for proposal in _proposals(channel, frozenset[Need]().union(*(s.needs for s, _ in asked)))
-    ]
     own = slice(first, first + len(variant.columns))
+
+    def seen(proposal: Proposal, runs: slice) -> NDArray[np.float64]:
+        motions = _motions(proposal, ends_s)[runs]
+        return np.vstack([_rows(channel, asked, motion, len(wanted)) for motion in motions])
+
+    def left(rows: NDArray[np.float64]) -> float:
+        return _size(_told(covariance, rows, noise_mm, own), variant)
+
+    proposals = _proposals(channel, frozenset[Need]().union(*(s.needs for s, _ in asked)))
+    # One direction tells well enough which tests are worth a closer look.
+    best = sorted(((left(seen(p, slice(1))), k) for k, p in enumerate(proposals)))[:CLOSER_LOOK]
+    looked = [(proposals[k], seen(proposals[k], slice(None))) for _, k in best]
     found: list[NextTest] = []
     while looked and len(found) < most:
         before = _size(covariance[own, own], variant)
-        tried = [(_size(_told(covariance, rows, noise_mm, own), variant), k) for k, (_, rows) in enumerate(looked)]
+        tried = [(left(rows), k) for k, (_, rows) in enumerate(looked)]
         after, k = min(tried)
         if after > WORTHWHILE * before:
             break

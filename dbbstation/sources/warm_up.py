@@ -13,6 +13,8 @@ of cooling, solved for heat that is switched on and off.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -100,9 +102,13 @@ def warmed_by_constant(time_s: NDArray[np.float64], constant_s: float) -> NDArra
 
 def pauses_s(motion: Motion) -> list[tuple[float, float]]:
     """Beginning and end of every pause of the motion's session [s]."""
-    moving = () if motion.setup is None else motion.setup.moving_s
-    ends = [max(end for _, end in moving[: k + 1]) for k in range(len(moving))]
-    pairs = zip(ends, [begin for begin, _ in moving[1:]], strict=False)
+    return [] if motion.setup is None else _pauses_between(motion.setup.moving_s)
+
+
+@lru_cache(maxsize=64)
+def _pauses_between(moving_s: tuple[tuple[float, float], ...]) -> list[tuple[float, float]]:
+    ends = accumulate((end for _, end in moving_s), max)
+    pairs = zip(ends, [begin for begin, _ in moving_s[1:]], strict=False)
     return [(begin, end) for begin, end in pairs if end - begin >= PAUSE_S]
 
 

@@ -60,6 +60,17 @@ class Kind(StrEnum):
     MOVED = "moved"
     MOUNTING = "mounting"
     BALL = "ball"
+    BAR = "bar"
+
+
+SOURCE_OF = {
+    Kind.MOUNTING: "mounting",
+    Kind.MOVED: "mounting",
+    Kind.BALL: "ball-coordinate",
+    Kind.WRONG_PLACE: "ball-coordinate",
+    Kind.BAR: "bar-offset",
+}
+"""Name of the error source that is out of size; a run that is no circle of this machine is none."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +79,16 @@ class Outlier:
 
     Attributes:
         kind: what it is.
-        test: name of the test.
+        test: name of the test; of the session for a bar.
         run: label of the run, or of the runs of one putting-up.
-        size_um: how far off: rms of a run, distance of a ball from its place [µm].
+        size_um: how far off: rms of a run, distance of a ball from its place, error of a bar's length [µm].
         shift_um: where a ball stands, machine axes; None for a run [µm].
         text: what it looks like, in words.
         sure: False where a badly seated ball cannot be told from a wrong CMM row: it was put up once only.
+        uncertainty_um: standard uncertainty of the size; None for a run [µm].
+        alike: error sources that would explain the recordings about as well in its place.
+        freed: names of the mountings that may stand anywhere, or of the session whose bar may have any length.
+        why: end of the text, what it may come from.
     """
 
     kind: Kind
@@ -83,6 +98,10 @@ class Outlier:
     shift_um: tuple[float, float, float] | None
     text: str
     sure: bool = True
+    uncertainty_um: float | None = None
+    alike: tuple[str, ...] = ()
+    freed: tuple[str, ...] = ()
+    why: str = ""
 
 
 def calibrate_robust(
@@ -262,26 +281,111 @@ def _off_its_place(fit: Fit, calibration: Calibration, runs: Sequence[Observatio
     beyond = float(chdtri(worst.freedom, _TAIL))
     if worst.square < usual * beyond or np.hypot(*worst.shift_mm[:2]) < 1e-3 * LEAST_UM:
         return None
+    return free_ball(fit, runs, worst.mounting, seats)
+
+
+def free_ball(fit: Fit, runs: Sequence[Observation], mounting: str, seats: Sequence[Seat]) -> Step:
+    """Let the ball of a mounting stand anywhere, with all its other mountings if it stands alike in them.
+
+    Args:
+        fit: calibrates runs.
+        runs: all runs.
+        mounting: name of the putting-up that is off.
+        seats: of a fit of these runs.
+
+    Returns:
+        What was found, the runs without its pull, and their fit.
+    """
+    worst = next(seat for seat in seats if seat.mounting == mounting)
     alike = [seat for seat in seats if seat.ball == worst.ball and seat is not worst]
     together = bool(alike) and all(_same(seat, worst) for seat in alike)
     names = {worst.mounting} | ({seat.mounting for seat in alike} if together else set())
     freed = [_freed(run) if run.setup.mounting in names else run for run in runs]
-    again = fit(freed)
-    shift = next(seat.shift_mm for seat in seats_of(again) if seat.mounting == worst.mounting)
-    of = [run for run in runs if run.setup.mounting in names]
-    which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {_tests(of)}"
-    where = f"the ball {which} stands {_towards(shift)} from its place"
     if together:
-        what = f"{where}, in all {len(names)} mountings alike: its CMM row, or it is another ball or holder"
+        why = f", in all {len(names)} mountings alike: its CMM row, or it is another ball or holder"
     elif alike:
-        what = f"{where}, but not when it was put up again: badly seated"
+        why = ", but not when it was put up again: badly seated"
     else:
-        what = f"{where}: badly seated, or its CMM row is wrong; put it up again to tell"
-    size = 1e3 * float(np.hypot(*shift[:2]))
+        why = ": badly seated, or its CMM row is wrong; put it up again to tell"
     kind = Kind.BALL if together else Kind.MOUNTING
-    labels = ", ".join(run.label for run in of)
-    return Outlier(kind, of[0].test, labels, size, _um(shift), what, sure=bool(alike)), freed, again
+    again = fit(freed)
+    return _ball(again, kind, (mounting, *sorted(names - {mounting})), why, sure=bool(alike)), freed, again
 
+
+def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
+    """Let the bar of a session have any length.
+
+    Args:
+        fit: calibrates runs.
+        runs: all runs.
+        session: whose bar is off.
+
+    Returns:
+        What was found, the runs without its pull, and their fit.
+    """
+    of = [run for run in runs if run.setup.session == session]
+    why = f", and ± {1e3 * of[0].setup.bar_uncertainty_mm:.2f} was stated: put it on its calibrator again"
+    freed = [
+        replace(run, setup=replace(run.setup, bar_uncertainty_mm=UNKNOWN_BAR_MM)) if run in of else run for run in runs
+    ]
+    again = fit(freed)
+    return _bar(again, session, why), freed, again
+
+
+def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
+    """What was set free as another fit finds it, such as one with the physics that pulled it; others as they are."""
+    if outlier.kind is Kind.BAR:
+        found = _bar(calibration, outlier.freed[0], outlier.why)
+    elif outlier.freed:
+        found = _ball(calibration, outlier.kind, outlier.freed, outlier.why, sure=outlier.sure)
+    else:
+        return outlier
+    return replace(found, alike=outlier.alike)
+
+
+def _ball(calibration: Calibration, kind: Kind, freed: tuple[str, ...], why: str, *, sure: bool) -> Outlier:
+    """A ball that may stand anywhere, as a fit finds it in the first of its mountings."""
+    seat = next(seat for seat in seats_of(calibration) if seat.mounting == freed[0])
+    of = [run for run in calibration.observations if run.setup.mounting in freed]
+    which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {_tests(of)}"
+    distance = float(np.hypot(*seat.shift_mm[:2]))
+    along = seat.shift_mm[:2] / max(distance, 1e-12)
+    return Outlier(
+        kind=kind,
+        test=of[0].test,
+        run=", ".join(run.label for run in of),
+        size_um=1e3 * distance,
+        shift_um=_um(seat.shift_mm),
+        text=f"the ball {which} stands {_towards(seat.shift_mm)} from its place{why}",
+        sure=sure,
+        uncertainty_um=1e3 * float(np.sqrt(along @ seat.spread_mm2[:2, :2] @ along)),
+        freed=freed,
+        why=why,
+    )
+
+
+def _bar(calibration: Calibration, session: str, why: str) -> Outlier:
+    """A bar that may have any length, as a fit finds it."""
+    terms = {(term.source.name, term.shared): term for term in calibration.layout.terms}
+    column = terms["bar-offset", session].columns.start
+    offset = 1e3 * float(calibration.x[column])
+    sigma = 1e3 * float(np.sqrt(calibration.solution.covariance[column, column]))
+    longer = "long" if offset > 0.0 else "short"
+    return Outlier(
+        kind=Kind.BAR,
+        test=session,
+        run="all runs",
+        size_um=offset,
+        shift_um=None,
+        text=f"the bar of {session} reads {abs(offset):.2f} ± {sigma:.2f} µm too {longer}{why}",
+        uncertainty_um=sigma,
+        freed=(session,),
+        why=why,
+    )
+
+
+UNKNOWN_BAR_MM = 0.1
+"""Stated size of the error of a bar that nobody set on a calibrator [mm]."""
 
 _TAIL = 5.7e-7
 """Chance of a normal variable beyond `SIGMAS`."""

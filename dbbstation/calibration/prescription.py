@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from dbbstation.errors import CalibrationError
+from dbbstation.inference.square_root import ROUNDING
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
@@ -87,10 +88,11 @@ def _fitted(layout: Layout) -> list[Name]:
 
 
 def _best(fitted: Sequence[Name], lost: NDArray[np.float64]) -> list[int]:
-    """Parameters that hold the lost directions most firmly, base joints first."""
+    """Parameters that hold the lost directions most firmly, base joints first; what nothing depends on holds itself."""
     if not len(lost):
         return []
-    preferred = [k for k, (source, _) in enumerate(fitted) if source == PREFERRED]
+    unseen = np.linalg.norm(lost, axis=0) > 1.0 - ROUNDING
+    preferred = [k for k, (source, _) in enumerate(fitted) if source == PREFERRED or unseen[k]]
     candidates = preferred if len(preferred) >= len(lost) else list(range(len(fitted)))
     (_, order) = qr(lost[:, candidates], mode="r", pivoting=True)
     return sorted(candidates[k] for k in order[: len(lost)])

@@ -102,6 +102,7 @@ def outlier_summary(outlier: Outlier) -> dict[str, Any]:
         "test": outlier.test,
         "runs": outlier.run,
         "size_um": outlier.size_um,
+        "uncertainty_um": outlier.uncertainty_um,
         "shift_um": shift,
         "text": outlier.text,
     }

@@ -1,4 +1,4 @@
-"""The channel of bar readings as the inference sees it: blocks of columns for base, named sources and shapes."""
+"""The channel of bar readings as the inference sees it: blocks of columns for base and named sources."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM
-from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Ranges, Shape, ranges, shapes, strongest_waves, variables
+from dbbstation.calibration.scatter import LEAST_STATED_MM
 from dbbstation.inference.race import Candidate, Race, Variant
 from dbbstation.inference.square_root import Block, Columns, compress, joined
 from dbbstation.trace.average import averaged, means, sector_of
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
-    from dbbstation.calibration.layout import Layout
+    from dbbstation.calibration.layout import Layout, Term
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
-    from dbbstation.sources.contract import ErrorSource, Motion
+    from dbbstation.sources.contract import ErrorSource, Motion, Parameter
 
 SECTORS = 720
 """Samples per turn that a diagnosis works on, at the most: every half degree."""
@@ -32,6 +32,12 @@ SECTORS = 720
 MANY, SIZES = 6, (1.0, 0.1)
 """Amplitudes from which on a source is looked for at both sizes, in units of the plausible one: that all of many are
 small is likely when one of them is, and the plausible size alone would count it as a miracle."""
+
+SET_UP = ("mounting", "ball-coordinate", "bar-offset")
+"""Random effects of the base that may be far larger than stated."""
+
+OUTSIZE = 20.0
+"""Size of such an effect in units of the stated one, one standard deviation."""
 
 FEWEST_PER_SECTOR = 2
 """Samples per sector below which sectors are made wider."""
@@ -48,9 +54,8 @@ class Channel:
         held: base directions at nominal.
         columns: number of all columns.
         named: sources that have a name, as candidates.
-        unnamed: shapes, as candidates; their names are `variable | strut | form`.
+        set_up: balls and bars that are off by far more than stated, as candidates: a variant for each of them.
         residual_mm: per run, what the base fit leaves, measurement's effects included [mm].
-        extent: of the variables that shapes are curves of.
     """
 
     observations: tuple[Observation, ...]
@@ -59,9 +64,8 @@ class Channel:
     held: NDArray[np.float64]
     columns: int
     named: tuple[Candidate, ...]
-    unnamed: tuple[Candidate, ...]
+    set_up: tuple[Candidate, ...]
     residual_mm: tuple[NDArray[np.float64], ...]
-    extent: Ranges
 
     @cached_property
     def joined(self) -> Block:
@@ -86,7 +90,7 @@ class Channel:
     def known(self) -> Columns:
         """Priors and scales of all columns; amplitudes of candidates are random with their plausible sizes."""
         prior = np.concatenate([self.base.prior, np.full(self.columns - len(self.base.prior), np.inf)])
-        for candidate in (*self.named, *self.unnamed):
+        for candidate in (*self.named, *self.set_up):
             for variant in candidate.variants:
                 prior[variant.columns] = variant.plausible
         more = self.columns - len(self.base.prior)
@@ -106,54 +110,72 @@ def thinned(observation: Observation) -> Observation:
 
 
 def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Channel:
-    """Lay out base, sources and shapes over a calibrated set of runs.
+    """Lay out base and sources over a calibrated set of runs.
 
     Args:
         calibration: the base model, fitted; its runs as thinned.
         sources: named candidates; each must be given what it needs by every run.
     """
-    layout, machine = calibration.layout, calibration.layout.machine
-    observations = calibration.observations
-    motions = [observation.motion() for observation in observations]
-    extent = ranges(motions, machine)
-    model = calibration.model
-    count = len(layout.known.prior)
-    book = _Book(count)
+    machine, model = calibration.layout.machine, calibration.model
+    motions = [observation.motion() for observation in calibration.observations]
+    book = _Book(len(calibration.layout.known.prior))
     readings = [model.bar(motion) for motion in motions]
-    left = [o.raw.length_mm - reading.length_mm for o, reading in zip(observations, readings, strict=True)]
-    waves = strongest_waves(
-        left,
-        [r.sensitivity.response.per_strut[m.kept] for r, m in zip(readings, motions, strict=True)],
-        [variables(m, machine)["strut-length"][m.kept] for m in motions],
-    )
-    blocks = []
-    for motion, reading, residual in zip(motions, readings, left, strict=True):
-        terms = [term for term in layout.terms if term.acts_on(motion)]
-        pieces = [reading.by_source(term.source, machine, calibration.x[term.columns]) for term in terms]
-        columns = [np.r_[term.columns] for term in terms]
+    outsize = _outsize(calibration.layout, calibration.observations)
+    left, blocks = [], []
+    for observation, motion, reading in zip(calibration.observations, motions, readings, strict=True):
+        numbers, jacobian = base_columns(calibration, motion, reading)
+        left.append(observation.raw.length_mm - reading.length_mm)
+        columns, pieces = [numbers], [jacobian]
+        for term, seen in outsize:
+            if term.acts_on(motion):
+                own = np.arange(term.columns.start, term.columns.start + seen)
+                columns.append(book.set_up(term, OUTSIZE * calibration.layout.known.prior[own]))
+                pieces.append(jacobian[:, np.searchsorted(numbers, own)])
         for source in sources:
-            for numbers, piece in _source_columns(source, motion, machine, reading, book):
-                columns.append(numbers)
+            for own, piece in _source_columns(source, motion, machine, reading, book):
+                columns.append(own)
                 pieces.append(piece)
-        for shape in shapes(motion, machine, extent, waves):
-            columns.append(book.shape(shape))
-            pieces.append(reading.by_parameters(shape.columns))
-        numbers = np.concatenate(columns)
-        jacobian = np.hstack(pieces)
-        base = numbers < count
-        target = residual + jacobian[:, base] @ (calibration.x - layout.nominal)[numbers[base]]
-        blocks.append(compress(numbers, jacobian, target))
+        target = left[-1] + jacobian @ (calibration.x - calibration.layout.nominal)[numbers]
+        blocks.append(compress(np.concatenate(columns), np.hstack(pieces), target))
     return Channel(
-        observations=observations,
+        observations=calibration.observations,
         blocks=tuple(blocks),
-        layout=layout,
+        layout=calibration.layout,
         held=calibration.solution.held,
         columns=book.count,
-        named=book.candidates(named=True),
-        unnamed=book.candidates(named=False),
+        named=book.candidates(),
+        set_up=book.of_the_set_up(),
         residual_mm=tuple(left),
-        extent=extent,
     )
+
+
+def _outsize(layout: Layout, observations: Sequence[Observation]) -> list[tuple[Term, int]]:
+    """Random effects that may be larger than stated, as terms, and how many of their parameters runs see.
+
+    A level bar does not see the height of its ball. A ball that was put up once only is no other matter than its
+    mounting, and one that was set free may stand anywhere as it is.
+    """
+    setups = [observation.setup for observation in observations]
+    put_up = {ball: {s.mounting for s in setups if s.ball == ball} for ball in {s.ball for s in setups}}
+    raised = {o.setup.mounting for o in observations if o.raw.circle.elevation_deg != 0.0}
+    found = []
+    for term in layout.terms:
+        name, stated = term.source.name, layout.known.prior[term.columns]
+        mountings = put_up.get(term.shared, set()) if name == "ball-coordinate" else {term.shared}
+        once = name == "ball-coordinate" and len(mountings) == 1
+        if name in SET_UP and not once and np.all(stated < LEAST_STATED_MM):
+            found.append((term, min(len(stated), 3 if mountings & raised else 2)))
+    return found
+
+
+def base_columns(
+    calibration: Calibration, motion: Motion, reading: BarReading
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Numbers and values of the columns of a fit that act on one run, shapes (k,) and (n, k)."""
+    machine = calibration.layout.machine
+    terms = [term for term in calibration.layout.terms if term.acts_on(motion)]
+    pieces = [reading.by_source(term.source, machine, calibration.x[term.columns]) for term in terms]
+    return np.concatenate([np.r_[term.columns] for term in terms]), np.hstack(pieces)
 
 
 def _source_columns(
@@ -170,10 +192,28 @@ def _source_columns(
         if shaped:
             values[shaped] = value
         derivative = reading.by_source(source, machine, values)[:, amplitudes]
-        prior = np.array([parameters[k].plausible for k in amplitudes])
         shape = tuple(float(values[k]) for k in shaped)
-        found.append((book.source(source, source.shared_by(motion), shape, prior), derivative))
+        numbers = book.source(source, source.shared_by(motion), shape, [parameters[k] for k in amplitudes])
+        found.append((numbers, derivative))
     return found
+
+
+def _forms(whole: Variant, struts: NDArray[np.int64]) -> list[Variant]:
+    """Forms in which a source is looked for: all its amplitudes, at one size or two, and those of each strut alone.
+
+    What wears or was made badly is often one strut only; all others free beside it would hide what is faint.
+
+    Args:
+        whole: all amplitudes.
+        struts: that each amplitude is of, 0 for none, shape (p,).
+    """
+    sizes = SIZES if len(whole.columns) >= MANY else SIZES[:1]
+    forms = [whole.scaled(size) for size in sizes]
+    single = np.unique(struts)
+    if len(single) > 1:
+        of = [struts == strut for strut in single]
+        forms += [replace(whole, columns=whole.columns[own], prior=whole.prior[own]) for own in of]
+    return forms
 
 
 class _Book:
@@ -182,41 +222,39 @@ class _Book:
     def __init__(self, first: int) -> None:
         self.count = first
         self._sources: dict[
-            tuple[str, tuple[float, ...]], dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]]
+            tuple[str, tuple[float, ...]], dict[str, tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]
         ] = {}
-        self._shapes: dict[tuple[str, int | None, str], tuple[NDArray[np.int64], float | None]] = {}
+        self._set_up: dict[str, dict[str, Variant]] = {}
 
     def source(
-        self, source: ErrorSource, shared: str, shape: tuple[float, ...], prior: NDArray[np.float64]
+        self, source: ErrorSource, shared: str, shape: tuple[float, ...], amplitudes: Sequence[Parameter]
     ) -> NDArray[np.int64]:
         """Columns of one variant of a source for one set that shares its values."""
         sets = self._sources.setdefault((source.name, shape), {})
         if shared not in sets:
-            sets[shared] = (self._new(len(prior)), prior)
+            prior = np.array([p.plausible for p in amplitudes])
+            sets[shared] = (self._new(len(prior)), prior, np.array([p.strut or 0 for p in amplitudes]))
         return sets[shared][0]
 
-    def shape(self, shape: Shape) -> NDArray[np.int64]:
-        """Columns of a shape."""
-        key = (shape.variable, shape.strut, shape.form)
-        if key not in self._shapes:
-            self._shapes[key] = (self._new(shape.count), shape.wave)
-        return self._shapes[key][0]
+    def set_up(self, term: Term, prior: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Columns of a ball or bar that is off by far more than stated."""
+        sets = self._set_up.setdefault(term.source.name, {})
+        if term.shared not in sets:
+            sets[term.shared] = Variant(self._new(len(prior)), prior, of=term.shared)
+        return sets[term.shared].columns
 
-    def candidates(self, *, named: bool) -> tuple[Candidate, ...]:
+    def of_the_set_up(self) -> tuple[Candidate, ...]:
+        """Return balls and bars as candidates."""
+        return tuple(Candidate(name, tuple(sets.values())) for name, sets in self._set_up.items())
+
+    def candidates(self) -> tuple[Candidate, ...]:
         """Return the candidates with their variants."""
         variants: dict[str, list[Variant]] = {}
-        if named:
-            for (name, form), sets in self._sources.items():
-                columns = np.concatenate([columns for columns, _ in sets.values()])
-                prior = np.concatenate([prior for _, prior in sets.values()])
-                usual = Variant(columns, prior, form)
-                sizes = SIZES if len(columns) >= MANY else SIZES[:1]
-                variants.setdefault(name, []).extend(usual.scaled(size) for size in sizes)
-        else:
-            for (variable, strut, _), (columns, wave) in self._shapes.items():
-                form = () if wave is None else (wave,)
-                prior = np.full(len(columns), PLAUSIBLE_MM)
-                variants.setdefault(f"{variable} | {strut or ''}", []).append(Variant(columns, prior, form))
+        for (name, form), sets in self._sources.items():
+            columns = np.concatenate([columns for columns, _, _ in sets.values()])
+            prior = np.concatenate([prior for _, prior, _ in sets.values()])
+            struts = np.concatenate([struts for _, _, struts in sets.values()])
+            variants.setdefault(name, []).extend(_forms(Variant(columns, prior, form), struts))
         return tuple(Candidate(name, tuple(forms)) for name, forms in variants.items())
 
     def _new(self, size: int) -> NDArray[np.int64]:

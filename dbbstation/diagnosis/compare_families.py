@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.compare_noise import first_columns, of_ball
-from dbbstation.diagnosis.shapes import ranges, shapes
+from dbbstation.diagnosis.shapes import ranges, samples_of, shapes
 from dbbstation.inference.harmonics import basis
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
@@ -139,11 +139,11 @@ def _of_struts(machine: Machine, pairs: Sequence[Pair], low: int) -> list[Family
     """Errors of strut lengths, constant or with a variable, through the sensitivities of the nominal machine."""
     model = MachineModel(machine)
     motions = [_motion(pair) for pair in pairs]
-    extent = ranges(motions, machine)
-    no_waves = np.zeros((STRUTS, 0))
+    readings = [model.bar(motion) for motion in motions]
+    runs = [samples_of(motion, machine, reading) for motion, reading in zip(motions, readings, strict=True)]
+    extent = ranges(runs)
     found: dict[tuple[str, int | None], list[NDArray[np.float64]]] = {}
-    for pair, motion in zip(pairs, motions, strict=True):
-        reading = model.bar(motion)
+    for pair, run, reading in zip(pairs, runs, readings, strict=True):
         theta = np.radians(pair.theta_deg)[_order(pair)]
         towards = basis(theta, low).T / np.sqrt(len(theta))
         constant = Effect(strut_mm=np.eye(STRUTS))
@@ -152,9 +152,11 @@ def _of_struts(machine: Machine, pairs: Sequence[Pair], low: int) -> list[Family
             found.setdefault((_STEP, i + 1), []).append(steps[:, i : i + 1])
         found.setdefault((_STEP, None), []).append(steps)
         signs = []
-        for shape in shapes(motion, machine, extent, no_waves):
-            columns = towards @ reading.by_parameters(shape.columns)
-            found.setdefault((_NAMES.get(shape.variable, shape.variable), shape.strut), []).append(columns)
+        for shape in shapes(extent):
+            if shape.name not in _NAMES:
+                continue
+            columns = towards @ shape.columns(run)
+            found.setdefault((_NAMES[shape.name], shape.strut), []).append(columns)
             if shape.variable == "strut-speed-sign" and shape.strut is not None:
                 signs.append(columns)
         if signs:
@@ -174,6 +176,7 @@ _NAMES = {
     "strut-force": "strut force",
     "time": "strut length, with time in B",
     "time of the reading": "reading, with time in B",
+    "position of the platform": "position of the platform",
     "angle": "the same curve over the angle in every run",
 }
 

@@ -9,13 +9,15 @@ import numpy as np
 from scipy.stats import chi2
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration
+from dbbstation.calibration.outliers import beside
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
 from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.naming import MOST_SOURCES, THRESHOLD, Round, best_look
 from dbbstation.diagnosis.next_test import propose
+from dbbstation.diagnosis.unexplained import unexplained
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
-from dbbstation.diagnosis.verdicts import crowded, doubted, judge, testable, unexplained
+from dbbstation.diagnosis.verdicts import beside_outliers, crowded, doubted, judge, testable
 from dbbstation.diagnosis.workspace import WorkspaceError, workspace_error
 from dbbstation.errors import ModelError
 from dbbstation.inference.held_out import HeldOut, held_out
@@ -32,8 +34,8 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
-SIGNIFICANT = 1e-3
-"""Probability below which a misfit counts as one."""
+SIGNIFICANT = 1e-4
+"""Probability below which a misfit that no source and no curve organises counts as one."""
 
 RIVALS, DRAWS = 6, 20
 """Best sources that compete in each draw of a part of the tests, and draws."""
@@ -68,20 +70,21 @@ def diagnose(
     progress("verdicts")
     joint = channel_of(after, sources) if chosen else channel
     findings = judge(channel, settled.race, joint, settled.left.noise, chosen, by_name, after)
-    rest = unexplained(channel, joint, first, settled.left, chosen, significant=SIGNIFICANT)
+    rest = unexplained(before, after, settled.race, first, settled.left, chosen, significant=SIGNIFICANT)
     progress("held-out tests")
     if rest.overrules:
         # Nothing has a name then: what is left, and what could be asked next, is that of the base model.
         chosen, after = (), before
         settled = Round((), before, first, settled.race)
         findings = tuple(rest.demoted(findings))
+    findings = beside_outliers(findings, outliers)
     findings = crowded(doubted(findings, rest.finding, by_name), chosen, settled.race)
     predicted = _held_out(channel, chosen, settled.left.noise)
     steady = _stability(channel, findings, settled)
     findings = tuple(replace(f, stability=steady.get(f.name)) for f in findings)
     elsewhere = workspace_error(before, after) if chosen else None
     progress("next test")
-    mismatch = first.probability < SIGNIFICANT or bool(chosen) or bool(outliers)
+    mismatch = first.probability < SIGNIFICANT or bool(chosen) or bool(outliers) or rest.found
     found = [by_name[choice.candidate.name] for choice in chosen]
     return Diagnosis(
         mismatch=mismatch,
@@ -90,7 +93,7 @@ def diagnose(
         before=before,
         after=after,
         held_out=predicted,
-        outliers=outliers,
+        outliers=tuple(beside(outlier, after) for outlier in outliers),
         workspace=elsewhere,
         locations=_locations(before, after, found, first, rest.finding.variable) if mismatch else (),
         sources=findings,
@@ -216,8 +219,8 @@ def _next_tests(
 
     A source that was named is open too, where the joint model is not `known` well enough to be of use elsewhere.
     """
-    variants = {c.name: settled.race.best_variant(c, [])[0] for c in channel.named}
-    chosen = {choice.candidate.name: choice.variant for choice in settled.chosen}
+    variants = {c.name: c.whole(settled.race.best_variant(c, [])[0]) for c in channel.named}
+    chosen = {choice.candidate.name: choice.candidate.whole(choice.variant) for choice in settled.chosen}
     for finding in findings:
         likes = [name for name in finding.ambiguous_with if name in variants]
         settled_name = finding.name in chosen and (known or len(chosen[finding.name].columns) == 1)

@@ -10,18 +10,19 @@ import numpy as np
 from scipy.special import chdtri
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration, calibrate, default_sources
-from dbbstation.calibration.outliers import Outlier, calibrate_robust
+from dbbstation.calibration.outliers import MOST, Outlier, calibrate_robust, free_ball, free_bar
+from dbbstation.calibration.scatter import seats_of
 from dbbstation.diagnosis.channel import Channel, channel_of
-from dbbstation.diagnosis.refit import refitted
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.harmonics import Misfit, misfit
-from dbbstation.inference.race import Choice, Race, select, worth_of
+from dbbstation.inference.race import AS_GOOD, Choice, Race, as_good, select, worth_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from dbbstation.calibration.outliers import Fit, Step
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
@@ -48,12 +49,23 @@ COST_OF_AN_AMPLITUDE = 2.5
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One round of naming: a joint fit, its noise, and the race that was run with that noise."""
+    """One round of naming: a joint fit, its noise, and the race that was run with that noise.
+
+    Attributes:
+        chosen: sources that were named.
+        after: fit with them.
+        left: misfit of that.
+        race: with its noise.
+        off: ball or bar that is off by far more than stated; what is said of sources then does not count.
+        alike: sources that would explain the recordings about as well in its place.
+    """
 
     chosen: tuple[Choice, ...]
     after: Calibration
     left: Misfit
     race: Race
+    off: Choice | None = None
+    alike: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,48 +103,54 @@ def best_look(
     sources: dict[str, ErrorSource],
     progress: Callable[[str], None],
 ) -> Look:
-    """Name what is missing, with and without balls off their place, and return the simpler story.
+    """Name what is missing, with and without balls that stand out of the kinematic fit, and return the simpler story.
 
     Both can stand in for each other: tests that show missing physics for the first time look like badly seated balls,
-    and a badly seated ball looks like a warped plate.
+    and a badly seated ball looks like a warped plate. One ball or bar at a time competes with the sources themselves;
+    several that are far off are found beforehand only.
     """
     progress("kinematic calibration")
-    robust = calibrate_robust(partial(calibrate, machine), runs)
+    fit = partial(calibrate, machine)
+    robust = calibrate_robust(fit, runs)
     if not robust[1]:
-        return _beside(_look(*robust, sources, progress), runs, sources, progress)
-    plain = calibrate_robust(partial(calibrate, machine), runs, balls=False)
-    first = _beside(_look(*plain, sources, progress), runs, sources, progress)
+        return _look(fit, *robust, sources, progress)
+    plain = calibrate_robust(fit, runs, balls=False)
+    first = _look(fit, *plain, sources, progress)
     if len(robust[1]) == len(plain[1]):
         return first
-    second = _look(*robust, sources, progress)
+    second = _look(fit, *robust, sources, progress)
     noise = min(first.settled.left.noise, second.settled.left.noise)
     return min((first, second), key=lambda look: look.cost(noise))
 
 
 def _look(
+    fit: Fit,
     before: Calibration,
     outliers: tuple[Outlier, ...],
     sources: dict[str, ErrorSource],
     progress: Callable[[str], None],
 ) -> Look:
-    progress("candidates")
-    channel = channel_of(before, list(sources.values()))
-    first = misfit_of(before)
-    return Look(before, outliers, channel, first, _settle(channel, before, first, sources, progress))
+    """Name sources; set free what balls and bars the race needs beside them, and name again."""
+    while True:
+        progress("candidates")
+        channel = channel_of(before, list(sources.values()))
+        first = misfit_of(before)
+        settled = _settle(channel, before, first, sources, progress)
+        if settled.off is None or len(outliers) >= MOST:
+            return Look(before, outliers, channel, first, settled)
+        step = _set_free(fit, before, settled.off)
+        progress(step[0].text)
+        outliers = (*outliers, replace(step[0], alike=settled.alike))
+        before = step[2]
 
 
-def _beside(
-    look: Look, runs: Sequence[Observation], sources: dict[str, ErrorSource], progress: Callable[[str], None]
-) -> Look:
-    """Look again where balls stand out beside the joint model that did not beside the base: physics had hidden them."""
-    if not look.settled.chosen:
-        return look
-    again, outliers = calibrate_robust(partial(refitted, look.settled.after), runs)
-    if {(o.kind, o.run) for o in outliers} == {(o.kind, o.run) for o in look.outliers}:
-        return look
-    other = _look(calibrate(look.channel.machine, again.observations), outliers, sources, progress)
-    noise = min(look.settled.left.noise, other.settled.left.noise)
-    return min((look, other), key=lambda one: one.cost(noise))
+def _set_free(fit: Fit, before: Calibration, off: Choice) -> Step:
+    """Ball or bar that may be anything from here on."""
+    runs, name = before.observations, off.variant.of
+    if off.candidate.name == "bar-offset":
+        return free_bar(fit, runs, name)
+    of_the_ball = {o.setup.mounting for o in runs if name in {o.setup.mounting, o.setup.ball}}
+    return free_ball(fit, runs, min(of_the_ball), seats_of(before))
 
 
 def misfit_of(calibration: Calibration) -> Misfit:
@@ -161,7 +179,11 @@ def _settle(
     for _ in range(MOST_ROUNDS):
         race = channel.race(best.left.noise)
         candidates = [candidate for candidate in channel.named if candidate.name not in dropped]
-        chosen = select(race, candidates, THRESHOLD, MOST_SOURCES)
+        chosen = select(race, [*candidates, *channel.set_up], THRESHOLD, MOST_SOURCES)
+        off = [choice for choice in chosen if choice.variant.of]
+        if off:
+            worst = max(off, key=lambda one: worth_of(race, chosen, one))
+            return replace(best, off=worst, alike=as_good(race, chosen, worst, candidates, AS_GOOD))
         found = {choice.candidate.name for choice in chosen}
         if found == {choice.candidate.name for choice in best.chosen}:
             break
@@ -172,7 +194,7 @@ def _settle(
             # An amplitude of next to nothing leaves the time constant beside it without a hold.
             dropped.add(min(chosen, key=lambda one: worth_of(race, chosen, one)).candidate.name)
             continue
-        weak = {name for name in found if not _stands_out(after, name)}
+        weak = {choice.candidate.name for choice in chosen if not _stands_out(after, choice)}
         left = misfit_of(after)
         if weak:
             dropped |= weak
@@ -184,22 +206,32 @@ def _settle(
     return replace(best, left=left, race=channel.race(left.noise))
 
 
-def _stands_out(calibration: Calibration, name: str) -> bool:
-    """Whether amplitudes of a source, in any of their combinations, stand out of their covariance in an exact fit."""
+def _stands_out(calibration: Calibration, choice: Choice) -> bool:
+    """Whether the amplitudes that were chosen, in any of their combinations, stand out of their covariance.
+
+    In an exact fit of all amplitudes of the source, of which the others are then said to be zero.
+    """
     columns = np.array(
         [
             term.columns.start + k
             for term in calibration.layout.terms
-            if term.source.name == name
+            if term.source.name == choice.candidate.name
             for k, parameter in enumerate(term.parameters)
             if not parameter.shape
         ]
     )
     scale = calibration.layout.known.scale[columns]
     covariance = calibration.solution.covariance[np.ix_(columns, columns)] / np.outer(scale, scale)
+    values = calibration.x[columns] / scale
+    own = np.isin(choice.candidate.whole(choice.variant).columns, choice.variant.columns)
+    if not own.all():
+        others = covariance[np.ix_(~own, ~own)]
+        gain = covariance[np.ix_(own, ~own)] @ np.linalg.pinv(others, rcond=HELD, hermitian=True)
+        values = values[own] - gain @ values[~own]
+        covariance = covariance[np.ix_(own, own)] - gain @ covariance[np.ix_(~own, own)]
     variance, axes = np.linalg.eigh(covariance)
     free = variance > HELD * variance.max(initial=0.0)  # directions that were held have none
-    along = (axes.T @ (calibration.x[columns] / scale))[free]
+    along = (axes.T @ values)[free]
     return float(np.sum(along**2 / variance[free])) > float(chdtri(max(int(free.sum()), 1), BY_CHANCE))
 
 
@@ -209,9 +241,11 @@ def _joint(channel: Channel, race: Race, chosen: Sequence[Choice], sources: dict
     start: dict[str, NDArray[np.float64]] = {}
     for choice in chosen:
         source = sources[choice.candidate.name]
-        count = len(choice.variant.columns)
-        start[source.name] = _with_shape(source, channel.machine, amplitudes[:count], choice.variant.shape)
-        amplitudes = amplitudes[count:]
+        whole, own = choice.candidate.whole(choice.variant).columns, choice.variant.columns
+        found = np.zeros(len(whole))
+        found[np.isin(whole, own)] = amplitudes[: len(own)]
+        start[source.name] = _with_shape(source, channel.machine, found, choice.variant.shape)
+        amplitudes = amplitudes[len(own) :]
     more = [sources[choice.candidate.name] for choice in chosen]
     return calibrate(channel.machine, channel.observations, [*default_sources(), *more], start)
 

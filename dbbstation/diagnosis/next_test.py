@@ -175,12 +175,15 @@ def _ends_s(channel: Channel) -> float:
 
 def _motions(proposal: Proposal, ends_s: float) -> list[Motion]:
     """Both directions, mounted anew on the same ball, so long after the end of the last run [s]."""
-    setup: Setup = replace(proposal.observation.setup, mounting="proposed")
+    first_s = ends_s + proposal.wait_s + SPACING_S
+    before: Setup = proposal.observation.setup
+    moving_s = (*before.moving_s, (first_s, first_s + SPACING_S * len(Direction)))
+    setup = replace(before, mounting="proposed", moving_s=moving_s)
     phi = np.linspace(-45.0, 360.0, SAMPLES + SAMPLES // 8, endpoint=False)
     motions = []
     for k, direction in enumerate(Direction):
         circle = replace(proposal.circle, direction=direction)
-        begun = ends_s + proposal.wait_s + SPACING_S * (k + 1)
+        begun = first_s + SPACING_S * k
         motions.append(
             Motion(
                 poses=circle.poses(circle.theta_deg(phi)),

@@ -1,4 +1,4 @@
-"""Errors without a name: any smooth error of strut lengths or readings that some variable organises.
+"""Errors without a name: an error of a strut, the reading or a ball that follows some variable.
 
 They compete with the named sources. Where one of them explains the recordings clearly better than every source that
 has a name, the cause is unknown, and strut and variable are what can be said of it.
@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.forms import Form, Hats, Lobes, Plane, Proportional, Sign
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
-from dbbstation.machine.statics import platform_weight, strut_tensions
+from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect
 
 if TYPE_CHECKING:
@@ -23,27 +24,60 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
+    from dbbstation.machine.kinematics import Struts
+    from dbbstation.model.machine_model import BarReading
     from dbbstation.sources.contract import Motion
 
-HATS = 7
-"""Points of a piecewise linear curve."""
-
 PLAUSIBLE_MM = 0.004
-"""Usual size of an unnamed strut-length error, one standard deviation [mm]."""
+"""Usual size of an unnamed error, one standard deviation [mm]."""
 
 LOBES = tuple(range(2, 11))
-"""Undulations per turn of an unnamed error of the reading that depends on the angle alone."""
+"""Undulations per turn of an error of the reading that follows the angle in any way."""
 
-WAVES_PER_MM = np.arange(0.0035, 0.26, 0.0015)
-"""Waves of strut travel that are looked for: periods of 290 down to 4 mm, spaced so that none is missed over the 300
-to 700 mm that a strut travels [1/mm]."""
+LEVER_MM = 100.0
+"""Turns and moments count by what they do at this distance [mm]."""
 
-FINER_PER_MM = (np.linspace(-0.0015, 0.0015, 31), np.linspace(-0.0001, 0.0001, 31))
-"""Around each of them and around the best of these, so that a wave keeps its phase to a degree from one end of the
-travel to the other [1/mm]."""
+READING, BALL, TABLE, TOOL, PULL, EVERY = (
+    "reading",
+    "ball on the table",
+    "table",
+    "ball on the tool",
+    "pull",
+    "every strut",
+)
+"""What moves, where it is no single strut: what the bar reads, a ball, the table as a body with the ball on it, all
+struts by a pull on the platform, or all struts alike."""
 
-STRONGEST = 2
-"""Waves of each strut that are kept as shapes."""
+UNITS = {
+    "strut-length": "mm",
+    "strut-force": "N",
+    "strut-speed-sign": "sign",
+    "strut-speed": "mm/s",
+    "strut-acceleration": "mm/s²",
+    "time": "s",
+    "angle": "deg",
+    "angle since the start": "turns",
+    "position of the platform": "mm",
+    "tilt of the platform": "deg",
+}
+"""Variables that an error may follow, and their units. Printed names begin with them: what kind of curve, and what
+moves where it is no strut, come behind."""
+
+OF_STRUTS = ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration")
+"""Those that each strut has its own of."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """One run as shapes see it, rows that count.
+
+    Attributes:
+        values: by variable, shape (n,), (n, 6) where each strut has its own, or (n, c) for c coordinates.
+        gain: how the reading answers to what moves, by its name, shape (n, d); of the struts shape (n, 6).
+    """
+
+    values: dict[str, NDArray[np.float64]]
+    gain: dict[str, NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,20 +85,79 @@ class Shape:
     """One family of curves.
 
     Attributes:
-        variable: what the error is a function of, as printed.
+        variable: what the error is a function of.
+        kind: of curve, such as `wave`; empty for the usual one.
         strut: 1 to 6; None where all struts follow the same curve, or where it is no strut's error.
-        form: tells apart the variants of one variable, such as a period.
-        columns: effect per amplitude at every sample of one run, p amplitudes.
-        count: p.
-        wave: of strut length [1/mm]; None for what is no wave.
+        moves: what moves; empty for one strut.
+        form: of the curve.
+        tried: how many independent forms it was picked from.
     """
 
     variable: str
+    kind: str
     strut: int | None
-    form: str
-    columns: Effect
-    count: int
-    wave: float | None = None
+    moves: str
+    form: Form
+    tried: float = 1.0
+
+    @property
+    def name(self) -> str:
+        """Variable, kind of curve and what moves, as printed."""
+        kind = f" {self.kind}" if self.kind else ""
+        own = (self.variable, self.moves) in ITS_OWN
+        return f"{self.variable}{kind}{'' if own else BEHIND.get(self.moves, '')}"
+
+    @property
+    def period(self) -> float | None:
+        """Of a wave of strut length [mm]; None for all others."""
+        frequency = getattr(self.form, "frequency", None)
+        return 1.0 / frequency if frequency and self.variable == "strut-length" else None
+
+    def given(self, samples: Samples) -> bool:
+        """Whether a run has what it needs."""
+        return self.variable in samples.values and (self.moves in samples.gain or self.strut is not None)
+
+    def columns(self, samples: Samples) -> NDArray[np.float64]:
+        """Effect of each amplitude on the readings of a run: directions that move times curves, shape (n, d p)."""
+        values, gain = samples.values[self.variable], self._gain(samples)
+        if self.variable not in OF_STRUTS or self.strut is not None:
+            curve = self.form.columns(
+                values[:, self.strut - 1] if self.variable in OF_STRUTS and self.strut else values
+            )
+            return np.asarray((gain[:, :, None] * curve[:, None, :]).reshape(len(gain), -1))
+        return np.einsum("ni,nip->np", samples.gain[EVERY], self.form.columns(values))
+
+    def _gain(self, samples: Samples) -> NDArray[np.float64]:
+        if self.strut is not None:
+            return samples.gain[EVERY][:, self.strut - 1 : self.strut]
+        return samples.gain[EVERY].sum(axis=1, keepdims=True) if self.moves == EVERY else samples.gain[self.moves]
+
+
+BEHIND = {
+    READING: " of the reading",
+    BALL: " of the ball on the table",
+    TABLE: " of the table",
+    TOOL: " of the ball on the tool",
+    PULL: " with a pull on it",
+}
+"""How a printed name ends, by what moves; nothing for struts."""
+
+ITS_OWN = {
+    ("angle", READING),
+    ("position of the platform", BALL),
+    ("tilt of the platform", TOOL),
+}
+"""Variables that say by themselves what moves."""
+
+
+def moves_struts(name: str) -> bool:
+    """Whether an error of a printed name is one of strut lengths."""
+    return name.startswith("strut-") or (name.startswith("time") and " of the " not in name)
+
+
+def variable_of(name: str) -> str:
+    """Variable that a printed name begins with."""
+    return max((variable for variable in UNITS if name.startswith(variable)), key=len)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,133 +169,110 @@ class Ranges:
 
 
 def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]]:
-    """Return what strut errors may hang on, by name, each of shape (n, 6)."""
-    frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-    struts = inverse(machine.hexapod, frames)
+    """Return what errors may follow, by name, of all rows: shape (n, 6) of struts, else (n,) or (n, c)."""
+    struts = _struts(motion, machine)
     found = {"strut-length": struts.length_mm}
     if motion.is_path:
         found["strut-speed-sign"] = np.sign(np.gradient(struts.length_mm, axis=0))
     if machine.masses is not None:
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
         found["strut-force"] = strut_tensions(struts, platform_weight(frames, machine.masses))
     if motion.time_s is not None:
-        found["time"] = np.repeat(motion.time_s[:, None], STRUTS, axis=1)
+        found["time"] = motion.time_s
+        if motion.is_path:
+            found["strut-speed"] = np.gradient(struts.length_mm, motion.time_s, axis=0)
+            found["strut-acceleration"] = np.gradient(found["strut-speed"], motion.time_s, axis=0)
+    found["position of the platform"] = motion.poses[:, :2]
+    found["tilt of the platform"] = motion.poses[:, 3:5]
+    if motion.setup is not None:
+        away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]
+        angle = np.unwrap(np.arctan2(away[:, 1], away[:, 0]))
+        found["angle"] = np.mod(np.degrees(angle), 360.0)
+        found["angle since the start"] = (angle - angle[motion.kept][0]) / (2.0 * np.pi)
     return found
 
 
-def ranges(motions: Sequence[Motion], machine: Machine) -> Ranges:
-    """Extent of every variable that all motions have."""
-    low: dict[str, NDArray[np.float64]] = {}
-    high: dict[str, NDArray[np.float64]] = {}
-    for motion in motions:
-        for name, values in variables(motion, machine).items():
-            least, greatest = values[motion.kept].min(axis=0), values[motion.kept].max(axis=0)
-            low[name] = np.minimum(low.get(name, least), least)
-            high[name] = np.maximum(high.get(name, greatest), greatest)
-    return Ranges(low, high)
-
-
-def strongest_waves(
-    residual: Sequence[NDArray[np.float64]],
-    per_strut: Sequence[NDArray[np.float64]],
-    strut_mm: Sequence[NDArray[np.float64]],
-) -> NDArray[np.float64]:
-    """Waves of strut length that readings follow best, for each strut, shape (6, 2) [1/mm].
-
-    A first look that leaves the base model alone; the race that follows fits it anew.
-
-    Args:
-        residual: per run, shape (n,).
-        per_strut: per run, how the reading answers to each strut, shape (n, 6).
-        strut_mm: per run, strut lengths, shape (n, 6) [mm].
-    """
-    rest, gain, length = np.concatenate(residual), np.vstack(per_strut), np.vstack(strut_mm)
-    found = np.empty((STRUTS, STRONGEST))
-    for i in range(STRUTS):
-        weighted = rest * gain[:, i]
-        phase = 2.0 * np.pi * np.outer(WAVES_PER_MM, length[:, i])
-        power = np.hypot(np.cos(phase) @ weighted, np.sin(phase) @ weighted)
-        peaks = np.flatnonzero((power >= np.roll(power, 1)) & (power >= np.roll(power, -1)))
-        best = peaks[np.argsort(-power[peaks])][:STRONGEST]
-        wave = WAVES_PER_MM[best]
-        for finer in FINER_PER_MM:
-            near = wave[:, None] + finer
-            phase = 2.0 * np.pi * near[:, :, None] * length[:, i]
-            power = np.hypot(np.cos(phase) @ weighted, np.sin(phase) @ weighted)
-            wave = near[np.arange(len(best)), power.argmax(axis=1)]
-        found[i] = np.resize(wave, STRONGEST)
-    return found
-
-
-def shapes(motion: Motion, machine: Machine, extent: Ranges, waves: NDArray[np.float64]) -> list[Shape]:
-    """Return all families of curves for one run, in an order that is the same for every run.
+def samples_of(
+    motion: Motion, machine: Machine, reading: BarReading, pivot_mm: NDArray[np.float64] | None = None
+) -> Samples:
+    """Return variables and gains of a run.
 
     Args:
         motion: the run.
         machine: nominal machine.
-        extent: of the variables over all runs.
-        waves: of strut length to look at, per strut, shape (6, w) [1/mm].
+        reading: what a model predicts for it.
+        pivot_mm: about which the table may turn with its balls, shape (3,) [mm]; None: it is not asked.
     """
-    values = variables(motion, machine)
+    gain = {
+        EVERY: reading.by_parameters(Effect(strut_mm=np.eye(STRUTS))),
+        READING: np.ones((len(reading.length_mm), 1)),
+        BALL: reading.by_parameters(Effect(fixed_ball_mm=np.eye(3))),
+        TOOL: reading.by_parameters(Effect(tool_tip_mm=np.eye(3))),
+        PULL: reading.by_parameters(Effect(strut_mm=_pulled(_struts(motion, machine)))),
+    }
+    if motion.setup is not None and pivot_mm is not None:
+        # A small turn w moves the ball by w x arm.
+        turns = np.cross(np.eye(3), (motion.setup.fixed_ball_mm - pivot_mm) / LEVER_MM).T
+        gain[TABLE] = np.hstack([gain[BALL], gain[BALL] @ turns])
+    return Samples({name: values[motion.kept] for name, values in variables(motion, machine).items()}, gain)
+
+
+def _struts(motion: Motion, machine: Machine) -> Struts:
+    return inverse(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+
+
+def _pulled(struts: Struts) -> NDArray[np.float64]:
+    """Lengthening of the struts by a force along each axis and a moment about each, one for each unit, (n, 6, 6)."""
+    count = len(struts.length_mm)
+    stretch = np.empty((count, STRUTS, 6))
+    for k, load in enumerate(np.diag([1.0] * 3 + [LEVER_MM] * 3)):
+        wrench = np.tile(load, (count, 1))
+        stretch[:, :, k] = strut_tensions(struts, Load(wrench[:, :3], wrench[:, 3:]))
+    return stretch
+
+
+def ranges(runs: Sequence[Samples]) -> Ranges:
+    """Extent of every variable that all runs have."""
+    names = set.intersection(*(set(run.values) for run in runs))
+    low = {name: np.min([run.values[name].min(axis=0) for run in runs], axis=0) for name in runs[0].values}
+    high = {name: np.max([run.values[name].max(axis=0) for run in runs], axis=0) for name in runs[0].values}
+    return Ranges({n: v for n, v in low.items() if n in names}, {n: v for n, v in high.items() if n in names})
+
+
+def shapes(extent: Ranges) -> list[Shape]:
+    """Return the families that need no first look, in the order of their columns.
+
+    Args:
+        extent: of the variables over all runs.
+    """
     found: list[Shape] = []
-    for name in extent.low:
-        curves = (
-            np.sign(values[name])[:, :, None]
-            if name == "strut-speed-sign"
-            else hats(values[name], extent.low[name], extent.high[name])
-        )
-        found += _per_strut(name, "", curves)
-    for i in range(STRUTS):
-        for wave in waves[i]:
-            angle = 2.0 * np.pi * wave * values["strut-length"][:, i]
-            own = np.zeros((len(motion), STRUTS, 2))
-            own[:, i] = np.column_stack([np.cos(angle), np.sin(angle)])
-            found.append(
-                Shape("strut-length wave", i + 1, f"period {1.0 / wave:.3f} mm", Effect(strut_mm=own), 2, wave)
-            )
+    for name in ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration", "time"):
+        if name not in extent.low:
+            continue
+        found += [
+            Shape(name, "", strut, "" if strut else EVERY, _usual(name, extent, strut))
+            for strut in (*range(1, STRUTS + 1), None)
+        ]
     if "time" in extent.low:
-        drift = hats(values["time"], extent.low["time"], extent.high["time"])[:, 0]
-        found.append(Shape("time of the reading", None, "", Effect(reading_mm=drift), HATS))
-    if motion.setup is not None:
-        found.append(Shape("place of the platform", None, "", _leaning_table(motion), LEANING))
-        theta = _angle_about_ball(motion)
-        lobes = np.column_stack([f(k * theta) for k in LOBES for f in (np.cos, np.sin)])
-        found.append(Shape("angle", None, "", Effect(reading_mm=lobes), lobes.shape[1]))
+        found.append(Shape("time", "", None, READING, _usual("time", extent, None)))
+    found.append(Shape("position of the platform", "", None, BALL, Plane(100.0, 2)))
+    found.append(Shape("position of the platform", "", None, TABLE, Plane(100.0, 2)))
+    found.append(Shape("tilt of the platform", "", None, TOOL, Plane(10.0, 2)))
+    found.append(Shape("position of the platform", "", None, PULL, Plane(100.0, 2, constant=True)))
+    if "angle" in extent.low:
+        found.append(Shape("angle", "", None, READING, Lobes(LOBES)))
+        turned = Hats(extent.low["angle since the start"], extent.high["angle since the start"])
+        found.append(Shape("angle since the start", "", None, READING, turned))
     return found
 
 
-LEANING = 6
-"""Each coordinate of the ball, with the platform's X and with its Y."""
-
-
-def _leaning_table(motion: Motion) -> Effect:
-    """A ball on the table that moves with the platform's place, as on a floor that gives way, per 100 mm."""
-    moved = np.zeros((len(motion), 3, LEANING))
-    for axis in range(3):
-        moved[:, axis, 2 * axis : 2 * axis + 2] = motion.poses[:, :2] / 100.0
-    return Effect(fixed_ball_mm=moved)
-
-
-def _angle_about_ball(motion: Motion) -> NDArray[np.float64]:
-    """Angle of the commanded tool tip about the fixed ball, from +X towards +Y, shape (n,) [rad]."""
-    assert motion.setup is not None  # noqa: S101 - asked by the caller
-    away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]
-    return np.arctan2(away[:, 1], away[:, 0])
-
-
-def _per_strut(variable: str, form: str, curves: NDArray[np.float64]) -> list[Shape]:
-    """One family per strut from curves of shape (n, 6, p), and one that all struts share."""
-    count = curves.shape[2]
-    found = []
-    for i in range(STRUTS):
-        own = np.zeros_like(curves)
-        own[:, i] = curves[:, i]
-        found.append(Shape(variable, i + 1, form, Effect(strut_mm=own), count))
-    found.append(Shape(variable, None, form, Effect(strut_mm=curves), count))
-    return found
-
-
-def hats(values: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Piecewise linear curves over each strut's range, shape (n, 6, 7)."""
-    span = np.maximum(high - low, 1e-12)
-    place = (values - low) / span * (HATS - 1)
-    return np.maximum(0.0, 1.0 - np.abs(place[:, :, None] - np.arange(HATS)))
+def _usual(name: str, extent: Ranges, strut: int | None) -> Form:
+    """Usual form of a curve over a variable, for one strut or for all."""
+    low, high = extent.low[name], extent.high[name]
+    if name == "strut-speed-sign":
+        return Sign()
+    if name in {"strut-speed", "strut-acceleration"}:
+        return Proportional(float(np.max(np.abs([low, high]))))
+    if name in OF_STRUTS and strut is not None:
+        return Hats(low[strut - 1], high[strut - 1])
+    return Hats(low, high)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.shapes import moves_struts as of_struts
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
@@ -34,9 +35,6 @@ WAVE_PIECE_MM = 1.0
 
 SEEN = 2.5
 """Fine pieces that are known this many times worse than usual are left open: they would drown the others."""
-
-OF_THE_READING = frozenset({"angle", "time of the reading"})
-"""What may organise an error without a name that is no strut's."""
 
 UNITS = {"strut-length": "mm", "strut-force": "N", "time": "s", "angle": "°"}
 """Of the variables that something can be drawn over."""
@@ -115,7 +113,7 @@ def _curves(diagnosis: Diagnosis, name: str) -> SourceCurves:
     if name:
         moves_struts = any(_strut_mm(after.model.actual(o.motion()), name) is not None for o in after.observations)
     else:
-        moves_struts = wanted not in OF_THE_READING
+        moves_struts = of_struts(wanted)
     signed, fine = "sign" in wanted, wanted == "strut-length wave"
     variable = _drawn_over(wanted, after.observations, moves_struts=moves_struts)
     samples = [_samples(after, name, o, variable, moves_struts=moves_struts) for o in after.observations]
@@ -153,7 +151,7 @@ def _drawn_over(wanted: str, observations: Sequence[Observation], *, moves_strut
         return "time"
     if not moves_struts or wanted == "angle":
         return "angle"
-    return "strut-force" if wanted == "strut-force" else "strut-length"
+    return "strut-force" if wanted.startswith("strut-force") else "strut-length"
 
 
 def _strut_mm(there: Actual, name: str) -> NDArray[np.float64] | None:
@@ -170,6 +168,8 @@ def _samples(
     known = variables(motion, model.machine)
     angle = np.repeat(observation.raw.theta_deg[:, None], STRUTS, axis=1)
     over = angle if variable == "angle" else known[variable][motion.kept]
+    if over.ndim == 1:
+        over = np.repeat(over[:, None], STRUTS, axis=1)
     if not moves_struts:
         without = MachineModel(model.machine, tuple(f for f in model.sources if f.source.name != name))
         added = bar.length_mm - without.bar(motion).length_mm

@@ -6,13 +6,14 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.calibration.evaluation import rms_um
-from dbbstation.calibration.outliers import Kind
+from dbbstation.calibration.outliers import SOURCE_OF, Kind
 from dbbstation.calibration.summary import outlier_summary
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from dbbstation.calibration.outliers import Outlier
     from dbbstation.diagnosis.findings import Diagnosis, Location, NextTest, SourceFinding
 
 
@@ -100,27 +101,34 @@ def _workspace(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 
 def _seats(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Balls that do not stand where they should, under the names of the sources that say so."""
+    """Balls and bars that are not what they should be, under the names of the sources that say so."""
     entries = []
-    for name, kinds in SEATS.items():
-        told = [outlier for outlier in diagnosis.outliers if outlier.kind in kinds]
+    for name in dict.fromkeys(SOURCE_OF.values()):
+        told = [outlier for outlier in diagnosis.outliers if SOURCE_OF.get(outlier.kind) == name]
         if told:
-            alone = all(outlier.sure for outlier in told)
+            alike = sorted({other for outlier in told for other in outlier.alike})
+            alike += [] if all(outlier.sure for outlier in told) else [other for other in BALLS if other != name]
             entries.append(
                 {
                     **_lacking(name, "; ".join(outlier.text for outlier in told)),
-                    "verdict": "identified" if alone else "ambiguous",
-                    "ambiguous_with": [] if alone else [other for other in SEATS if other != name],
+                    "verdict": "ambiguous" if alike else "identified",
+                    "ambiguous_with": alike,
+                    "parameters": {
+                        _of(outlier): {"value": outlier.size_um, "uncertainty": outlier.uncertainty_um, "unit": "µm"}
+                        for outlier in told
+                        if outlier.uncertainty_um is not None
+                    },
                 }
             )
     return entries
 
 
-SEATS = {
-    "mounting": frozenset({Kind.MOUNTING, Kind.MOVED}),
-    "ball-coordinate": frozenset({Kind.BALL, Kind.WRONG_PLACE}),
-}
-"""Which outliers are which error source of the measurement."""
+def _of(outlier: Outlier) -> str:
+    return f"offset ({outlier.test})" if outlier.kind is Kind.BAR else f"distance ({outlier.run})"
+
+
+BALLS = ("mounting", "ball-coordinate")
+"""What cannot be told apart where a ball was put up once only."""
 
 
 def _location(location: Location) -> dict[str, Any]:

@@ -4,6 +4,9 @@ Amplitudes are those of the race, with the kinematic parameters, mountings, ball
 these can make of a curve cannot be told from them, so it is taken out by convention: a constant of everything, which is
 a strut's reference length or the bar's offset, and of a curve over strut length also a slope, which joints can do almost
 whole. What is printed is the curve less the straight line (or constant) that fits it best over all readings.
+
+What moves in several directions, such as a ball, is printed along the one in which it moves most, and where its variable
+is a place, along the line on which it changes most.
 """
 
 from __future__ import annotations
@@ -14,71 +17,65 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.findings import Curve, CurvePoint
-from dbbstation.diagnosis.shapes import HATS, LOBES, hats, variables
+from dbbstation.diagnosis.forms import HATS, Hats, Plane, PlaneStep, WaveOfTurn
+from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, TABLE, TOOL, UNITS
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.race import free_directions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.channel import Channel
-    from dbbstation.inference.race import Amplitudes, Race, Variant
-
-UNITS = {
-    "strut-length": "mm",
-    "strut-length wave": "mm",
-    "strut-force": "N",
-    "strut-speed-sign": "sign",
-    "time": "s",
-    "time of the reading": "s",
-    "angle": "deg",
-}
-"""Of what the curve is a function of."""
+    from dbbstation.diagnosis.shapes import Samples, Shape
+    from dbbstation.diagnosis.unnamed import Best, Unnamed
+    from dbbstation.inference.race import Amplitudes
 
 TAKEN_OUT = {
     "strut-length": "less the straight line that fits it best over the readings: joints and reference length make that",
     "strut-force": "less its mean over the readings: the reference length makes that",
     "time": "less its mean over the readings: the reference length makes that",
-    "time of the reading": "less its mean over the readings: the bar's offset makes that",
 }
-"""What is conventional of a curve and taken out of it; nothing of the others."""
+"""What is conventional of a piecewise linear curve and taken out of it."""
+
+OF_THE_READING = "less its mean over the readings: the bar's offset makes that"
 
 SIZES = 2.0 ** np.arange(8)
-"""Sizes that curves are tried with, as multiples of the usual one: a large error must not be drawn towards zero."""
+"""Sizes that curves are tried with, as multiples of the one found: a large error must not be drawn towards zero."""
 
-POINTS_PER_WAVE = 8
-ANGLES_DEG = np.arange(0.0, 360.0, 10.0)
+AXES = {
+    BALL: "along ({:+.2f}, {:+.2f}, {:+.2f}) in machine axes",
+    TOOL: "along ({:+.2f}, {:+.2f}, {:+.2f}) in platform axes",
+    TABLE: "shift ({:+.2f}, {:+.2f}, {:+.2f}) with turns ({:+.2f}, {:+.2f}, {:+.2f}) about X, Y, Z, these at "
+    f"{LEVER_MM:g} mm from the middle of the balls",
+    PULL: "strut lengths change as under a force ({:+.2f}, {:+.2f}, {:+.2f}) and moments ({:+.2f}, {:+.2f}, {:+.2f}), "
+    f"these at {LEVER_MM:g} mm from the tool tip",
+}
+"""How a direction is told, by what moves."""
 
 
-def curve_of(channel: Channel, race: Race, name: str, variant: Variant) -> Curve | None:
-    """Return the curve that an unnamed candidate found; None for one that is a plane, not a curve.
+def curve_of(of: Unnamed, best: Best) -> Curve:
+    """Return the curve of the shape that was found.
 
     Args:
-        channel: that the race was run on.
-        race: on that channel.
-        name: of the candidate, `variable | strut`.
-        variant: its best form.
+        of: all shapes about the fit that it was found on.
+        best: the shape.
     """
-    variable, _, strut = name.partition(" | ")
-    if variable not in UNITS:
-        return None
-    number = int(strut) if strut else None
-    sized = max((replace(variant, prior=size * variant.prior) for size in SIZES), key=lambda one: race.evidence([one]))
-    found = race.amplitudes([sized])
-    at, values, covariance = _at_points(channel, variable, number, variant, found)
-    covariance = covariance + np.eye(len(at)) * _not_followed(channel, race, variant) * np.mean(values**2)
-    machine = np.flatnonzero(~channel.base.random)
-    free = free_directions(channel.base, machine, channel.held)
-    amplitudes = found.values
-    if variable in TAKEN_OUT:
-        amplitudes = values  # hats: a value at a point is the amplitude of its hat
-    signature = concealment([channel.joined], machine, variant.columns, amplitudes, free)
+    shape, variant = best.shape, best.variant
+    sized = max(
+        (replace(variant, prior=size * variant.prior) for size in SIZES), key=lambda one: of.race.evidence([one])
+    )
+    found = of.race.amplitudes([sized])
+    amplitudes, to_points, at, words = _along(of, shape, found)
+    values, covariance = to_points @ amplitudes, to_points @ found.covariance @ to_points.T
+    covariance = covariance + np.eye(len(at)) * _not_followed(of, best) * np.mean(values**2)
+    machine = np.flatnonzero(~of.base.random)
+    free = free_directions(of.base, machine, of.held)
+    signature = concealment([of.block], machine, variant.columns, amplitudes, free)
     return Curve(
-        variable=variable,
-        unit=UNITS[variable],
-        strut=number,
-        period_mm=1.0 / variant.shape[0] if variant.shape else None,
-        convention=TAKEN_OUT.get(variable, ""),
+        variable=shape.name,
+        unit=UNITS[shape.variable],
+        strut=shape.strut,
+        period_mm=shape.period,
+        convention=words,
         readings_um=1e3 * signature.whole_rms,
         unconcealed_um=1e3 * signature.rest_rms,
         points=tuple(
@@ -88,38 +85,65 @@ def curve_of(channel: Channel, race: Race, name: str, variant: Variant) -> Curve
     )
 
 
-def _not_followed(channel: Channel, race: Race, variant: Variant) -> float:
+def _not_followed(of: Unnamed, best: Best) -> float:
     """Structured sum of squares that the curve leaves to all other curves together, over what it explains itself.
 
     A curve with a kink between two points, or another error beside this one, spoils the values more than noise does:
     each point is then uncertain by that share of the curve's own size.
     """
-    every = [other for candidate in channel.unnamed for other in candidate.variants]
-    own = race.explained([variant])
-    more = race.explained(every) - sum(len(other.columns) for other in every) - own
+    # Those picked from many forms would find something in noise as well: more than one for each amplitude.
+    every = [variant for shape, variant in of.shapes if shape.tried == 1.0 or shape is best.shape]
+    own = of.race.explained([best.variant])
+    more = of.race.explained(every) - sum(len(other.columns) for other in every) - own
     return max(more, 0.0) / max(own, 1e-300)
 
 
-def _at_points(
-    channel: Channel, variable: str, strut: int | None, variant: Variant, found: Amplitudes
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Places, values [mm] and covariance [mm²] of the points of a curve."""
-    if variable == "angle":
-        theta = np.radians(ANGLES_DEG)
-        shape = np.column_stack([f(k * theta) for k in LOBES for f in (np.cos, np.sin)])
-        return ANGLES_DEG, shape @ found.values, shape @ found.covariance @ shape.T
-    if variable == "strut-speed-sign":
-        signs = np.array([-1.0, 1.0])
-        return signs, signs * found.values[0], np.outer(signs, signs) * found.covariance[0, 0]
-    if variable == "strut-length wave":
-        return _wave(channel, strut or 1, variant.shape[0], found)
-    of = variable.removesuffix(" of the reading")
-    extent = channel.extent
-    struts = np.arange(len(extent.low[of])) if strut is None else np.array([strut - 1])
-    at = np.linspace(extent.low[of][struts].mean(), extent.high[of][struts].mean(), HATS)
-    order = 1 if variable == "strut-length" else 0
-    keep = np.eye(HATS) - _line(np.linspace(-1.0, 1.0, HATS), _weights(channel, of, struts), order)
-    return at, keep @ found.values, keep @ found.covariance @ keep.T
+def _along(
+    of: Unnamed, shape: Shape, found: Amplitudes
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], str]:
+    """Amplitudes less what is conventional, matrix from them to the points, places of the points, and words."""
+    form, amplitudes = shape.form, found.values
+    if isinstance(form, Hats):
+        order = 1 if shape.variable == "strut-length" else 0
+        keep = np.eye(HATS) - _line(np.linspace(-1.0, 1.0, HATS), _weights(of, shape), order)
+        words = (
+            TAKEN_OUT[shape.variable] if shape.variable in TAKEN_OUT and not _of_the_reading(shape) else OF_THE_READING
+        )
+        return keep @ amplitudes, keep, form.points(0.0, 0.0), words
+    by_direction = amplitudes.reshape(-1, form.count)
+    left, _, right = np.linalg.svd(by_direction)
+    way, line = left[:, 0], right[0]
+    if isinstance(form, Plane):
+        coordinates = form.coordinates
+        flat = line[:coordinates] / max(float(np.linalg.norm(line[:coordinates])), 1e-12)
+        at = form.points(*_extent(of, shape, flat))
+        curve = form.columns(at[:, None] * flat)
+        words = f"along the line at {np.degrees(np.arctan2(flat[1], flat[0])):.0f} deg to {_AXIS[shape.variable]}"
+    elif isinstance(form, PlaneStep):
+        across = np.radians(form.across_deg)
+        flat = np.array([np.cos(across), np.sin(across)])
+        at = form.points(*_extent(of, shape, flat))
+        curve = form.columns(at[:, None] * flat)
+        words = f"across a line, at {form.across_deg:.0f} deg to +X"
+    else:
+        at = form.points(*_extent(of, shape, None))
+        curve, words = form.columns(at), ""
+    if isinstance(form, WaveOfTurn):
+        words = "negative in clockwise runs"
+    if shape.moves in AXES:
+        # Signs so that the greatest part of the direction is positive.
+        way = way * np.sign(way[np.abs(way).argmax()])
+        words = ", ".join(part for part in (AXES[shape.moves].format(*way), words) if part)
+    else:
+        way = np.ones(1)
+    return amplitudes, np.kron(way, curve), at, words
+
+
+_AXIS = {"position of the platform": "+X", "tilt of the platform": "that of tilt A"}
+
+
+def _of_the_reading(shape: Shape) -> bool:
+    return shape.strut is None and shape.moves != EVERY
 
 
 def _line(at: NDArray[np.float64], weights: NDArray[np.float64], order: int) -> NDArray[np.float64]:
@@ -129,29 +153,19 @@ def _line(at: NDArray[np.float64], weights: NDArray[np.float64], order: int) -> 
     return np.asarray(basis @ np.linalg.solve(weighted @ basis, weighted), dtype=np.float64)
 
 
-def _weights(channel: Channel, variable: str, struts: NDArray[np.int64]) -> NDArray[np.float64]:
+def _values(shape: Shape, run: Samples) -> NDArray[np.float64]:
+    """Values of the shape's variable in one run: of its strut, or of all."""
+    values = run.values[shape.variable]
+    return values[:, shape.strut - 1] if shape.variable in OF_STRUTS and shape.strut else values
+
+
+def _weights(of: Unnamed, shape: Shape) -> NDArray[np.float64]:
     """How many readings lie about each point of a piecewise linear curve, shape (7,)."""
-    total = np.zeros(HATS)
-    for observation in channel.observations:
-        motion = observation.motion()
-        values = variables(motion, channel.machine)[variable][motion.kept]
-        near = hats(values, channel.extent.low[variable], channel.extent.high[variable])
-        total += near[:, struts].sum(axis=(0, 1))
-    return total
+    return np.asarray(sum(shape.form.columns(_values(shape, run)).reshape(-1, HATS).sum(axis=0) for run in of.runs))
 
 
-def _wave(
-    channel: Channel, strut: int, wave: float, found: Amplitudes
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Points of a wave over the strut lengths that were travelled, its period taken for known."""
-    lengths = np.concatenate(
-        [
-            variables(motion, channel.machine)["strut-length"][motion.kept, strut - 1]
-            for motion in (observation.motion() for observation in channel.observations)
-        ]
-    )
-    low, high = lengths.min(), lengths.max()
-    at = np.linspace(low, high, max(2, int(np.ceil((high - low) * wave * POINTS_PER_WAVE)) + 1))
-    angle = 2.0 * np.pi * wave * at
-    shape = np.column_stack([np.cos(angle), np.sin(angle)])
-    return at, shape @ found.values, shape @ found.covariance @ shape.T
+def _extent(of: Unnamed, shape: Shape, flat: NDArray[np.float64] | None) -> tuple[float, float]:
+    """Least and greatest value of the variable over all runs, of a place along one direction in its plane."""
+    values = [_values(shape, run) for run in of.runs]
+    along = values if flat is None else [value @ flat for value in values]
+    return float(min(one.min() for one in along)), float(max(one.max() for one in along))

@@ -1,16 +1,17 @@
-"""Verdicts on sources, and what can be said where none of them is it."""
+"""Verdicts on sources."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.calibration.outliers import SOURCE_OF
 from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
-from dbbstation.diagnosis.unexplained_curve import curve_of
+from dbbstation.diagnosis.shapes import variable_of
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.race import Race, free_directions
+from dbbstation.inference.race import AS_GOOD, Race, as_good, free_directions, worth_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -18,9 +19,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.outliers import Outlier
     from dbbstation.diagnosis.channel import Channel
-    from dbbstation.inference.harmonics import Misfit
-    from dbbstation.inference.race import Candidate, Choice, Variant
+    from dbbstation.inference.race import Choice, Variant
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import ErrorSource
 
@@ -30,30 +31,14 @@ TESTABLE_SIGMA = 5.0
 TESTABLE_SHARE = 0.5
 """Share of the combinations of a source's amplitudes that must be seen for the source to be ruled out."""
 
-AS_GOOD = 5.0
-"""Difference in log evidence below which one source explains the recordings about as well as another."""
-
 OWN_LAW = 0.01
 """Share of its log evidence by which one source that grows with time must be better than another."""
-
-NAMED_EXPLAINS = 0.9
-"""Share of what the best unnamed shape explains that named sources must explain to be believed: below it they are
-only the nearest names of something else."""
-
-FLEXIBLE = 16
-"""Amplitudes from which on a source may imitate what it is not: joints that may be off, or run out, everywhere."""
-
-MADE_UP_FOR = 0.2
-"""Share of its evidence below which what others bring beside a flexible source only makes up for its failings."""
 
 CROWD = 3
 """Causes at once that are more than happens."""
 
 OUTWEIGHS = 10.0
 """By how much a first cause must outweigh what all others bring, to stand beside them."""
-
-SHAPE_THRESHOLD = 10.0
-"""Log evidence that an unnamed shape must bring."""
 
 
 def testable(race: Race, variant: Variant, others: Sequence[Variant]) -> bool:
@@ -104,12 +89,14 @@ def judge(
             values = _fitted_values(after, candidate.name)
             verdict = Verdict.AMBIGUOUS if alike else Verdict.IDENTIFIED
         else:
-            variant, gain = rest.best_variant(on_joint[candidate.name], [])
+            beside = on_joint[candidate.name]
+            variant, gain = rest.best_variant(beside, [])
+            variant = beside.whole(variant)
             values = _best_values(source, channel.machine, rest, variant)
             seen = testable(rest, variant, [])
             verdict = Verdict.RULED_OUT if seen else Verdict.NOT_TESTABLE
             verdict = Verdict.AMBIGUOUS if alike else verdict
-            variant, _ = race.best_variant(candidate, [])
+            variant = candidate.whole(race.best_variant(candidate, [])[0])
             signature = concealment([channel.joined], machine_columns, variant.columns, variant.plausible, free)
         findings.append(
             SourceFinding(
@@ -137,20 +124,16 @@ def _likenesses(
     does not tell one such source from another.
     """
     likes: dict[str, list[str]] = {}
-    names = {choice.candidate.name for choice in chosen}
     for choice in chosen:
-        others = [c.variant for c in chosen if c is not choice]
-        _, own = race.best_variant(choice.candidate, others)
-        beside = race.evidence(others)
-        for rival in channel.named:
-            if rival.name in names:
-                continue
-            _, theirs = race.best_variant(rival, others)
-            both = {sources[choice.candidate.name].varies_with, sources[rival.name].varies_with}
-            enough = max(AS_GOOD, OWN_LAW * (own - beside)) if both == {"time"} else AS_GOOD
-            if own - theirs < enough:
-                likes.setdefault(choice.candidate.name, []).append(rival.name)
-                likes.setdefault(rival.name, []).append(choice.candidate.name)
+        own = choice.candidate.name
+        lawful = [c for c in channel.named if {sources[own].varies_with, sources[c.name].varies_with} == {"time"}]
+        others = [c for c in channel.named if c not in lawful]
+        alike = as_good(race, chosen, choice, others, AS_GOOD)
+        if lawful:
+            alike += as_good(race, chosen, choice, lawful, max(AS_GOOD, OWN_LAW * worth_of(race, chosen, choice)))
+        for rival in alike:
+            likes.setdefault(own, []).append(rival)
+            likes.setdefault(rival, []).append(own)
     return {name: tuple(sorted(alike)) for name, alike in likes.items()}
 
 
@@ -208,24 +191,6 @@ def _text(source: ErrorSource, verdict: Verdict, alike: Sequence[str]) -> str:
     return "It would have been seen at its usual size and was not needed."
 
 
-@dataclass(frozen=True)
-class Rest:
-    """What is left without a name, and whether it overrules the names."""
-
-    finding: Unexplained
-    overrules: bool
-
-    def demoted(self, findings: Sequence[SourceFinding]) -> list[SourceFinding]:
-        """Findings with no source identified: the nearest name is not the right one."""
-        text = "It explains part of the misfit, but clearly less than the unnamed error does."
-        return [
-            replace(f, verdict=Verdict.RULED_OUT, ambiguous_with=(), text=text)
-            if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}
-            else f
-            for f in findings
-        ]
-
-
 def doubted(
     findings: Sequence[SourceFinding], rest: Unexplained, sources: Mapping[str, ErrorSource]
 ) -> tuple[SourceFinding, ...]:
@@ -239,7 +204,7 @@ def doubted(
         rest: what is left.
         sources: by name.
     """
-    variable = (rest.variable or "").removesuffix(" of the reading")
+    variable = variable_of(rest.variable) if rest.variable else ""
     of_it = {
         f.name
         for f in findings
@@ -253,6 +218,19 @@ def doubted(
         text = f"What is left follows {variable} too, so it may only make up for another law of {', '.join(alike)}."
         doubtful = replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text)
         told.append(doubtful if finding.name in of_it else finding)
+    return tuple(told)
+
+
+def beside_outliers(findings: Sequence[SourceFinding], outliers: Sequence[Outlier]) -> tuple[SourceFinding, ...]:
+    """Findings where a ball or bar that was set free might be one of the sources as well: neither is sure then."""
+    told = []
+    for finding in findings:
+        alike = tuple(SOURCE_OF[o.kind] for o in outliers if finding.name in o.alike)
+        if alike and finding.verdict in {Verdict.RULED_OUT, Verdict.NOT_TESTABLE}:
+            text = f"These tests cannot tell it from {', '.join(alike)}."
+            told.append(replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text))
+        else:
+            told.append(finding)
     return tuple(told)
 
 
@@ -277,67 +255,3 @@ def crowded(findings: Sequence[SourceFinding], chosen: Sequence[Choice], race: R
         text = f"Several causes are needed together, with {', '.join(others)}: one without a name may be behind them."
         told.append(replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=others, text=text))
     return tuple(told)
-
-
-def unexplained(
-    channel: Channel, joint: Channel, first: Misfit, left: Misfit, chosen: Sequence[Choice], *, significant: float
-) -> Rest:
-    """Look for an unnamed shape in what is left; let it overrule names that explain much less than it does.
-
-    Args:
-        channel: about the base fit.
-        joint: about the joint fit.
-        first: misfit of the base fit.
-        left: misfit of the joint fit.
-        chosen: sources that were found.
-        significant: probability below which a misfit counts.
-    """
-    race, candidate, variant, gain = _best_shape(channel, left.noise)
-    about = channel
-    named = [choice.variant for choice in chosen]
-    imitated = bool(named) and _imitates(race, named, variant)
-    if left.probability >= significant and not imitated:
-        return Rest(Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."), overrules=False)
-    # The first of the chosen explains most. Where even it falls short of one unnamed curve, the others were only
-    # called in to make up for that.
-    enough = NAMED_EXPLAINS * race.explained([variant])
-    overrules = imitated or (bool(named) and min(race.explained(named[:1]), race.explained(named)) < enough)
-    if named and not overrules:
-        # The names stand; what is left beside them is looked at about the joint fit.
-        about = joint
-        race, candidate, variant, gain = _best_shape(joint, left.noise)
-    rms_um = 1e3 * (first.rms if overrules else left.rms)
-    if gain < SHAPE_THRESHOLD:
-        text = "Something is left beyond noise, and no variable organises it clearly."
-        return Rest(Unexplained(rms_um, None, None, gain, text), overrules=False)
-    variable, _, strut = candidate.name.partition(" | ")
-    number = int(strut) if strut else None
-    text = (
-        f"An error without a known name, organised by {variable}, {f'strut {number}' if number else 'no single strut'}."
-    )
-    curve = curve_of(about, race, candidate.name, variant)
-    return Rest(Unexplained(rms_um, number, variable, gain, text, curve), overrules=overrules)
-
-
-def _imitates(race: Race, named: Sequence[Variant], shape: Variant) -> bool:
-    """Whether a source of many amplitudes only imitates an error that has no name.
-
-    It can follow nearly anything that is smooth in the pose. It has to bring more evidence than an unnamed curve of no
-    more amplitudes, and to leave nothing that others have to make up for: what they then bring is little beside it.
-    """
-    first = named[0]
-    if len(first.columns) < FLEXIBLE:
-        return False
-    alone = race.evidence([first])
-    if len(shape.columns) <= len(first.columns) and race.evidence([shape]) > alone:
-        return True
-    beside = race.evidence(named) - alone
-    return len(named) > 1 and beside < MADE_UP_FOR * alone
-
-
-def _best_shape(channel: Channel, noise_mm: float) -> tuple[Race, Candidate, Variant, float]:
-    """Unnamed shape with the greatest evidence on a channel."""
-    race = channel.race(noise_mm)
-    trials = [(*race.best_variant(candidate, []), candidate) for candidate in channel.unnamed]
-    variant, gain, candidate = max(trials, key=lambda trial: trial[1])
-    return race, candidate, variant, gain

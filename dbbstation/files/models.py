@@ -123,8 +123,8 @@ class _Sources:
             return None
         location = (*location, "parameters")
         expected = {parameter.name: parameter for parameter in parameters}
-        for name in expected:
-            if name not in entry.parameters:
+        for name, parameter in expected.items():
+            if name not in entry.parameters and not parameter.newer:
                 self._fault(location, f"{dotted(location)}: `{name}` of {source.name} is missing", "add it")
         for name, given in entry.parameters.items():
             if name not in expected:
@@ -134,9 +134,11 @@ class _Sources:
             elif given.unit != expected[name].unit:
                 what = f"{source.name} {name} is in {expected[name].unit}, not in {given.unit}"
                 self._fault((*location, name, "unit"), what, "convert the number, do not only change the unit")
-        if set(entry.parameters) != set(expected):
+        may_lack = {name for name, parameter in expected.items() if parameter.newer}
+        if set(entry.parameters) | may_lack != set(expected):
             return None
-        values = np.array([entry.parameters[name].value for name in expected], dtype=np.float64)
+        stated = {name: given.value for name, given in entry.parameters.items()}
+        values = np.array([stated.get(name, 0.0) for name in expected], dtype=np.float64)
         return Fitted(source, values, shared)
 
     def _fault(self, location: Location, what: str, remedy: str, *, at_key: bool = False) -> None:

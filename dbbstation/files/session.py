@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -183,12 +184,22 @@ class SessionFolder:
             place_known=ball.place_known,
             set_up_errors=next((reading.to_domain() for reading in readings), None),
             plate=ball.plate,
+            moving_s=self.moving_s,
         )
 
     def started_s(self, run: RunEntry) -> float | None:
         """Start of a run after that of the session's first [s]; None where not noted."""
         moments = [other.started for other in self.runs if other.started is not None]
         return None if run.started is None else (run.started - min(moments)).total_seconds()
+
+    @cached_property
+    def moving_s(self) -> tuple[tuple[float, float], ...]:
+        """Beginning and end of every run whose start is noted, kept or not, on the clock of `started_s` [s].
+
+        It ends when its circle is through at the plan's feed: a second or two do not count here.
+        """
+        circles = [(began, self.circle(run)) for run in self.runs if (began := self.started_s(run)) is not None]
+        return tuple(sorted((began, began + circle.swept_deg / circle.turning_deg_s) for began, circle in circles))
 
     def load(self, run: RunEntry) -> RunFile:
         """Read a run and hold it against what session and plan say of it.

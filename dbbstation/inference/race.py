@@ -28,6 +28,10 @@ PAIRED = 8
 """Best single candidates of which all pairs are tried."""
 
 
+AS_GOOD = 5.0
+"""Difference in log evidence below which one candidate explains measurements about as well as another."""
+
+
 @dataclass(frozen=True, eq=False)
 class Variant:
     """One form of a candidate: columns with priors, and the values of shape that they were made with.
@@ -38,12 +42,15 @@ class Variant:
         shape: values of the shape parameters, for reports.
         scale: of the prior, against the amplitudes' plausible sizes: 1, or less where effects smaller than usual are
             looked for. Many amplitudes that are all small would otherwise count as unlikely.
+        of: what it is the form of, where the variants of a candidate are several things of a kind and not several
+            shapes of one.
     """
 
     columns: NDArray[np.int64]
     prior: NDArray[np.float64]
     shape: tuple[float, ...] = ()
     scale: float = 1.0
+    of: str = ""
 
     @property
     def plausible(self) -> NDArray[np.float64]:
@@ -61,6 +68,11 @@ class Candidate:
 
     name: str
     variants: tuple[Variant, ...]
+
+    def whole(self, variant: Variant) -> Variant:
+        """Return the form with all its amplitudes, where a variant has some of them, at their plausible sizes."""
+        alike = [one for one in self.variants if one.shape == variant.shape and one.of == variant.of]
+        return max(alike, key=lambda one: len(one.columns)).scaled(1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +97,9 @@ class Race:
     Args:
         blocks: compressed runs over all columns, base first.
         base: what is known of the base columns.
-        held: orthonormal rows of fitted base directions to keep at zero, in units of the scales.
+        held: orthonormal rows of fitted base directions that the fit kept at zero, in units of the scales. They have
+            their usual size here: where it is seen at all, as the curvature of a model lets it be beside very little
+            noise, it is no sign of a candidate.
         columns: number of all columns.
         noise: standard deviation of one measurement, where a block does not state its own.
     """
@@ -97,9 +111,11 @@ class Race:
         whole = _whole(blocks, columns, noise)
         random, fitted = np.flatnonzero(base.random), np.flatnonzero(~base.random)
         free = free_directions(base, fitted, held)
-        eliminated = np.hstack([whole[:, random], whole[:, fitted] @ free])
-        priors = np.zeros((len(random), eliminated.shape[1] + columns - count + 1))
-        priors[np.arange(len(random)), np.arange(len(random))] = 1.0 / base.prior[random]
+        along = base.scale[fitted][:, None] * held.T
+        eliminated = np.hstack([whole[:, random], whole[:, fitted] @ along, whole[:, fitted] @ free])
+        sizes = np.concatenate([base.prior[random], np.ones(len(held))])
+        priors = np.zeros((len(sizes), eliminated.shape[1] + columns - count + 1))
+        np.fill_diagonal(priors, 1.0 / sizes)
         (triangle,) = qr(np.vstack([np.hstack([eliminated, whole[:, count:]]), priors]), mode="r")
         skip = eliminated.shape[1]
         self._first = count
@@ -249,6 +265,24 @@ def worth_of(race: Race, chosen: Sequence[Choice], one: Choice) -> float:
     others = [c.variant for c in chosen if c is not one]
     _, together = race.best_variant(one.candidate, others)
     return together - race.evidence(others)
+
+
+def as_good(
+    race: Race, chosen: Sequence[Choice], one: Choice, rivals: Sequence[Candidate], enough: float
+) -> tuple[str, ...]:
+    """Names of rivals, not chosen themselves, that do about as well in the place of one of the chosen.
+
+    Args:
+        race: on what the base leaves.
+        chosen: combination.
+        one: of them.
+        rivals: what might stand in its place.
+        enough: log evidence by which it must be better than a rival to be told from it.
+    """
+    names = {choice.candidate.name for choice in chosen}
+    others = [choice.variant for choice in chosen if choice is not one]
+    _, own = race.best_variant(one.candidate, others)
+    return tuple(r.name for r in rivals if r.name not in names and own - race.best_variant(r, others)[1] < enough)
 
 
 def _settled(race: Race, chosen: list[Choice]) -> list[Choice]:

@@ -50,7 +50,7 @@ def stability(
         rng: of the draws.
     """
     first = len(base.prior)
-    wanted = np.concatenate([np.arange(first), *(v.columns for c in candidates for v in c.variants)])
+    wanted = np.unique(np.concatenate([np.arange(first), *(v.columns for c in candidates for v in c.variants)]))
     place = {int(column): k for k, column in enumerate(wanted)}
     thin = [_thin(block, place) for block in blocks]
     moved = [

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.warm_up import grown_by, time_constant, warmed
+from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -18,9 +17,9 @@ MM_PER_UM = 1e-3
 
 
 class BarDrift(ErrorSource):
-    """The bar's reading drifts as its body takes the temperature of hand, machine and air: a (1 - exp(-t / tau)).
+    """The bar's reading drifts as its body takes the temperature of hand, machine and air.
 
-    Counted from the session's first sample, where the drift is zero by definition: what the bar was off then is its
+    It follows the growth of `warm_up`, counted from the session's first sample, where the drift is zero by definition: what the bar was off then is its
     offset. Sessions with the same bar share the drift, as they begin with the same handling.
     """
 
@@ -37,18 +36,14 @@ class BarDrift(ErrorSource):
         "steel of 150 mm reads 1.6 µm more or less per kelvin.",
         cure="Lay bar and calibrator on the machine table an hour before; touch the bar with gloves only; put it on the "
         "calibrator between the tests.",
-        equation="reading = distance + a (1 - exp(-t / tau)), t since the session's first sample",
-        origin="linear expansion and the first-order warm-up of a small body",
+        equation=f"reading = distance + g(t), g = {EQUATION}",
+        origin=ORIGIN,
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Drift in the end and time constant."""
-        return (
-            Parameter(
-                "drift_um", "µm", 2.0, "reading minus true distance, from the first sample to the end of warm-up"
-            ),
-            time_constant(1800.0, "the drift"),
-        )
+        """Drift in the end, time constant, what pauses take back."""
+        meaning = "reading minus true distance, from the first sample to the end of warm-up"
+        return warm_up_parameters(Parameter("drift_um", "µm", 2.0, meaning), 1800.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Drift of the reading.
@@ -56,16 +51,14 @@ class BarDrift(ErrorSource):
         Raises:
             ModelError: the motion has no time.
         """
-        return Effect(reading_mm=MM_PER_UM * values[0] * warmed(self._time_s(motion), values[1]))
+        self.require(motion)
+        return Effect(reading_mm=MM_PER_UM * grown(motion, values))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the drift and by the time constant.
+        """By the three parameters of the law.
 
         Raises:
             ModelError: the motion has no time.
         """
-        return Effect(reading_mm=MM_PER_UM * grown_by(self._time_s(motion), *values))
-
-    def _time_s(self, motion: Motion) -> NDArray[np.float64]:
         self.require(motion)
-        return np.asarray(motion.time_s)
+        return Effect(reading_mm=MM_PER_UM * grown_by(motion, values))

@@ -8,6 +8,7 @@ current.
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
@@ -84,6 +85,8 @@ class Setup:
         run: name of the run; empty where it has none.
         start_uncertainty_deg: how well the beginning of its turn is known along the travel, one standard deviation;
             zero where angles were recorded [deg].
+        moving_s: beginning and end of every run of the session, in order, on the clock of `Motion.time_s` [s]; empty
+            where nobody noted them.
     """
 
     session: str
@@ -99,6 +102,7 @@ class Setup:
     plate: Plate | None = None
     run: str = ""
     start_uncertainty_deg: float = 0.0
+    moving_s: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +166,7 @@ class Parameter:
             phase); empty for an amplitude, which the effect is proportional to.
         tolerance: standard deviation that the machine file states, in that unit: a fit takes it for known; None where
             nothing is stated.
+        newer: True for one that the source had not always: models written before lack it, and it is zero there.
     """
 
     name: str
@@ -170,6 +175,13 @@ class Parameter:
     meaning: str
     shape: tuple[float, ...] = ()
     tolerance: float | None = None
+    newer: bool = False
+
+    @property
+    def strut(self) -> int | None:
+        """Strut that it is of, 1 to 6, as `strut_3_um` and `joint_3_x_mm` say; None where it is of none."""
+        named = re.match(r"(?:strut|joint)_([1-6])_", self.name)
+        return int(named.group(1)) if named else None
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,8 @@ MM_PER_UM = 1e-3
 WAYS = ("upward", "sideways", "skew")
 ENDS = ("base", "platform")
 
+USUAL_UM = 20.0
+
 
 class JointRunout(LinearSource):
     """The axes of a joint do not meet, or its ball is not round: the strut's length changes as the joint swings.
@@ -29,8 +31,7 @@ class JointRunout(LinearSource):
     Let the second axis of a universal joint pass the first at the distance e, towards the strut. Swung by the angle
     beta about the second axis, the strut reaches e cos(beta) beyond the first, which the controller takes for its
     end: dL = e (cos(beta) - 1) = -e/2 sin²(beta) for small angles, with sin(beta) = u a, u the strut's direction and a
-    the first axis. Any other runout is no error of its own: an offset that is fixed in base or platform is a joint in
-    another place, one that is fixed in the strut another length.
+    the first axis. An offset that is fixed in the strut is another length.
 
     Where the axes point need not be known. With d the strut's direction in base or platform, less what it is in the
     middle of the travel, along v (in the strut's vertical plane) and h (level), both across the strut there,
@@ -40,6 +41,11 @@ class JointRunout(LinearSource):
     which holds for a universal joint whose first axis a lies across the strut there (e_vv = e a_v² and so on), and for an
     oval ball, whose radius is another quadratic form of the direction; all to second order in the swing. Three numbers
     for each of the twelve joints.
+
+    Where the strut's end is offset across the strut and goes round the first axis with it, as a crank does, its length
+    changes in the first order, dL = f_v d_v + f_h d_h: what a joint in another place does. In the base that is a part
+    of `base-joints` and left to it; in the platform two numbers more for each strut, and these tests can hardly tell
+    them from `platform-joints`.
     """
 
     name = "joint-runout"
@@ -52,25 +58,27 @@ class JointRunout(LinearSource):
         confirm="Take the strut off at its other end, put a dial gauge on the joint's housing towards the strut and "
         "swing the strut about one axis of the joint, then about the other.",
         cure="Exchange or shim the joint.",
-        equation="actual minus driven length = -1/2 (e_vv d_v² + e_hh d_h² + 2 e_vh d_v d_h) for each joint, d the "
-        "strut's direction less that in the middle of the travel",
+        equation="actual minus driven length = -1/2 (e_vv d_v² + e_hh d_h² + 2 e_vh d_v d_h) for each joint, and f_v d_v + "
+        "f_h d_h for that of the platform, d the strut's direction less that in the middle of the travel",
         origin="geometry of a universal (Hooke's) joint with offset axes, e (cos(beta) - 1), to second order in the swing",
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Three offsets for each joint of each strut."""
+        """Three offsets for each joint of each strut, and two across the strut for that of the platform."""
         swings = dict(zip(WAYS, ("up and down", "sideways", "both ways at once"), strict=True))
-        return tuple(
-            Parameter(
-                f"strut_{i + 1}_{end}_{way}_um",
-                "µm",
-                20.0,
-                f"offset of the axes of its {end} joint, as the strut swings {swings[way]}; positive: towards the strut",
-            )
-            for i in range(STRUTS)
-            for end in ENDS
-            for way in WAYS
-        )
+        towards = "offset of the axes of its {} joint, as the strut swings {}; positive: towards the strut"
+        across = "offset of the strut's end across it, which goes round the first axis of its platform joint: {} part"
+        found: list[Parameter] = []
+        for i in range(STRUTS):
+            of = f"strut_{i + 1}"
+            for end in ENDS:
+                found += [
+                    Parameter(f"{of}_{end}_{way}_um", "µm", USUAL_UM, towards.format(end, swings[way])) for way in WAYS
+                ]
+            found += [
+                Parameter(f"{of}_platform_across_{way}_um", "µm", USUAL_UM, across.format(way)) for way in WAYS[:2]
+            ]
+        return tuple(found)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each strut answers to the offsets of its own two joints."""
@@ -78,9 +86,10 @@ class JointRunout(LinearSource):
         unit, rest = inverse(machine.hexapod, frames).unit, inverse(machine.hexapod, middle(machine)).unit[0]
         across = _across(rest)
         in_platform = np.einsum("nji,nkj->nki", frames.rotation, unit)
-        forms = [_forms(np.einsum("nki,kai->nka", seen - rest, across)) for seen in (unit, in_platform)]
-        own = np.concatenate(forms, axis=2)[:, :, None, :] * np.eye(STRUTS)[:, :, None]
-        return Effect(strut_mm=-MM_PER_UM * own.reshape(len(motion), STRUTS, -1))
+        swings = [np.einsum("nki,kai->nka", seen - rest, across) for seen in (unit, in_platform)]
+        lengths = np.concatenate([*(-_forms(swing) for swing in swings), swings[1]], axis=2)
+        own = lengths[:, :, None, :] * np.eye(STRUTS)[:, :, None]
+        return Effect(strut_mm=MM_PER_UM * own.reshape(len(motion), STRUTS, -1))
 
 
 def _across(rest: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.warm_up import grown_by, time_constant, warmed
+from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,10 +21,10 @@ _OUT_OF_THE_SPINDLE = np.array([0.0, 0.0, -1.0])
 
 
 class SpindleGrowth(ErrorSource):
-    """The tool tip moves out of the spindle along its axis: a (1 - exp(-t / tau)).
+    """The tool tip moves out of the spindle along its axis by the growth g(t) of `warm_up`.
 
     Counted from the session's first sample, where the growth is zero by definition. A bar level with its ball does not
-    see it while the spindle is upright; tilted circles are shifted by a sin(tilt).
+    see it while the spindle is upright; tilted circles are shifted by g sin(tilt).
     """
 
     name = "spindle-growth"
@@ -40,16 +40,14 @@ class SpindleGrowth(ErrorSource):
         "time and speed as in the measurement.",
         cure="Measure with the spindle at rest and cool; else let it warm up at working speed first, or enter its growth "
         "as a tool length that follows the spindle's temperature.",
-        equation="tool tip moves along -z of the platform by a (1 - exp(-t / tau)), t since the session's first sample",
-        origin="thermal distortion caused by a rotating spindle, ISO 230-3; first-order warm-up",
+        equation=f"tool tip moves along -z of the platform by g(t) = {EQUATION}",
+        origin=f"thermal distortion caused by a rotating spindle, ISO 230-3; {ORIGIN}",
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Growth in the end and time constant."""
-        return (
-            Parameter("growth_um", "µm", 10.0, "way of the tool tip out of the spindle, from the first sample on"),
-            time_constant(1800.0, "the growth"),
-        )
+        """Growth in the end, time constant, what pauses take back."""
+        meaning = "way of the tool tip out of the spindle, from the first sample on"
+        return warm_up_parameters(Parameter("growth_um", "µm", 10.0, meaning), 1800.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Shift of the tool tip.
@@ -57,18 +55,15 @@ class SpindleGrowth(ErrorSource):
         Raises:
             ModelError: the motion has no time.
         """
-        growth_mm = MM_PER_UM * values[0] * warmed(self._time_s(motion), values[1])
-        return Effect(tool_tip_mm=growth_mm[:, None] * _OUT_OF_THE_SPINDLE)
+        self.require(motion)
+        return Effect(tool_tip_mm=MM_PER_UM * grown(motion, values)[:, None] * _OUT_OF_THE_SPINDLE)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the growth and by the time constant.
+        """By the three parameters of the law.
 
         Raises:
             ModelError: the motion has no time.
         """
-        law = MM_PER_UM * grown_by(self._time_s(motion), *values)
-        return Effect(tool_tip_mm=_OUT_OF_THE_SPINDLE[:, None] * law[:, None, :])
-
-    def _time_s(self, motion: Motion) -> NDArray[np.float64]:
         self.require(motion)
-        return np.asarray(motion.time_s)
+        law = MM_PER_UM * grown_by(motion, values)
+        return Effect(tool_tip_mm=_OUT_OF_THE_SPINDLE[:, None] * law[:, None, :])

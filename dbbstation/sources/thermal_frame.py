@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.warm_up import grown_by, time_constant, warmed
+from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -19,9 +18,9 @@ MM_PER_UM_M = 1e-6
 
 
 class ThermalFrame(ErrorSource):
-    """The base joints move away from the centre of the base plate: dQ_i = Q_i e (1 - exp(-t / tau)).
+    """The base joints move away from the centre of the base plate: dQ_i = Q_i g(t).
 
-    The plate is taken as evenly warm and held at its centre, the origin of the machine frame; one that is held elsewhere
+    g is the growth of `warm_up`. The plate is taken as evenly warm and held at its centre, the origin of the machine frame; one that is held elsewhere
     shifts as a whole as well, which is a matter of where the jig stands. Counted from the session's first sample,
     where the growth is zero by definition, as thermal-struts is.
     """
@@ -39,16 +38,14 @@ class ThermalFrame(ErrorSource):
         "half hour over a morning.",
         cure="Let machine and shop come to rest before measuring; keep the sun and warm air off the frame; repeat early "
         "tests at the end, so that the drift does not mix with the height of the ball.",
-        equation="dQ_i = Q_i e (1 - exp(-t / tau)), t since the session's first sample",
-        origin="linear expansion and the first-order warm-up of a body that is heated evenly",
+        equation=f"dQ_i = Q_i g(t), g = {EQUATION}",
+        origin=ORIGIN,
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Growth in the end and time constant."""
-        return (
-            Parameter("growth_um_m", "µm/m", 15.0, "growth of the base from the first sample to the end of warm-up"),
-            time_constant(7200.0, "the growth"),
-        )
+        """Growth in the end, time constant, what pauses take back."""
+        meaning = "growth of the base from the first sample to the end of warm-up"
+        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 15.0, meaning), 7200.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Shift of each base joint.
@@ -56,21 +53,18 @@ class ThermalFrame(ErrorSource):
         Raises:
             ModelError: the motion has no time.
         """
-        share = warmed(self._time_s(motion), values[1])
-        return Effect(base_joint_mm=values[0] * share[:, None, None] * _per_growth_mm(machine))
+        self.require(motion)
+        return Effect(base_joint_mm=grown(motion, values)[:, None, None] * _per_growth_mm(machine))
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the growth and by the time constant.
+        """By the three parameters of the law.
 
         Raises:
             ModelError: the motion has no time.
         """
-        law = grown_by(self._time_s(motion), *values)
-        return Effect(base_joint_mm=_per_growth_mm(machine)[:, :, None] * law[:, None, None, :])
-
-    def _time_s(self, motion: Motion) -> NDArray[np.float64]:
         self.require(motion)
-        return np.asarray(motion.time_s)
+        law = grown_by(motion, values)
+        return Effect(base_joint_mm=_per_growth_mm(machine)[:, :, None] * law[:, None, None, :])
 
 
 def _per_growth_mm(machine: Machine) -> NDArray[np.float64]:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
-from dbbstation.sources.warm_up import grown_by, time_constant, warmed
+from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -21,9 +20,9 @@ MM_PER_UM_M = 1e-6
 
 
 class ThermalStruts(ErrorSource):
-    """All struts grow alike, each in proportion to its length: dL_i = L_i e (1 - exp(-t / tau)).
+    """All struts grow alike, each in proportion to its length: dL_i = L_i g(t), g the growth of `warm_up`.
 
-    Counted from the session's first sample, where the growth is zero by definition: e is what the struts still had
+    Counted from the session's first sample, where the growth is zero by definition: it is what the struts still had
     to grow then, not their growth since the machine was switched on, and what they had grown before is part of their
     reference lengths. A cold and a warm start are therefore two different values, and a session predicted with this
     source starts as those did that it was fitted to.
@@ -42,16 +41,14 @@ class ThermalStruts(ErrorSource):
         "start. A thermometer on a strut shows about 1 K for each 11 µm/m of steel.",
         cure="Let the machine warm up with a movement like that of the measurement before it starts; repeat early "
         "tests at the end, so that the drift does not mix with the height of the ball.",
-        equation="actual minus driven length = L_i e (1 - exp(-t / tau)), t since the session's first sample",
-        origin="linear expansion and the first-order warm-up of a body that is heated evenly",
+        equation=f"actual minus driven length = L_i g(t), g = {EQUATION}",
+        origin=ORIGIN,
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Growth in the end and time constant."""
-        return (
-            Parameter("growth_um_m", "µm/m", 30.0, "growth of all struts from the first sample to the end of warm-up"),
-            time_constant(3600.0, "the growth"),
-        )
+        """Growth in the end, time constant, what pauses take back."""
+        meaning = "growth of all struts from the first sample to the end of warm-up"
+        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 30.0, meaning), 3600.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Growth of each strut.
@@ -59,21 +56,20 @@ class ThermalStruts(ErrorSource):
         Raises:
             ModelError: the motion has no time.
         """
-        per_growth, time_s = self._growth_mm(motion, machine)
-        return Effect(strut_mm=values[0] * warmed(time_s, values[1])[:, None] * per_growth)
+        per_growth = self._per_growth_mm(motion, machine)
+        return Effect(strut_mm=grown(motion, values)[:, None] * per_growth)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """By the growth and by the time constant.
+        """By the three parameters of the law.
 
         Raises:
             ModelError: the motion has no time.
         """
-        per_growth, time_s = self._growth_mm(motion, machine)
-        return Effect(strut_mm=per_growth[:, :, None] * grown_by(time_s, *values)[:, None, :])
+        per_growth = self._per_growth_mm(motion, machine)
+        return Effect(strut_mm=per_growth[:, :, None] * grown_by(motion, values)[:, None, :])
 
-    def _growth_mm(self, motion: Motion, machine: Machine) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Growth per µm/m of fully warmed struts, shape (n, 6) [mm], and the times, shape (n,) [s]."""
+    def _per_growth_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
+        """Growth of every strut per µm/m, shape (n, 6) [mm]."""
         self.require(motion)
         frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        time_s: NDArray[np.float64] = np.asarray(motion.time_s)
-        return MM_PER_UM_M * inverse(machine.hexapod, frames).length_mm, time_s
+        return MM_PER_UM_M * inverse(machine.hexapod, frames).length_mm

@@ -77,7 +77,8 @@ def cut(recording: Recording, circle: Circle) -> RawCircle:
             programmed one.
     """
     if recording.theta_deg is not None:
-        return _selected(recording, circle, circle.phi_deg(recording.theta_deg), np.ones(len(recording), dtype=bool))
+        phi = _along(circle.phi_deg(recording.theta_deg))
+        return _selected(recording, circle, phi, np.ones(len(recording), dtype=bool))
     edges = edges_of(recording, circle)
     phi = FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
     _check_feed(recording, circle, edges)
@@ -241,6 +242,17 @@ def _match(recording: Recording, circle: Circle, middle: float, start_s: float) 
     spread = float(np.sum((slope - slope.mean()) ** 2))
     remaining = float(np.sqrt(left @ left / (PIECES - 2)))
     return turn, (remaining / np.sqrt(spread) if spread > 0.0 else np.inf), remaining
+
+
+def _along(phi_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Progress in order of time: what ends a turn at its full 360 degrees does not stand at its beginning."""
+    start = phi_deg[:1]
+    if np.any(np.minimum(start, FULL_TURN_DEG - start) > LARGEST_GAP_DEG):
+        return phi_deg
+    early = np.arange(len(phi_deg)) < len(phi_deg) // 2
+    before = early & (phi_deg > FULL_TURN_DEG - LARGEST_GAP_DEG)
+    after = ~early & (phi_deg < LARGEST_GAP_DEG)
+    return phi_deg - FULL_TURN_DEG * before + FULL_TURN_DEG * after
 
 
 def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64], rows: NDArray[np.bool_]) -> RawCircle:

@@ -165,6 +165,14 @@ def test_parameters_that_do_not_hold_what_is_lost_are_refused(machine, under_spi
         calibrate(machine, runs, prescribe=[("base-joints", "joint_7_z_mm")])
 
 
+def test_what_no_run_depends_on_is_prescribed_itself(machine, on_jig):
+    """A session without a pause says nothing of what pauses take back; base joints cannot hold that."""
+    sources = [*default_sources(), known_sources()["thermal-frame"]]
+    calibration = calibrate(machine, on_jig, sources, prescribe=())
+    assert ("thermal-frame", "pause_loss_um_m") in calibration.prescribed
+    assert len(calibration.prescribed) == len(calibration.directions_lost)
+
+
 def test_a_tolerance_of_the_machine_file_stands_in_for_what_is_lost_and_is_said_to(machine, on_jig):
     without = calibrate(machine, on_jig)
     assert (without.directions_lost, without.directions_regularised) == ((RIGID[2],), ())

@@ -18,7 +18,7 @@ from dbbstation.virtual.truth import random_kinematics
 
 PLAY_UM, DRIFT_UM, CONSTANT_S = 4.0, 3.0, 1800.0
 
-VALUES = {"backlash": np.full(6, PLAY_UM), "bar-drift": np.array([DRIFT_UM, CONSTANT_S]), "gravity": np.array([9.7])}
+VALUES = {"backlash": np.full(6, PLAY_UM), "bar-drift": np.array([DRIFT_UM, CONSTANT_S, 0.0]), "gravity": np.array([9.7])}
 
 
 def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,24 @@ def test_every_source_survives_in_a_model(tmp_path: Path, source) -> None:
     (read,) = read_model(path, known_sources()).model.sources
     assert (read.source, read.shared) == (source, shared)
     assert np.array_equal(read.values, values)
+
+
+def test_a_parameter_that_a_source_had_not_yet_is_zero(tmp_path: Path, reference) -> None:
+    """A model with a warm-up, as it was written before pauses counted."""
+    source = known_sources()["thermal-struts"]
+    rows = tuple((source.name, "", name) for name in ("growth_um_m", "time_constant_s", "pause_loss_um_m"))
+    path = tmp_path / "model.yaml"
+    fitted = Fitted(source, np.array([21.5, 3000.0, 4.0]))
+    write_model(path, IdentifiedModel(MachineModel(reference, (fitted,)), rows[:2], np.eye(2)))
+    text = path.read_text()
+    lacking, count = re.subn(r",\s*pause_loss_um_m: \{[^}]*\}", "", text)
+    assert count == 1
+    path.write_text(lacking)
+    (read,) = read_model(path, known_sources()).model.sources
+    assert np.array_equal(read.values, [21.5, 3000.0, 0.0])
+    path.write_text(text.replace("time_constant_s", "time_constant_x"))
+    with pytest.raises(InputError, match="`time_constant_s` of thermal-struts is missing"):
+        read_model(path, known_sources())
 
 
 def test_writing_twice_needs_force(tmp_path: Path, reference) -> None:

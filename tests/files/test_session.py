@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import shutil
 from pathlib import Path
 
@@ -78,6 +79,18 @@ def test_what_an_entry_says() -> None:
     assert session.circle(rejected).ball_mm == session.circle(first).ball_mm
     assert session.started_s(first) == 0.0
     assert session.started_s(rejected) == 180.0
+
+
+def test_runs_that_were_not_kept_moved_the_machine_too() -> None:
+    session = read_session(SMALL)
+    starts = [session.started_s(run) for run in session.runs]
+    assert [began for began, _ in session.moving_s] == sorted(starts)
+    circle = session.circle(session.runs[0])
+    turn_s = (
+        (360.0 + 2.0 * circle.overshoot_deg) / 360.0 * 2.0 * math.pi * circle.radius_mm / (circle.feed_mm_min / 60.0)
+    )
+    assert session.moving_s[0] == pytest.approx((0.0, turn_s))
+    assert all(session.setup(run).moving_s == session.moving_s for run in session.runs)
 
 
 def test_runs_share_a_mounting_by_number_or_by_test(session: Path) -> None:

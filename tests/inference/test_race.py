@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.harmonics import bands, coefficients, misfit, smooth
 from dbbstation.inference.held_out import held_out
-from dbbstation.inference.race import Candidate, Race, Variant, select
+from dbbstation.inference.race import Candidate, Race, Variant, as_good, select
 from dbbstation.inference.square_root import Columns, compress, joined, solve
 from dbbstation.inference.stability import stability
 
@@ -276,6 +276,49 @@ def test_few_samples_per_period_are_looked_at_in_fewer_harmonics(rng):
 def test_nothing_left_at_all_is_no_misfit():
     phase = np.linspace(0, 2 * np.pi, 720, endpoint=False)
     assert misfit([np.zeros(720)] * 4, [phase] * 4, [0, 0, 1, 1], 0.0).probability == 1.0
+
+
+def test_what_was_held_may_still_be_seen_a_little_and_is_then_no_sign_of_a_candidate(rng):
+    """The slope of the base was held at zero. A candidate that is nearly a slope must not stand in for it."""
+    held = np.array([[0.0, 1.0]])
+    nearly = Columns(np.full(2, np.inf), np.array([1.0, 2.0]), np.zeros(2, dtype=bool))
+    for slope, noise in ((1.5, NOISE), (1.5, 0.1 * NOISE)):
+        columns = [np.column_stack([np.ones(60), T, T + 0.02 * np.sin(2 * np.pi * T)]) for _ in range(RUNS)]
+        targets = [slope * T + rng.normal(0, noise, 60) for _ in columns]
+        blocks = [compress(np.arange(3), c, t) for c, t in zip(columns, targets, strict=True)]
+        race = Race(blocks, nearly, held, 3, noise)
+        flat = np.vstack(columns)[:, :2] * [1e2, 2.0]
+        spread = flat @ flat.T + noise**2 * np.eye(60 * RUNS)
+        own = np.vstack(columns)[:, 2:]
+        logs = [multivariate_normal.logpdf(np.concatenate(targets), cov=spread + 4.0 * k * own @ own.T) for k in (0, 1)]
+        found = race.evidence([Variant(np.array([2]), np.array([2.0]))])
+        assert found == pytest.approx(logs[1] - logs[0], abs=1e-3)
+        assert found < 0
+
+
+def test_rivals_are_as_good_where_little_evidence_tells_them_apart(rng):
+    race, *_ = race_on(rng, [1.0, 0.0, 0.0, 0.0])
+    chosen = select(race, CANDIDATES, 5.0, 3)
+    assert [choice.candidate.name for choice in chosen] == ["sine"]
+    gaps = {
+        c.name: race.evidence([chosen[0].variant]) - race.evidence([c.variants[0]])
+        for c in CANDIDATES
+        if c.name != "sine"
+    }
+    between = sorted(gaps.values())
+    assert as_good(race, chosen, chosen[0], CANDIDATES, between[0] - 0.1) == ()
+    nearest = min(gaps, key=gaps.__getitem__)
+    assert as_good(race, chosen, chosen[0], CANDIDATES, (between[0] + between[1]) / 2) == (nearest,)
+
+
+def test_the_whole_form_of_one_strut_alone_has_all_amplitudes_at_their_usual_sizes():
+    whole = Variant(np.arange(6), np.full(6, 3.0), (1.0,))
+    one = Variant(np.array([2]), np.array([3.0]), (1.0,))
+    other = Variant(np.arange(6, 12), np.full(6, 3.0), (2.0,))
+    candidate = Candidate("play", (whole, whole.scaled(0.1), one, other))
+    assert candidate.whole(one).columns.tolist() == [0, 1, 2, 3, 4, 5]
+    assert candidate.whole(whole.scaled(0.1)).prior.tolist() == [3.0] * 6
+    assert candidate.whole(other).columns.tolist() == [6, 7, 8, 9, 10, 11]
 
 
 def test_two_that_make_each_other_needless_do_not_hang_the_selection(rng):

@@ -46,14 +46,14 @@ def across_the_strut(machine, rng):
 
 
 def offsets(axes_base, axes_platform, machine, offset_um):
-    """Offsets as parameters: e a_v², e a_h², e a_v a_h, with v in the strut's vertical plane and h level."""
+    """Offsets as parameters: e a_v², e a_h², e a_v a_h, with v in the strut's vertical plane and h level; no cranks."""
     rest = inverse(machine.hexapod, middle(machine)).unit[0]
     level = unit(np.cross(rest, [0.0, 0.0, 1.0]))
     up = np.cross(level, rest)
-    sizes = np.zeros((6, 2, 3))
+    sizes = np.zeros((6, 8))
     for k, (axes, e) in enumerate(zip((axes_base, axes_platform), offset_um, strict=True)):
         v, h = np.sum(axes * up, axis=1), np.sum(axes * level, axis=1)
-        sizes[:, k] = e * np.column_stack([v**2, h**2, v * h])
+        sizes[:, 3 * k : 3 * k + 3] = e * np.column_stack([v**2, h**2, v * h])
     return sizes.ravel()
 
 
@@ -89,6 +89,27 @@ def test_axes_that_do_not_meet_in_a_chain_of_bodies(machine, rng, offset_um):
     assert np.allclose(error, longer, atol=0.03 * np.abs(longer).max())
 
 
+def test_a_crank_in_the_platform_is_a_joint_in_another_place(machine, rng):
+    """Two numbers across each strut lengthen it as exact distances to moved joints do, less what they do at rest."""
+    rest = inverse(machine.hexapod, middle(machine)).unit[0]
+    level = unit(np.cross(rest, [0.0, 0.0, 1.0]))
+    up = np.cross(level, rest)
+    across_um = rng.normal(scale=20.0, size=(6, 2))
+    moved_mm = 1e-3 * (across_um[:, :1] * up + across_um[:, 1:] * level)
+    motion = random_run(rng, 80)
+
+    def longer(frames):
+        base, ends, turned = struts_at(machine, frames)
+        by_move = np.einsum("nij,kj->nki", turned, moved_mm)
+        return np.linalg.norm(ends + by_move - base, axis=2) - np.linalg.norm(ends - base, axis=2)
+
+    wanted = longer(Frames.from_poses(motion.poses, machine.hexapod.rotation)) - longer(middle(machine))
+    values = np.zeros((6, 8))
+    values[:, 6:] = across_um
+    assert np.abs(wanted).max() > 2e-3
+    assert np.allclose(RUNOUT.effect(motion, machine, values.ravel()).strut_mm, wanted, atol=1e-5)
+
+
 def test_three_numbers_of_a_joint_are_an_oval_ball(machine, rng):
     """A radius u S u in the platform, less what is a shift of the joint or a length; S may lean by 3 degrees.
 
@@ -99,7 +120,7 @@ def test_three_numbers_of_a_joint_are_an_oval_ball(machine, rng):
     direction = np.einsum("nji,nkj->nki", frames.rotation, inverse(machine.hexapod, frames).unit)[:, 3]
     rest = inverse(machine.hexapod, middle(machine)).unit[0, 3]
     frame = np.linalg.qr(np.column_stack([rest, rng.normal(size=(3, 2))]))[0]
-    by_offset = 1e3 * RUNOUT.derivative(motion, machine, np.zeros(36)).strut_mm[:, 3, 21:24]
+    by_offset = 1e3 * RUNOUT.derivative(motion, machine, np.zeros(48)).strut_mm[:, 3, 27:30]
     known = np.column_stack([by_offset, direction, np.ones(len(direction))])
     for lean_deg, allowed in ((0.0, 1e-9), (3.0, 0.02)):
         axes = Turn.from_rotvec(np.radians(lean_deg) * frame[:, 1]).as_matrix() @ frame
@@ -215,6 +236,6 @@ def test_a_hanging_strut_does_not_sag(reference):
 def test_little_of_sag_and_runout_is_left_by_a_kinematic_calibration(reference):
     runs = jig_runs(step_deg=6.0)
     sag = concealed_share(reference, runs, lambda m: SAG.derivative(m, reference, np.zeros(1)))
-    runout = concealed_share(reference, runs, lambda m: RUNOUT.derivative(m, reference, np.zeros(36)))
+    runout = concealed_share(reference, runs, lambda m: RUNOUT.derivative(m, reference, np.zeros(48)))
     assert sag[0] > 0.9
     assert (runout > 0.7).all()

@@ -54,6 +54,16 @@ def test_rows_with_angles_are_used_as_they_are():
     assert np.allclose(raw.theta_deg, theta)
 
 
+@pytest.mark.parametrize("extra_deg", [0.0, 0.3])
+def test_recorded_angles_keep_their_order_where_a_turn_begins_and_ends(extra_deg):
+    phi = np.arange(-extra_deg, 360.0 + extra_deg + 1e-9, 0.5)
+    theta = CIRCLE.theta_deg(phi)
+    recording = Recording("a run", np.arange(float(len(theta))), 150 + shape(theta), theta % 360)
+    raw = cut(recording, CIRCLE)
+    assert np.allclose(raw.phi_deg, phi)
+    assert np.all(np.diff(raw.phi_deg) > 0)
+
+
 @pytest.mark.parametrize("feed", [800, 900, 970, 995, 1005, 1030, 1100, 1200])
 def test_another_feed_is_found_and_named(feed):
     with pytest.raises(TraceError, match=r"a feed of .* plan says 1000") as refused:

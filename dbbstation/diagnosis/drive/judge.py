@@ -11,9 +11,10 @@ from dbbstation.diagnosis.drive.design import BASE
 from dbbstation.diagnosis.drive.findings import DriveFinding, Rest
 from dbbstation.diagnosis.drive.fit import fit, term_of
 from dbbstation.diagnosis.findings import Value, Verdict
-from dbbstation.diagnosis.verdicts import AS_GOOD, NAMED_EXPLAINS, SHAPE_THRESHOLD, testable
+from dbbstation.diagnosis.unexplained import NAMED_EXPLAINS
+from dbbstation.diagnosis.verdicts import testable
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.race import worth_of
+from dbbstation.inference.race import AS_GOOD, worth_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 SIGNIFICANT = 1e-3
 """Probability below which a misfit counts as one."""
+
+SHAPE_THRESHOLD = 10.0
+"""Log evidence that an unnamed shape must bring."""
 
 METHOD_SHARE = 0.002
 """Of the force's root mean square: low-pass and differences leave up to this of a drive that follows its model exactly,

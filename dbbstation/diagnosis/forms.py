@@ -1,0 +1,317 @@
+"""Forms of curves that an error without a name may follow along its variable: each is a few columns of amplitudes.
+
+A form says what its columns are at any values of its variable, and at which values its curve is printed.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+HATS = 7
+"""Points of a piecewise linear curve."""
+
+POINTS_PER_WAVE = 8
+POINTS_PER_WIDTH = 3
+"""Of a bump or a step: from four widths before it to four behind it."""
+
+WIDTHS = 4.0
+
+
+class Form(ABC):
+    """One family of curves over a variable; p amplitudes."""
+
+    @property
+    @abstractmethod
+    def count(self) -> int:
+        """Number of amplitudes, p."""
+
+    @abstractmethod
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Curve of each amplitude at values of the variable, shape (..., p)."""
+
+    @abstractmethod
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Places between least and greatest value at which a curve is printed, shape (q,)."""
+
+    @property
+    def text(self) -> str:
+        """What tells it from others of its kind; empty where there are none."""
+        return ""
+
+
+@dataclass(frozen=True, eq=False)
+class Hats(Form):
+    """Any smooth curve: straight between seven points. Limits are arrays where every strut has its own."""
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    @property
+    def count(self) -> int:
+        """One amplitude per point."""
+        return HATS
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """One at its own point, zero at all others."""
+        place = (values - self.low) / np.maximum(self.high - self.low, 1e-12) * (HATS - 1)
+        return np.maximum(0.0, 1.0 - np.abs(place[..., None] - np.arange(HATS)))
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Its own points, in the middle between struts that have their own."""
+        del low, high
+        return np.linspace(np.mean(self.low), np.mean(self.high), HATS)
+
+
+@dataclass(frozen=True, eq=False)
+class Wave(Form):
+    """Cosine and sine of one frequency [1 / unit of the variable]."""
+
+    frequency: float
+
+    @property
+    def count(self) -> int:
+        """Two."""
+        return 2
+
+    @property
+    def text(self) -> str:
+        """Its period."""
+        return f"period {1.0 / self.frequency:.6g}"
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Cosine, sine."""
+        phase = 2.0 * np.pi * self.frequency * values
+        return np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Eight per period, over one period at least and over all of the variable where that takes less than 2000."""
+        periods = min((high - low) * self.frequency, _MOST_PERIODS)
+        span = high - low if periods < _MOST_PERIODS else periods / self.frequency
+        return np.linspace(low, low + span, max(2, int(np.ceil(periods * POINTS_PER_WAVE)) + 1))
+
+
+_MOST_PERIODS = 250.0
+
+
+@dataclass(frozen=True, eq=False)
+class WaveOfTurn(Form):
+    """A wave of the angle since the start [turns] that need not close, with a phase of its own in each direction.
+
+    The variable is signed: positive in counterclockwise runs.
+    """
+
+    frequency: float
+
+    @property
+    def count(self) -> int:
+        """Cosine and sine for either direction."""
+        return 4
+
+    @property
+    def text(self) -> str:
+        """Waves per turn."""
+        return f"{self.frequency:.4g} per turn"
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Cosine and sine counterclockwise, then clockwise."""
+        both = Wave(self.frequency).columns(np.abs(values))
+        ccw = (values > 0.0)[..., None]
+        return np.concatenate([both * ccw, both * ~ccw], axis=-1)
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Clockwise runs first, each from its end to its start, then counterclockwise ones."""
+        del low, high
+        turn = np.linspace(0.0, 1.0, int(np.ceil(POINTS_PER_WAVE * max(self.frequency, 1.0))) + 1)
+        return np.concatenate([-turn[:0:-1], turn[1:]])
+
+
+@dataclass(frozen=True, eq=False)
+class Lobes(Form):
+    """Waves that close within one turn of an angle [deg]."""
+
+    numbers: tuple[int, ...]
+
+    @property
+    def count(self) -> int:
+        """Cosine and sine of each."""
+        return 2 * len(self.numbers)
+
+    @property
+    def text(self) -> str:
+        """How many lobes, where it is one number alone."""
+        return f"{self.numbers[0]} lobes" if len(self.numbers) == 1 else ""
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Cosine and sine of each."""
+        theta = np.radians(values)
+        return np.stack([f(k * theta) for k in self.numbers for f in (np.cos, np.sin)], axis=-1)
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """One turn, finely enough for the shortest wave."""
+        del low, high
+        step = 10.0 if max(self.numbers) <= 10 else 5.0  # noqa: PLR2004 - lobes as in `LOBES`
+        return np.arange(0.0, 360.0, step)
+
+
+@dataclass(frozen=True, eq=False)
+class Bump(Form):
+    """A bell about one value, with its standard deviation as width."""
+
+    centre: float
+    width: float
+
+    @property
+    def count(self) -> int:
+        """Its height."""
+        return 1
+
+    @property
+    def text(self) -> str:
+        """Where, how wide."""
+        return f"about {self.centre:.5g}, width {self.width:.3g}"
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """One at its centre."""
+        return np.exp(-0.5 * ((values - self.centre) / self.width) ** 2)[..., None]
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Across the bump."""
+        return _across(self.centre, self.width, low, high)
+
+
+@dataclass(frozen=True, eq=False)
+class Step(Form):
+    """Minus a half before one value, plus a half behind it, over a few widths."""
+
+    at: float
+    width: float
+
+    @property
+    def count(self) -> int:
+        """Its height."""
+        return 1
+
+    @property
+    def text(self) -> str:
+        """Where."""
+        return f"at {self.at:.5g}"
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """From minus to plus a half."""
+        return 0.5 * np.tanh((values - self.at) / self.width)[..., None]
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Across the step."""
+        return _across(self.at, self.width, low, high)
+
+
+def _across(at: float, width: float, low: float, high: float) -> NDArray[np.float64]:
+    """Points about one place, and the ends."""
+    near = at + width * np.linspace(-WIDTHS, WIDTHS, int(2 * WIDTHS * POINTS_PER_WIDTH) + 1)
+    return np.unique(np.concatenate([[low], near[(near > low) & (near < high)], [high]]))
+
+
+@dataclass(frozen=True, eq=False)
+class Sign(Form):
+    """One way round plus, the other way minus."""
+
+    @property
+    def count(self) -> int:
+        """One."""
+        return 1
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sign of the variable."""
+        return np.sign(values)[..., None]
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Either way."""
+        del low, high
+        return np.array([-1.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Proportional(Form):
+    """In proportion to the variable; the amplitude belongs to `unit` of it."""
+
+    unit: float
+
+    @property
+    def count(self) -> int:
+        """One."""
+        return 1
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variable in its unit."""
+        return (values / self.unit)[..., None]
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Both ends and the middle."""
+        return np.linspace(low, high, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Plane(Form):
+    """In proportion to each coordinate of a place, and with `constant` also the same everywhere."""
+
+    unit: float
+    coordinates: int
+    constant: bool = False
+
+    @property
+    def count(self) -> int:
+        """One per coordinate, and the constant."""
+        return self.coordinates + self.constant
+
+    @property
+    def text(self) -> str:
+        """Whether with a constant."""
+        return "with a constant" if self.constant else ""
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coordinates in their unit; values of shape (n, c)."""
+        scaled = values / self.unit
+        return np.column_stack([scaled, np.ones(len(scaled))]) if self.constant else scaled
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Both ends and the middle, along the direction in which most changes."""
+        return np.linspace(low, high, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneStep(Form):
+    """A step across a straight line in the plane, at an angle to +X and a distance from the origin."""
+
+    across_deg: float
+    at: float
+    width: float
+
+    @property
+    def count(self) -> int:
+        """Its height."""
+        return 1
+
+    @property
+    def text(self) -> str:
+        """Where."""
+        return f"across {self.across_deg:.0f} deg at {self.at:.4g} mm"
+
+    def along(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance from the origin across the line, shape (n,)."""
+        across = np.radians(self.across_deg)
+        return np.asarray(values @ np.array([np.cos(across), np.sin(across)]), dtype=np.float64)
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """From minus to plus a half; values of shape (n, 2)."""
+        return Step(self.at, self.width).columns(self.along(values))
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Across the line."""
+        return _across(self.at, self.width, low, high)

@@ -1,0 +1,312 @@
+"""First look for waves, bumps and steps: which of many forms the readings follow best, beside a base fitted anew.
+
+Readings are added up over narrow pieces of a variable, once for what the base leaves and once for everything that the
+base can do. Any curve over the variable then costs as much as it has pieces, and what it would explain beside the base
+is still exact but for the width of a piece. The best few of each kind enter the race as shapes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.fft import next_fast_len, rfft
+from scipy.sparse import csr_array
+
+from dbbstation.diagnosis.forms import Bump, Form, Lobes, PlaneStep, Step, Wave, WaveOfTurn
+from dbbstation.diagnosis.shapes import BALL, EVERY, PLAUSIBLE_MM, READING, TABLE, TOOL, Ranges, Samples, Shape
+from dbbstation.inference.race import free_directions
+from dbbstation.machine.geometry import STRUTS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.square_root import Columns
+
+STRONGEST = 2
+"""Forms of each kind that are kept as shapes."""
+
+PIECE_MM = 0.5
+"""Of strut length, for waves down to 4 mm [mm]."""
+
+SHORTEST_MM = 4.0
+"""Shortest wave of strut length that is looked for [mm]."""
+
+PIECES = 8192
+"""Of time, at the most."""
+
+SHORTEST_S = 3.0
+"""Shortest wave of time that is looked for; four pieces where the recordings last longer than that allows [s]."""
+
+FINER = (1.0 / 30.0, 1.0 / 450.0)
+"""Steps of frequency about the best one of the first look, as shares of one over the extent of the variable: the last
+keeps the phase of a wave to a degree from one end to the other."""
+
+WIDTHS_MM = (3.0, 5.0, 8.0, 13.0, 20.0)
+"""Standard deviations of bumps of strut length: dents and bent covers [mm]."""
+
+LOBES_ALONE = tuple(range(2, 31))
+"""Numbers of lobes that are looked for one at a time."""
+
+WAVES_PER_TURN = np.arange(0.2, 20.0, 0.05)
+"""Waves of the angle since the start: they need not close."""
+
+ACROSS_DEG = np.arange(0.0, 180.0, 15.0)
+LINE_WIDTHS_MM = (5.0, 20.0)
+"""Lines in the plane that a table may tip over at: their directions [deg] and widths [mm]."""
+
+PLACE_MM = 5.0
+"""Of the platform's position, either way [mm]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums over the pieces of one variable, for what moves in d directions.
+
+    Attributes:
+        at: mean of the variable in each piece, shape (b,) or (b, c).
+        rest: gain times what the base leaves, shape (b, d).
+        gains: gain times gain, shape (b, d, d).
+        base: gain times what the base can do, along orthonormal directions, shape (b, d, k).
+    """
+
+    at: NDArray[np.float64]
+    rest: NDArray[np.float64]
+    gains: NDArray[np.float64]
+    base: NDArray[np.float64]
+
+    def explained(self, curves: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Weighted sum of squares that curves explain beside the base, shape (m,), from (b, m, p)."""
+        pieces, many, count = curves.shape
+        flat = curves.reshape(pieces, many * count).T
+        rest = (flat @ self.rest).reshape(many, count, -1)
+        base = (flat @ self.base.reshape(pieces, -1)).reshape(many, count, *self.base.shape[1:])
+        pairs = (curves[:, :, :, None] * curves[:, :, None, :]).reshape(pieces, -1)
+        gains = (pairs.T @ self.gains.reshape(pieces, -1)).reshape(many, count, count, *self.gains.shape[1:])
+        return _solved(rest, base, gains)
+
+
+def _solved(rest: NDArray[np.float64], base: NDArray[np.float64], gains: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Explained sums of squares from products with curves: (m, p, d), (m, p, d, k) and (m, p, p, d, d)."""
+    many, size = len(rest), rest.shape[1] * rest.shape[2]
+    side = base.reshape(many, size, -1)
+    normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - side @ side.transpose(0, 2, 1)
+    normal = normal + np.eye(size)
+    right = rest.reshape(many, size, 1)
+    return np.asarray((right * np.linalg.solve(normal, right)).sum(axis=(1, 2)))
+
+
+class Look:
+    """What a fit leaves of all runs, and what its base can do, in units of noise.
+
+    Args:
+        runs: as shapes see them.
+        residual: per run, what the fit leaves, shape (n,) [mm].
+        jacobian: per run, of all base columns, shape (n, k).
+        base: what is known of these.
+        held: directions that are kept at nominal.
+        noise_mm: of one sample [mm].
+    """
+
+    def __init__(
+        self,
+        runs: Sequence[Samples],
+        residual: Sequence[NDArray[np.float64]],
+        jacobian: Sequence[NDArray[np.float64]],
+        base: Columns,
+        held: NDArray[np.float64],
+        noise_mm: float,
+    ) -> None:
+        self._runs, self._noise = runs, noise_mm
+        whole = np.vstack(jacobian)
+        random, fitted = np.flatnonzero(base.random), np.flatnonzero(~base.random)
+        columns = np.hstack([whole[:, fitted] @ free_directions(base, fitted, held), whole[:, random]]) / noise_mm
+        priors = np.zeros((len(random), columns.shape[1]))
+        priors[np.arange(len(random)), columns.shape[1] - len(random) + np.arange(len(random))] = (
+            1.0 / base.prior[random]
+        )
+        # Readings only: what the rows of the priors take part in is no reading.
+        self._base = np.linalg.qr(np.vstack([columns, priors]))[0][: len(whole)]
+        self._rest = np.concatenate(residual) / noise_mm
+
+    def sums(
+        self, variable: str, strut: int | None, moves: str, pieces: Callable[[NDArray[np.float64]], NDArray[np.int64]]
+    ) -> Sums:
+        """Add up over pieces of a variable, given the piece of each value."""
+        values = np.concatenate([run.values[variable] for run in self._runs])
+        gain = np.vstack([run.gain[moves or EVERY] for run in self._runs])
+        if strut is not None:
+            gain = gain[:, strut - 1 : strut]
+            values = values[:, strut - 1] if variable.startswith("strut-") else values
+        gain = gain * (PLAUSIBLE_MM / self._noise)
+        _, piece, number = np.unique(pieces(values), return_inverse=True, return_counts=True)
+        add = csr_array((np.ones(len(piece)), (piece, np.arange(len(piece)))), shape=(len(number), len(piece)))
+        many, directions = len(values), gain.shape[1]
+
+        def added(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray(add @ samples, dtype=np.float64)
+
+        at = added(values.reshape(many, -1)) / number[:, None]
+        products = (gain[:, :, None] * gain[:, None, :]).reshape(many, -1)
+        return Sums(
+            at=at[:, 0] if values.ndim == 1 else at,
+            rest=added(gain * self._rest[:, None]),
+            gains=added(products).reshape(-1, directions, directions),
+            base=np.stack([added(gain[:, d : d + 1] * self._base) for d in range(directions)], axis=1),
+        )
+
+
+def looked_for(look: Look, extent: Ranges) -> list[Shape]:
+    """Return the shapes that the readings follow best, some of every kind that the runs can show."""
+    found: list[Shape] = []
+    for strut in range(1, STRUTS + 1):
+        low, high = (float(limit["strut-length"][strut - 1]) for limit in (extent.low, extent.high))
+        sums = look.sums("strut-length", strut, "", partial(_piece, low=low, width=PIECE_MM))
+        found += _waves("strut-length", strut, "", sums, np.arange(0.5, (high - low) / SHORTEST_MM, 0.5) / (high - low))
+        found += _best("strut-length", "bump", strut, "", sums, _bumps(low, high), _BUMPS_APART)
+        found += _best("strut-length", "step", strut, "", sums, _steps(low, high), 1.0)
+        if "strut-force" in extent.low:
+            low, high = (float(limit["strut-force"][strut - 1]) for limit in (extent.low, extent.high))
+            wide = max(high - low, 1e-6) / _FORCES
+            sums = look.sums("strut-force", strut, "", partial(_piece, low=low, width=wide))
+            found += _best("strut-force", "step", strut, "", sums, _steps(low, high), 1.0)
+    if "time" in extent.low:
+        low, high = float(extent.low["time"]), float(extent.high["time"])
+        wide = max(SHORTEST_S / 4.0, (high - low) / PIECES)
+        movers: list[tuple[int | None, str]] = [(None, READING), (None, BALL)]
+        movers += [(strut, "") for strut in range(1, STRUTS + 1)]
+        for own, moves in movers:
+            sums = look.sums("time", own, moves, partial(_piece, low=low, width=wide))
+            found += _waves_of_time(own, moves, sums, low, wide, high - low)
+            found += _best("time", "step", own, moves, sums, _steps(low, high, _TIMES), 1.0)
+    if "angle" in extent.low:
+        sums = look.sums("angle", None, READING, partial(_piece, low=0.0, width=1.0))
+        found += _best("angle", "wave", None, READING, sums, [Lobes((k,)) for k in LOBES_ALONE], 1.0)
+        waves = [WaveOfTurn(float(f)) for f in WAVES_PER_TURN]
+        for moves in (READING, TOOL):
+            sums = look.sums("angle since the start", None, moves, partial(_piece, low=-1.5, width=_TURN))
+            found += _best("angle since the start", "wave", None, moves, sums, waves, _TURNS_APART)
+    for moves in (BALL, TABLE):
+        sums = look.sums("position of the platform", None, moves, _place)
+        found += _best("position of the platform", "step", None, moves, sums, _lines(sums.at), _LINES_APART)
+    return found
+
+
+_FORCES, _TIMES, _STEPS = 200, 100, 40
+_TURN = 1.0 / 360.0
+_BUMPS_APART, _TURNS_APART, _LINES_APART = 3.0, 4.0, 6.0
+"""How many neighbours in a list of forms are about the same: only every so many-th counts as another try."""
+
+
+def _piece(values: NDArray[np.float64], low: float, width: float) -> NDArray[np.int64]:
+    return np.floor((values - low) / width).astype(np.int64)
+
+
+def _place(values: NDArray[np.float64]) -> NDArray[np.int64]:
+    x, y = np.floor(values / PLACE_MM).astype(np.int64).T
+    return np.asarray(x * 100_000 + y, dtype=np.int64)
+
+
+def _bumps(low: float, high: float) -> list[Form]:
+    return [Bump(float(at), width) for width in WIDTHS_MM for at in np.arange(low + width, high - width, width / 2.0)]
+
+
+def _steps(low: float, high: float, count: int = _STEPS) -> list[Form]:
+    """Steps that are sharp, anywhere but at the very ends."""
+    wide = (high - low) / count
+    return [Step(float(at), wide / 4.0) for at in np.linspace(low, high, count + 1)[2:-2]] if wide > 0.0 else []
+
+
+def _lines(places: NDArray[np.float64]) -> list[Form]:
+    found: list[Form] = []
+    for across in ACROSS_DEG:
+        along = PlaneStep(float(across), 0.0, 1.0).along(places)
+        for width in LINE_WIDTHS_MM:
+            lines = np.arange(along.min() + 2 * width, along.max() - 2 * width, max(width, 2 * PLACE_MM))
+            found += [PlaneStep(float(across), float(at), width) for at in lines]
+    return found
+
+
+def _best(
+    variable: str, kind: str, strut: int | None, moves: str, sums: Sums, forms: Sequence[Form], apart: float
+) -> list[Shape]:
+    """Return the forms that explain most, of those that explain more than their neighbours in the list."""
+    if not forms:
+        return []
+    curves = np.stack([form.columns(sums.at) for form in forms], axis=1)
+    tried = max(len(forms) / apart, 1.0)
+    return [Shape(variable, kind, strut, moves, forms[k], tried) for k in _peaks(sums.explained(curves))]
+
+
+def _peaks(explained: NDArray[np.float64]) -> NDArray[np.int64]:
+    padded = np.concatenate([[-np.inf], explained, [-np.inf]])
+    peaks = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
+    return np.asarray(peaks[np.argsort(-explained[peaks])][:STRONGEST])
+
+
+def _waves(variable: str, strut: int | None, moves: str, sums: Sums, grid: NDArray[np.float64]) -> list[Shape]:
+    """Return waves of a grid of frequencies, made finer about the best ones."""
+    if len(grid) == 0:
+        return []
+    explained = sums.explained(_cosines(sums.at, grid))
+    return _finer(variable, strut, moves, sums, grid, explained)
+
+
+def _finer(
+    variable: str,
+    strut: int | None,
+    moves: str,
+    sums: Sums,
+    grid: NDArray[np.float64],
+    explained: NDArray[np.float64],
+) -> list[Shape]:
+    extent = float(np.ptp(sums.at))
+    found = []
+    for k in _peaks(explained):
+        best = grid[k]
+        for step in FINER:
+            near = best + np.arange(-15, 16) * step / extent
+            near = near[near > 0.25 / extent]
+            best = near[int(sums.explained(_cosines(sums.at, near)).argmax())]
+        found.append(Shape(variable, "wave", strut, moves, Wave(float(best)), len(grid) / 2.0))
+    return found
+
+
+def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cosine and sine of each frequency, shape (b, m, 2)."""
+    phase = 2.0 * np.pi * np.outer(at, frequencies)
+    return np.stack([np.cos(phase), np.sin(phase)], axis=2)
+
+
+def _waves_of_time(strut: int | None, moves: str, sums: Sums, low: float, width: float, extent: float) -> list[Shape]:
+    """Waves of time at all frequencies at once, by Fourier transformation of the sums."""
+    place = np.floor((sums.at - low) / width).astype(np.int64)
+    size = next_fast_len(2 * (int(place.max()) + 1), real=True)
+    first, last = max(1, int(np.floor(0.5 * size * width / extent))), size // 4
+
+    def transformed(values: NDArray[np.float64], step: int) -> NDArray[np.complex128]:
+        wide = np.zeros((size, values.shape[1]))
+        wide[place] = values
+        return np.asarray(rfft(wide, axis=0)[step * first : step * last : step])
+
+    grid = np.arange(first, last) / (size * width)
+    directions = sums.rest.shape[1]
+    rest = transformed(sums.rest, 1)
+    base = transformed(sums.base.reshape(len(place), -1), 1).reshape(len(grid), directions, -1)
+    twice = transformed(sums.gains.reshape(len(place), -1), 2).reshape(len(grid), directions, directions)
+    mean = sums.gains.sum(axis=0)
+    gains = np.empty((len(grid), 2, 2, directions, directions))
+    # cos² = (1 + cos 2x) / 2, sin² = (1 - cos 2x) / 2, sin cos = sin 2x / 2; a transform has exp(-ix).
+    gains[:, 0, 0], gains[:, 1, 1] = (mean + twice.real) / 2.0, (mean - twice.real) / 2.0
+    gains[:, 0, 1] = gains[:, 1, 0] = -twice.imag / 2.0
+    explained = _solved(_sides(rest), _sides(base), gains)
+    return _finer("time", strut, moves, sums, grid, explained)
+
+
+def _sides(transform: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Sums with cosine and with sine, shape (m, 2, ...)."""
+    return np.stack([transform.real, -transform.imag], axis=1)

@@ -1,0 +1,134 @@
+"""What can be said of what is left where no source explains it, and whether names have to give way to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Verdict
+from dbbstation.diagnosis.unexplained_curve import curve_of
+from dbbstation.diagnosis.unnamed import unnamed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.calibration.fit import Calibration
+    from dbbstation.diagnosis.unnamed import Best, Unnamed
+    from dbbstation.inference.harmonics import Misfit
+    from dbbstation.inference.race import Choice, Race, Variant
+
+NAMED_EXPLAINS = 0.9
+"""Share of what the best unnamed shape explains that named sources must explain to be believed: below it they are
+only the nearest names of something else."""
+
+FLEXIBLE = 16
+"""Amplitudes from which on a source may imitate what it is not: joints that may be off, or run out, everywhere."""
+
+MADE_UP_FOR = 0.2
+"""Share of its evidence below which what others bring beside a flexible source only makes up for its failings."""
+
+SHAPE_THRESHOLD = 8.0
+"""Log evidence that an unnamed shape must bring, what picking it from many costs taken off. A misfit of the low harmonics
+as a whole is not asked for: a wave or a bump can hide in them. Of recordings with nothing to find one in thousands brings
+as much."""
+
+OVERRULES_BY = 5.0
+"""Log evidence by which it must be better than names to overrule them, beside explaining more: one that can be bent to
+nearly anything explains a little more of any noise."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What is left without a name, and whether it overrules the names."""
+
+    finding: Unexplained
+    overrules: bool
+
+    @property
+    def found(self) -> bool:
+        """Whether something organises it clearly."""
+        return self.finding.variable is not None
+
+    def demoted(self, findings: Sequence[SourceFinding]) -> list[SourceFinding]:
+        """Findings with no source identified: the nearest name is not the right one."""
+        text = "It explains part of the misfit, but clearly less than the unnamed error does."
+        return [
+            replace(f, verdict=Verdict.RULED_OUT, ambiguous_with=(), text=text)
+            if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}
+            else f
+            for f in findings
+        ]
+
+
+def unexplained(
+    before: Calibration,
+    after: Calibration,
+    race: Race,
+    first: Misfit,
+    left: Misfit,
+    chosen: Sequence[Choice],
+    *,
+    significant: float,
+) -> Rest:
+    """Look for an unnamed shape in what is left; let it overrule names that explain much less than it does.
+
+    Args:
+        before: the base fit.
+        after: the joint fit.
+        race: of the named sources about the base fit, with the noise that is left in the end.
+        first: misfit of the base fit.
+        left: misfit of the joint fit.
+        chosen: sources that were found.
+        significant: probability below which a misfit counts.
+    """
+    named = [choice.variant for choice in chosen]
+    of = unnamed(before, left.noise)
+    best = of.best()
+    overrules = bool(named) and _overrules(race, named, of, best)
+    if named and not overrules:
+        # The names stand; what is left beside them is looked at about the joint fit.
+        of = unnamed(after, left.noise)
+        best = of.best()
+    misfit = left.probability < significant or overrules
+    rms_um = 1e3 * (first.rms if overrules else left.rms)
+    if best.gain < SHAPE_THRESHOLD:
+        if not misfit:
+            return Rest(Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."), overrules=False)
+        text = "Something is left beyond noise, and no variable organises it clearly."
+        return Rest(Unexplained(rms_um, None, None, best.gain, text), overrules=False)
+    shape, curve = best.shape, curve_of(of, best)
+    where = f"strut {shape.strut}" if shape.strut else "no single strut"
+    text = f"An error without a known name, organised by {shape.name}, {where}."
+    rms_um = rms_um if misfit else curve.unconcealed_um
+    return Rest(Unexplained(rms_um, shape.strut, shape.name, best.gain, text, curve), overrules=overrules)
+
+
+def _overrules(race: Race, named: Sequence[Variant], of: Unnamed, best: Best) -> bool:
+    """Whether one unnamed shape is clearly better than what has a name.
+
+    The first of the chosen explains most. Where even it falls short of one unnamed curve, the others were only called in
+    to make up for that.
+    """
+    if _imitates(race, named, best):
+        return True
+    enough = NAMED_EXPLAINS * of.race.explained([best.variant])
+    for some in (named[:1], named):
+        if race.explained(some) < enough and best.gain > race.evidence(some) + OVERRULES_BY:
+            return True
+    return False
+
+
+def _imitates(race: Race, named: Sequence[Variant], best: Best) -> bool:
+    """Whether a source of many amplitudes only imitates an error that has no name.
+
+    It can follow nearly anything that is smooth in the pose. It has to bring more evidence than an unnamed curve of no
+    more amplitudes, and to leave nothing that others have to make up for: what they then bring is little beside it.
+    """
+    first = named[0]
+    if len(first.columns) < FLEXIBLE:
+        return False
+    alone = race.evidence([first])
+    if len(best.variant.columns) <= len(first.columns) and best.gain > alone:
+        return True
+    beside = race.evidence(named) - alone
+    return len(named) > 1 and beside < MADE_UP_FOR * alone

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.directions import in_words
-from dbbstation.inference.square_root import complement
+from dbbstation.inference.square_root import complement, spread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -93,15 +93,7 @@ def visibility(calibration: Calibration) -> Visibility:
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
     scale = known.scale[fitted]
-    place = np.full(len(known.random), -1)
-    place[fitted] = np.arange(len(fitted))
-    rows = [np.zeros((0, len(fitted)))]
-    for block in calibration.circle_blocks:
-        own = place[block.columns] >= 0
-        wide = np.zeros((len(block.target), len(fitted)))
-        wide[:, place[block.columns[own]]] = block.triangle[:, own]
-        rows.append(wide * scale)
-    whole = np.vstack(rows)
+    whole = spread(calibration.circle_blocks, len(known.random))[:, fitted] * scale
     free = complement(calibration.solution.held)
     singular = np.asarray(np.linalg.svd(whole @ free.T, compute_uv=False), dtype=np.float64)
     singular = singular[singular > ROUNDING * singular[0]]  # circles see nothing of what moves currents only
@@ -179,14 +171,9 @@ def _leverage(calibration: Calibration, fitted: NDArray[np.int64]) -> dict[str, 
     worth: dict[str, float] = {}
     for test, blocks in tests.items():
         own = np.setdiff1d(touched[test], common)
-        place = np.full(len(known.random), -1)
-        place[own], place[common] = np.arange(len(own)), len(own) + np.arange(len(common))
-        rows = [np.hstack([np.diag(1.0 / known.prior[own]), np.zeros((len(own), len(common)))])]
-        for block in blocks:
-            wide = np.zeros((len(block.target), len(own) + len(common)))
-            wide[:, place[block.columns]] = block.triangle / noise
-            rows.append(wide)
-        triangle = np.asarray(np.linalg.qr(np.vstack(rows), mode="r"), dtype=np.float64)
+        priors = np.hstack([np.diag(1.0 / known.prior[own]), np.zeros((len(own), len(common)))])
+        rows = spread(blocks, len(known.random))[:, np.concatenate([own, common])] / noise
+        triangle = np.asarray(np.linalg.qr(np.vstack([priors, rows]), mode="r"), dtype=np.float64)
         root = triangle[len(own) :, len(own) :]
         worth[test] = float(np.sum((root @ covariance) * root))
     return worth

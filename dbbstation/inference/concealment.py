@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.square_root import spread
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -51,13 +53,8 @@ def concealment(
             direction that was held swallows nothing, even where it is not quite lost.
     """
     wanted = np.concatenate([fitted, columns])
-    size = int(max(int(block.columns.max()) for block in blocks)) + 1
-    rows = []
-    for block in blocks:
-        wide = np.zeros((len(block.target), max(size, int(wanted.max()) + 1)))
-        wide[:, block.columns] = block.triangle
-        rows.append(wide[:, wanted])
-    stacked = np.vstack(rows)
+    size = 1 + max(int(wanted.max()), *(int(block.columns.max()) for block in blocks))
+    stacked = spread(blocks, size)[:, wanted]
     explaining, signature = stacked[:, : len(fitted)], stacked[:, len(fitted) :] @ amplitudes
     explaining = explaining if free is None else explaining @ free
     u, s, _ = np.linalg.svd(explaining / np.maximum(np.linalg.norm(explaining, axis=0), 1e-300), full_matrices=False)

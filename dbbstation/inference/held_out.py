@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.square_root import Block, Columns, Solution, solve
+from dbbstation.inference.square_root import Block, Columns, Solution, solve, spread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -71,15 +71,6 @@ def _restricted(block: Block, active: NDArray[np.int64]) -> Block:
     return Block(columns, block.triangle[:, inside], block.target, block.count, block.square)
 
 
-def _wide(blocks: Sequence[Block], size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    rows = []
-    for block in blocks:
-        wide = np.zeros((len(block.target), size))
-        wide[:, block.columns] = block.triangle
-        rows.append(wide)
-    return np.vstack(rows), np.concatenate([block.target for block in blocks])
-
-
 def _weighted(blocks: Sequence[Block], fitted: Solution, noise: float) -> tuple[float, int]:
     """Sum of squares of what predictions leave, weighted by its predicted covariance, and its degrees of freedom.
 
@@ -87,22 +78,22 @@ def _weighted(blocks: Sequence[Block], fitted: Solution, noise: float) -> tuple[
     """
     # The last row of a triangle holds the length of what no column reaches, which is not one measurement's noise.
     cut = [Block(b.columns, b.triangle[:-1], b.target[:-1], b.count, b.square) for b in blocks]
-    whole, target = _wide(cut, len(fitted.x))
-    remaining = (target - whole @ fitted.x) / noise
+    whole, target = np.hsplit(spread(cut, len(fitted.x)), [-1])
+    remaining = (target[:, 0] - whole @ fitted.x) / noise
     variance, axes = np.linalg.eigh(fitted.covariance)
-    spread = whole @ (axes * np.sqrt(np.maximum(variance, 0.0))) / noise
-    towards = spread.T @ remaining
-    explained = towards @ np.linalg.solve(np.eye(len(towards)) + spread.T @ spread, towards)
+    uncertain = whole @ (axes * np.sqrt(np.maximum(variance, 0.0))) / noise
+    towards = uncertain.T @ remaining
+    explained = towards @ np.linalg.solve(np.eye(len(towards)) + uncertain.T @ uncertain, towards)
     return float(remaining @ remaining - explained), len(remaining)
 
 
 def _left(blocks: Sequence[Block], known: Columns, x: NDArray[np.float64], noise: float) -> float:
     """Sum of squares that is left of blocks once their random effects have settled."""
     random = np.flatnonzero(known.random)
-    whole, target = _wide(blocks, len(known.prior))
+    whole, target = np.hsplit(spread(blocks, len(known.prior)), [-1])
     fixed = x.copy()
     fixed[random] = 0.0
-    remaining = target - whole @ fixed
+    remaining = target[:, 0] - whole @ fixed
     stacked = np.vstack([whole[:, random] / noise, np.diag(1.0 / known.prior[random])])
     effects, *_ = np.linalg.lstsq(stacked, np.concatenate([remaining / noise, np.zeros(len(random))]), rcond=None)
     remaining = remaining - whole[:, random] @ effects

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.square_root import spread
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -26,18 +28,11 @@ def jackknife_covariance(blocks: Sequence[Block], size: int) -> NDArray[np.float
         blocks: compressed runs, at least two; values that one block alone knows come out with a large variance.
         size: number of columns k.
     """
-    wide, targets = [], []
-    for block in blocks:
-        rows = np.zeros((len(block.target), size))
-        rows[:, block.columns] = block.triangle
-        wide.append(rows)
-        targets.append(block.target)
-    norm = np.maximum(np.linalg.norm(np.vstack(wide), axis=0), 1e-300)
+    norm = np.maximum(np.linalg.norm(spread(blocks, size)[:, :-1], axis=0), 1e-300)
     values = []
     for out in range(len(blocks)):
-        kept = np.vstack([rows for k, rows in enumerate(wide) if k != out]) / norm
-        target = np.concatenate([one for k, one in enumerate(targets) if k != out])
-        found, *_ = np.linalg.lstsq(kept, target, rcond=1e-12)
+        kept = spread([block for k, block in enumerate(blocks) if k != out], size)
+        found, *_ = np.linalg.lstsq(kept[:, :-1] / norm, kept[:, -1], rcond=1e-12)
         values.append(found / norm)
     away = np.array(values) - np.mean(values, axis=0)
     return np.asarray((len(blocks) - 1) / len(blocks) * away.T @ away, dtype=np.float64)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import qr
 
-from dbbstation.inference.square_root import complement
+from dbbstation.inference.square_root import complement, spread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -296,13 +296,7 @@ def _settled(race: Race, chosen: list[Choice]) -> list[Choice]:
 
 def _whole(blocks: Sequence[Block], columns: int, noise: float) -> NDArray[np.float64]:
     """One triangle of all blocks, target last, weighted by their noise."""
-    rows = []
-    for block in blocks:
-        wide = np.zeros((len(block.target), columns + 1))
-        wide[:, block.columns] = block.triangle
-        wide[:, -1] = block.target
-        rows.append(wide / (noise if block.noise is None else block.noise))
-    (triangle,) = qr(np.vstack(rows), mode="r", overwrite_a=True)
+    (triangle,) = qr(spread(blocks, columns, noise), mode="r", overwrite_a=True)
     return np.asarray(triangle, dtype=np.float64)[: columns + 1]
 
 

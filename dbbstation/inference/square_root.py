@@ -58,17 +58,32 @@ def compress(columns: NDArray[np.int64], jacobian: NDArray[np.float64], target: 
     return Block(columns, triangle[:, :-1], triangle[:, -1], len(target), float(target @ target))
 
 
-def joined(blocks: Sequence[Block], columns: int) -> Block:
-    """One block over all columns that says what several blocks of one noise say together."""
+def spread(blocks: Sequence[Block], columns: int, noise: float | None = None) -> NDArray[np.float64]:
+    """Rows of all blocks over all columns, target last, shape (r, columns + 1).
+
+    Args:
+        blocks: compressed runs.
+        columns: number of all columns.
+        noise: standard deviation of one measurement, where a block does not state its own: rows are divided by it, so
+            that all weigh alike; None leaves them as they are.
+    """
     wide = np.zeros((sum(len(block.target) for block in blocks), columns + 1))
     row = 0
     for block in blocks:
-        if block.noise is not None:
-            raise ValueError("blocks with a noise of their own cannot be joined with others")
-        wide[row : row + len(block.target), block.columns] = block.triangle
-        wide[row : row + len(block.target), -1] = block.target
-        row += len(block.target)
-    triangle = _triangle(wide)
+        rows = wide[row : row + len(block.target)]
+        rows[:, block.columns] = block.triangle
+        rows[:, -1] = block.target
+        if noise is not None:
+            rows /= noise if block.noise is None else block.noise
+        row += len(rows)
+    return wide
+
+
+def joined(blocks: Sequence[Block], columns: int) -> Block:
+    """One block over all columns that says what several blocks of one noise say together."""
+    if any(block.noise is not None for block in blocks):
+        raise ValueError("blocks with a noise of their own cannot be joined with others")
+    triangle = _triangle(spread(blocks, columns))
     return Block(
         columns=np.arange(columns),
         triangle=triangle[:, :-1],
@@ -212,17 +227,11 @@ def _stacked(
     total = len(known.prior)
     place = np.empty(total, dtype=np.int64)
     place[order] = np.arange(total)
-    rows = [np.zeros((0, total + 1))]
-    for block in blocks:
-        wide = np.zeros((len(block.target), total + 1))
-        own = noise if block.noise is None else block.noise
-        wide[:, place[block.columns]] = block.triangle / own
-        wide[:, -1] = block.target / own
-        rows.append(wide)
+    rows = spread(blocks, total, noise)[:, [*order, total]]
     finite = np.flatnonzero(np.isfinite(known.prior))
     priors = np.zeros((len(finite), total + 1))
     priors[np.arange(len(finite)), place[finite]] = 1.0 / known.prior[finite]
-    triangle = _triangle(np.vstack([*rows, priors, np.zeros((total + 1, total + 1))]))
+    triangle = _triangle(np.vstack([rows, priors, np.zeros((total + 1, total + 1))]))
     floor = float(triangle[total, total] ** 2)
     root: NDArray[np.float64] = triangle[:total, :total]
     return root, triangle[:total, -1], floor

@@ -13,7 +13,8 @@ from dbbstation.calibration.on_the_plate import ball_shifts, circle_tests
 from dbbstation.calibration.residual_map import residual_map
 from dbbstation.calibration.visibility import visibility
 from dbbstation.plan.circle import Direction
-from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, as_svg, draw_maps, in_style
+from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, draw_maps, in_style
+from dbbstation.report.svg import as_svg
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

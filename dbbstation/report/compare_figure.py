@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
 from dbbstation.diagnosis.compare_summary import by_angle_um
 from dbbstation.plan.circle import Direction
+from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, in_style
+from dbbstation.report.svg import as_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,17 +18,14 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.compare import Comparison, RunDifference
 
-STYLE: Any = {"svg.hashsalt": "dbbstation", "font.size": 9, "axes.titlesize": 10, "svg.fonttype": "none"}
-"""Same input, same bytes; text stays text."""
-
 OVERLAYS = 3
-COLOUR_A, COLOUR_B = "#1f6fb2", "#c0392b"
+COLOUR_A, COLOUR_B = AFTER, BEFORE
 
 
 def compare_figure(found: Comparison) -> bytes:
     """Draw maps of the difference over test and angle, and the worst runs of three tests, as SVG."""
     tests = list(dict.fromkeys((run.pair.test, run.pair.number) for run in found.runs))
-    with mpl.rc_context(STYLE):
+    with in_style():
         figure = Figure(figsize=(11.0, 6.0 + 0.2 * len(tests)), layout="constrained")
         halves: Any = figure.subfigures(2, 1, height_ratios=(1.2 + 0.2 * len(tests), 4.2))
         upper, lower = halves
@@ -42,9 +39,7 @@ def compare_figure(found: Comparison) -> bytes:
             _overlay(lines[0, k], lines[1, k], run)
         lines[0, 0].set_ylabel("length less commanded, µm")
         lines[1, 0].set_ylabel("B less A, µm")
-        out = io.BytesIO()
-        figure.savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
+        return as_svg(figure)
 
 
 def _worst(found: Comparison) -> list[RunDifference]:
@@ -60,11 +55,11 @@ def _map(axes: Axes, found: Comparison, tests: list[tuple[str, int]], direction:
     nothing = np.full(len(by_angle_um(found.runs[0])), np.nan)
     values = np.array([rows.get(test, nothing) for test in tests])
     edges = np.linspace(0.0, 360.0, values.shape[1] + 1)
-    mesh = axes.pcolormesh(edges, np.arange(len(tests) + 1), values, cmap="RdBu_r", vmin=-reach, vmax=reach)
+    mesh = axes.pcolormesh(edges, np.arange(len(tests) + 1), values, cmap=DIVERGING, vmin=-reach, vmax=reach)
     numbered = any(number > 1 for _, number in tests)
     axes.set_yticks(np.arange(len(tests)) + 0.5, [f"{test} {n}" if numbered else test for test, n in tests])
     axes.set_ylim(len(tests), 0)
-    axes.set_xticks(range(0, 361, 90))
+    axes.set_xticks(QUARTERS)
     axes.set_xlabel("angle from +X towards +Y, degrees")
     axes.set_title(f"difference, {str(direction).upper()}")
     return mesh
@@ -76,9 +71,9 @@ def _overlay(readings: Axes, differences: Axes, run: RunDifference) -> None:
     readings.plot(theta, 1e3 * run.pair.a_mm, color=COLOUR_A, linewidth=1.0, label="A")
     readings.plot(theta, 1e3 * run.pair.b_mm, color=COLOUR_B, linewidth=1.0, label="B")
     readings.set_title(f"{run.pair.label}: {1e3 * run.rms_mm:.1f} µm rms apart")
-    readings.legend(frameon=False)
+    readings.legend()
     differences.plot(theta, 1e3 * run.pair.difference_mm, color="#bbbbbb", linewidth=0.6)
     differences.plot(theta, 1e3 * run.smooth_mm, color="black", linewidth=1.2)
     differences.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
-    differences.set_xticks(range(0, 361, 90))
+    differences.set_xticks(QUARTERS)
     differences.set_xlabel("angle, degrees")

@@ -13,7 +13,9 @@ from dbbstation.calibration.residual_map import residual_map
 from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.source_curves import source_curves
 from dbbstation.plan.circle import Direction
-from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, as_svg, draw_maps, in_style
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, draw_maps, in_style
+from dbbstation.report.svg import as_svg
+from dbbstation.report.unexplained_panel import draw_unexplained
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,22 +37,24 @@ LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
 def diagnosis_figure(diagnosis: Diagnosis) -> bytes:
-    """Draw maps of the misfit, errors over what organises them, traces and gains per test, as SVG."""
+    """Draw maps of the misfit, errors over what organises them and what has no name, traces and gains, as SVG."""
     with in_style():
         return as_svg(draw_diagnosis(diagnosis))
 
 
 def draw_diagnosis(diagnosis: Diagnosis) -> Figure:
-    """Lay the four parts out one below the other; parts that have nothing to show are left out."""
+    """Lay the parts out one below the other; parts that have nothing to show are left out."""
     found = diagnosis.after is not diagnosis.before
-    curves, gains = source_curves(diagnosis), gains_by_test(diagnosis)
-    heights = [1.0 + ROW_IN * len(gains), *(2.1 for _ in curves), 4.6, 2.4]
+    curves, gains, unnamed = source_curves(diagnosis), gains_by_test(diagnosis), diagnosis.unexplained.curve
+    heights = [1.0 + ROW_IN * len(gains), *(2.1 for _ in curves), *([2.1] if unnamed else []), 4.6, 2.4]
     figure = Figure(figsize=(WIDTH_IN, sum(heights) + 0.4), layout="constrained")
     figure.suptitle(_headline(diagnosis), fontsize=11, fontweight="bold")
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights, hspace=0.03)
     _maps(parts[0], diagnosis, found=found)
-    for part, one in zip(parts[1:-2], curves, strict=True):
+    for part, one in zip(parts[1:], curves, strict=False):
         _curves(part, one, None if one.source else diagnosis.unexplained.strut, found=found)
+    if unnamed is not None:
+        draw_unexplained(parts[-3], unnamed)
     _traces(parts[-2], gains, found=found)
     _bars(parts[-1], diagnosis, gains, found=found)
     return figure

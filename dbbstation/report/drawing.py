@@ -1,9 +1,7 @@
-"""What the figures share: one style, one way to bytes, maps over test and angle."""
+"""What the figures share: one style, maps over test and angle."""
 
 from __future__ import annotations
 
-import io
-import re
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -17,7 +15,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from dbbstation.calibration.residual_map import ResidualMap
@@ -25,6 +22,7 @@ if TYPE_CHECKING:
 STYLE: Any = {
     "svg.hashsalt": "dbbstation",
     "svg.fonttype": "none",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"],  # named with every text
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.labelsize": 8,
@@ -50,24 +48,6 @@ ROW_IN = 0.15
 def in_style() -> AbstractContextManager[None]:
     """Draw what follows in the house style."""
     return mpl.rc_context(STYLE)
-
-
-def as_svg(figure: Figure) -> bytes:
-    """Return the figure's bytes, the same for the same figure.
-
-    Paths are given to a hundredth of a point, which halves them. The layout's solver rounds as memory happens to lie;
-    clipping frames, whose names are hashes of all digits, are therefore counted in their order.
-    """
-    out = io.BytesIO()
-    figure.savefig(out, format="svg", metadata={"Date": None})
-    drawn = _PATH.sub(lambda path: _FURTHER_DIGITS.sub(rb"\1", path.group()), out.getvalue())
-    number = {name: k for k, name in enumerate(dict.fromkeys(_FRAME.findall(drawn)))}
-    return _FRAME.sub(lambda frame: f"frame{number[frame.group()]}".encode(), drawn)
-
-
-_PATH = re.compile(rb' d="[^"]*"')
-_FURTHER_DIGITS = re.compile(rb"(\.\d\d)\d+")
-_FRAME = re.compile(rb"\bp[0-9a-f]{10}\b")
 
 
 def draw_maps(panels: Sequence[Axes], titles: Sequence[str], maps: Sequence[ResidualMap], noise_um: float) -> QuadMesh:

@@ -11,6 +11,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.play_ends import first_side
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -99,12 +100,7 @@ def follow(
     count, columns = travel.shape
     for i in range(columns):
         half = 0.5 * width[i]
-        # The end of the play that the first movement leans on, as if it had gone on before the first row.
-        side = 0.0
-        for k in range(1, count):
-            if travel[k, i] != travel[0, i]:
-                side = -0.5 if travel[k, i] > travel[0, i] else 0.5
-                break
+        side = first_side(travel[:, i])
         place = travel[0, i] + side * width[i]
         for k in range(count):
             if place < travel[k, i] - half:

@@ -12,6 +12,7 @@ from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.play_ends import first_side
 from dbbstation.sources.weights import platform_masses
 
 if TYPE_CHECKING:
@@ -128,12 +129,8 @@ def settle(
     count, columns = travel.shape
     for i in range(columns):
         half = 0.5 * width[i]
-        # Where friction holds the strut at first, the end of the play that the first movement leans on.
-        side = 0.0
-        for k in range(1, count):
-            if travel[k, i] != travel[0, i]:
-                side = -0.5 if travel[k, i] > travel[0, i] else 0.5
-                break
+        # Where friction holds the strut at first.
+        side = first_side(travel[:, i])
         at = travel[0, i] + side * width[i]
         for k in range(count):
             error = at - travel[k, i]

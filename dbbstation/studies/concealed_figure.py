@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-import io
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
+from dbbstation.report.svg import as_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from dbbstation.studies.concealed_gravity import ConcealedGravity
 
-STYLE: Any = {"svg.hashsalt": "dbbstation", "font.size": 9, "axes.titlesize": 10, "svg.fonttype": "none"}
-"""Same input, same bytes; text stays text."""
-
-COLOURS = ("#888888", "#c0392b", "#1f6fb2")
+COLOURS = (MEASURED, BEFORE, AFTER)
 
 
 def concealed_figure(study: ConcealedGravity) -> bytes:
     """Draw residuals on the jig, the tilted circle and the pull on the joints, as SVG."""
-    with mpl.rc_context(STYLE):
+    with in_style():
         figure = Figure(figsize=(11.0, 5.4), layout="constrained")
         jig, pull = figure.add_subplot(1, 3, 1), figure.add_subplot(1, 3, 3)
         _residuals(jig, study)
         _circle(figure.add_subplot(1, 3, 2, projection="polar"), study)
         _pull(pull, study)
-        out = io.BytesIO()
-        figure.savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
+        return as_svg(figure)
 
 
 def _residuals(axes: Axes, study: ConcealedGravity) -> None:
@@ -41,7 +37,7 @@ def _residuals(axes: Axes, study: ConcealedGravity) -> None:
     axes.set_xticks(place, names)
     axes.set_ylabel("residual within mountings, µm rms")
     axes.set_title("on the jig: looks almost fine")
-    axes.legend(frameon=False)
+    axes.legend()
 
 
 def _circle(axes: Axes, study: ConcealedGravity) -> None:
@@ -53,7 +49,7 @@ def _circle(axes: Axes, study: ConcealedGravity) -> None:
     axes.plot(angle, np.full(len(angle), 1.6 * reach), color="black", linewidth=0.5, linestyle=":")
     axes.set_yticks([])
     axes.set_title("tilted by -23°: circularity left after", pad=14)
-    axes.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.08), fontsize=8)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08))
 
 
 def _pull(axes: Axes, study: ConcealedGravity) -> None:

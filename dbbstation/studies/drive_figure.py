@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from dbbstation.studies.concealed_figure import COLOURS, STYLE
+from dbbstation.report.drawing import in_style
+from dbbstation.report.svg import as_svg
+from dbbstation.studies.concealed_figure import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +22,7 @@ MOST_POINTS = 3000
 
 def drive_figure(diagnosis: DriveDiagnosis) -> bytes:
     """Draw a diagnosis of a drive, as SVG."""
-    with mpl.rc_context(STYLE):
+    with in_style():
         figure = Figure(figsize=(11.0, 6.2), layout="constrained")
         grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0))
         force = figure.add_subplot(grid[0, 0])
@@ -30,9 +30,7 @@ def drive_figure(diagnosis: DriveDiagnosis) -> bytes:
         _force(force, diagnosis)
         _left(left, diagnosis)
         _friction(figure.add_subplot(grid[:, 1]), diagnosis)
-        out = io.BytesIO()
-        figure.savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
+        return as_svg(figure)
 
 
 def _force(axes: Axes, diagnosis: DriveDiagnosis) -> None:
@@ -48,7 +46,7 @@ def _force(axes: Axes, diagnosis: DriveDiagnosis) -> None:
     axes.axvspan(*diagnosis.held_back_s, color="#eeeeee", zorder=0)
     axes.set_ylabel("force, N")
     axes.set_title("force in the band of the comparison; grey: held back")
-    axes.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
 
 
 def _left(axes: Axes, diagnosis: DriveDiagnosis) -> None:
@@ -91,7 +89,7 @@ def _friction(axes: Axes, diagnosis: DriveDiagnosis) -> None:
     axes.set_xlabel("speed, mm/s")
     axes.set_ylabel("force less inertia, N")
     axes.set_title("friction (band: two standard uncertainties)")
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    axes.legend(loc="upper left")
 
 
 def _named(diagnosis: DriveDiagnosis) -> str:

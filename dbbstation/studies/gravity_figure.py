@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from dbbstation.studies.concealed_figure import STYLE
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
+from dbbstation.report.svg import as_svg
 from dbbstation.studies.gravity import JOINT, PUBLISHED_UM, SEQUENTIAL, WITHOUT
 
 if TYPE_CHECKING:
@@ -18,13 +17,12 @@ if TYPE_CHECKING:
 
     from dbbstation.studies.gravity import GravityStudy
 
-BEFORE, AFTER, EXPECTED = "#c0392b", "#1f6fb2", "#555555"
 TICKS_UM = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
 
 
 def gravity_figure(study: GravityStudy) -> bytes:
     """Draw the circularity of the conditions about one centre against their tilt, for both identifications, as SVG."""
-    with mpl.rc_context(STYLE):
+    with in_style():
         figure = Figure(figsize=(9.6, 4.2), layout="constrained")
         left, right = figure.subplots(1, 2, sharey=True)
         _panel(left, study, SEQUENTIAL)
@@ -32,9 +30,7 @@ def gravity_figure(study: GravityStudy) -> bytes:
         left.set_title("kinematics first, gravity from A and B then")
         right.set_title("kinematics and gravity together")
         left.set_ylabel("circularity, µm")
-        out = io.BytesIO()
-        figure.savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
+        return as_svg(figure)
 
 
 def same_place(study: GravityStudy) -> list[str]:
@@ -55,7 +51,7 @@ def _panel(axes: Axes, study: GravityStudy, way: str) -> None:
     axes.plot(tilt, published[:, 1], "s", color=AFTER, fillstyle="none", label="published, with")
     axes.plot(tilt, median(WITHOUT, "circularity_um"), "-", color=BEFORE, label="without compensation")
     axes.plot(tilt, median(way, "circularity_um"), "-", color=AFTER, label="with compensation")
-    axes.plot(tilt, median(way, "expected_um"), "--", color=EXPECTED, label="expected")
+    axes.plot(tilt, median(way, "expected_um"), "--", color=MEASURED, label="expected")
     axes.plot(tilt, median(way, "left_um"), ":", color=AFTER, label="with compensation, no noise")
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(FixedLocator(TICKS_UM))
@@ -65,4 +61,4 @@ def _panel(axes: Axes, study: GravityStudy, way: str) -> None:
     for name, at in zip(names, tilt, strict=True):
         axes.annotate(name, (at, 220.0), ha="center", va="center", fontsize=8)
     axes.set_xlabel("tilt A about X, degrees")
-    axes.legend(frameon=False, fontsize=7, loc="upper right", bbox_to_anchor=(1.0, 0.93))
+    axes.legend(fontsize=7, loc="upper right", bbox_to_anchor=(1.0, 0.93))

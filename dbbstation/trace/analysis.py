@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -80,16 +81,27 @@ def horizontal_radius_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDAr
 
 
 def figures(raw: RawCircle, length_mm: NDArray[np.float64] | None = None) -> CircleFigures:
-    """Figures of a raw circle, or of other lengths at the same angles, shape (n,) [mm].
+    """Figures of a raw circle, worked out once, or of other lengths at the same angles, shape (n,) [mm].
 
     Raises:
         TraceError: the points do not determine a circle.
     """
-    length = raw.length_mm if length_mm is None else length_mm
-    centre, _, deviation = best_circle(raw.theta_deg, horizontal_radius_mm(raw, length))
+    if length_mm is not None:
+        return _figures(raw, length_mm)
+    if raw not in _MEASURED:
+        _MEASURED[raw] = _figures(raw, raw.length_mm)
+    return _MEASURED[raw]
+
+
+_MEASURED: WeakKeyDictionary[RawCircle, CircleFigures] = WeakKeyDictionary()
+"""Figures of raw circles as measured, which checks, fits and reports all ask for."""
+
+
+def _figures(raw: RawCircle, length_mm: NDArray[np.float64]) -> CircleFigures:
+    centre, _, deviation = best_circle(raw.theta_deg, horizontal_radius_mm(raw, length_mm))
     return CircleFigures(
         centre_mm=(float(centre[0]), float(centre[1])),
-        mean_radial_error_um=1e3 * float((length - raw.circle.bar_mm).mean()),
+        mean_radial_error_um=1e3 * float((length_mm - raw.circle.bar_mm).mean()),
         circularity_um=1e3 * float(np.ptp(deviation)),
     )
 

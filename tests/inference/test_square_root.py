@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.inference.noise import noise_of
 from dbbstation.inference.race import Race
-from dbbstation.inference.square_root import Columns, compress, lost_directions, solve
+from dbbstation.inference.square_root import Columns, compress, joined, lost_directions, solve, spread
 
 NOISE = 0.3
 
@@ -161,3 +161,27 @@ def test_what_is_no_number_is_refused(rng, count):
     jacobian[count // 2, 0] = np.nan
     with pytest.raises(ValueError, match="must be numbers"):
         compress(np.arange(2), jacobian, target)
+
+
+def test_blocks_spread_over_all_columns_say_the_same(problem):
+    """Against every block's own normal equations, written into place one by one."""
+    jacobians, columns, targets, known, _ = problem
+    blocks = blocks_of(jacobians, columns, targets)
+    blocks[2] = replace(blocks[2], noise=0.05)
+    size = len(known.prior)
+    for noise in (None, NOISE):
+        wide = spread(blocks, size, noise)
+        expected = np.zeros((size + 1, size + 1))
+        for k, (jacobian, at, target) in enumerate(zip(jacobians, columns, targets, strict=True)):
+            whole = np.zeros((len(target), size + 1))
+            whole[:, at], whole[:, -1] = jacobian, target
+            expected += whole.T @ whole / (1.0 if noise is None else (0.05 if k == 2 else NOISE) ** 2)
+        np.testing.assert_allclose(wide.T @ wide, expected, rtol=1e-10, atol=1e-10)
+    assert spread([], size).shape == (0, size + 1)
+
+
+def test_a_block_of_its_own_noise_cannot_be_joined(problem):
+    jacobians, columns, targets, known, _ = problem
+    blocks = blocks_of(jacobians, columns, targets)
+    with pytest.raises(ValueError, match="noise of their own"):
+        joined([blocks[0], replace(blocks[1], noise=0.1)], len(known.prior))

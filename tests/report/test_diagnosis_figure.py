@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
 
-from dbbstation.diagnosis.findings import Unexplained
+from dbbstation.diagnosis.findings import Curve, CurvePoint, Unexplained
 from dbbstation.report.diagnosis_figure import diagnosis_figure
+from dbbstation.report.unexplained_panel import draw_unexplained
 from tests.diagnosis.joint_fits import joint_fit
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -55,6 +59,75 @@ def test_an_error_without_a_name(reference):
     assert rest.text in said
     assert "without a name: strut-length error over strut length" in said
     assert not any("causes found" in text for text in said)
+
+
+def curve(variable, unit, at, value, sigma, strut=3, period_mm=None, convention=""):
+    points = tuple(CurvePoint(*map(float, point)) for point in zip(at, value, sigma, strict=True))
+    return Curve(variable, unit, strut, period_mm, convention, 2.0, 1.0, points)
+
+
+def panel(drawn):
+    part = Figure().subfigures()
+    draw_unexplained(part, drawn)
+    (axes,) = part.axes
+    return part, axes
+
+
+def test_its_curve_has_a_panel_of_its_own(reference):
+    wave = curve("strut-length wave", "mm", [600.0, 610.0, 620.0], [1.0, 0.0, -1.0], [0.1, 0.1, 0.1], 3, 40.0)
+    rest = Unexplained(1.0, 3, "strut-length wave", 30.0, "organised by a wave", wave)
+    said = texts(diagnosis_figure(joint_fit(reference, ("backlash",), unexplained=rest)))
+    assert said.count("without a name: a wave of 40.00 mm: error of strut 3, cause unknown") == 1
+    assert "µm, ±2u" in said
+
+
+def test_the_band_is_two_standard_uncertainties():
+    part, axes = panel(
+        curve("strut-force", "N", [0.0, 5.0, 9.0], [1.0, -2.0, 4.0], [0.5, 0.1, 1.0], None, None, "less")
+    )
+    (band,) = (each for each in axes.collections if isinstance(each, PolyCollection))
+    corners = {(round(float(x), 6), round(float(y), 6)) for x, y in band.get_paths()[0].vertices}
+    assert corners == {(0.0, 0.0), (0.0, 2.0), (5.0, -2.2), (5.0, -1.8), (9.0, 2.0), (9.0, 6.0)}
+    assert axes.lines[0].get_xydata().tolist() == [[0.0, 1.0], [5.0, -2.0], [9.0, 4.0]]
+    assert (axes.get_xlabel(), axes.get_title(loc="right")) == ("strut force, N", "less")
+    assert part.get_suptitle() == "without a name: error of every strut, cause unknown"
+
+
+def test_a_wave_is_drawn_as_one_with_its_uncertainty_between_the_points():
+    """Amplitudes 3 and -2 with variances 0.04 and 0.09 and covariance 0.03, in closed form."""
+
+    def value(x):
+        return 3.0 * np.cos(2 * np.pi * x / 40.0) - 2.0 * np.sin(2 * np.pi * x / 40.0)
+
+    def sigma(x):
+        c, s = np.cos(2 * np.pi * x / 40.0), np.sin(2 * np.pi * x / 40.0)
+        return np.sqrt(0.04 * c * c + 0.09 * s * s + 2 * 0.03 * c * s)
+
+    at = np.arange(500.0, 601.0, 5.0)
+    _, axes = panel(curve("strut-length wave", "mm", at, value(at), sigma(at), 3, 40.0))
+    x, y = axes.lines[0].get_xydata().T
+    assert len(x) > 2 * len(at)
+    np.testing.assert_allclose(y, value(x), atol=1e-9)
+    (band,) = (each for each in axes.collections if isinstance(each, PolyCollection))
+    corners = band.get_paths()[0].vertices
+    away = np.abs(corners[:, 1] - value(corners[:, 0]))
+    np.testing.assert_allclose(away, 2.0 * sigma(corners[:, 0]), atol=1e-9)
+    assert axes.get_xlabel() == "strut length, mm"
+
+
+def test_signs_of_travel_are_two_points():
+    part, axes = panel(curve("strut-speed-sign", "sign", [-1.0, 1.0], [-2.0, 2.0], [0.3, 0.3]))
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["shortening", "lengthening"]
+    assert not any(isinstance(each, PolyCollection) for each in axes.collections)
+    assert part.get_suptitle() == "without a name: error of strut 3, cause unknown"
+
+
+def test_what_is_of_the_reading_is_no_struts():
+    part, axes = panel(curve("angle", "deg", [0.0, 10.0], [1.0, 2.0], [0.1, 0.1], None))
+    assert (part.get_suptitle(), axes.get_xlabel()) == (
+        "without a name: error of the reading, cause unknown",
+        "angle, °",
+    )
 
 
 def test_nothing_to_find(reference):

@@ -42,6 +42,25 @@ def test_figures_of_a_shifted_circle():
     assert found.circularity_um == pytest.approx(0, abs=1e-6)
 
 
+def test_figures_as_measured_are_worked_out_once(monkeypatch):
+    worked_out = []
+
+    def counted(theta_deg, radius_mm):
+        worked_out.append(radius_mm)
+        return best_circle(theta_deg, radius_mm)
+
+    monkeypatch.setattr("dbbstation.trace.analysis.best_circle", counted)
+    one, other = raw(shifted_circle(150.1, 0.3, -0.4)), raw(shifted_circle(150.1, 0.1, 0.0))
+    first = figures(one)
+    assert figures(one) == first
+    assert len(worked_out) == 1
+    # Neither another circle, nor other lengths at its angles, are taken for it.
+    assert figures(other).centre_deviation_um == pytest.approx(100)
+    assert figures(one, other.length_mm) == figures(other)
+    assert figures(one) == first
+    assert len(worked_out) == 3
+
+
 def test_circularity_of_an_ellipse():
     """A cos 2θ of amplitude A has the circularity 2A and no centre."""
     found = figures(raw(150 + 0.01 * np.cos(2 * np.radians(THETA))))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from dbbstation.diagnosis.forms import Form, Hats, Lobes, Plane, Proportional, Sign
 from dbbstation.machine.geometry import STRUTS
@@ -171,9 +172,10 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
         found["strut-force"] = strut_tensions(struts, platform_weight(frames, machine.masses))
     if motion.time_s is not None:
         found["time"] = motion.time_s
-        if motion.is_path:
-            found["strut-speed"] = np.gradient(struts.length_mm, motion.time_s, axis=0)
-            found["strut-acceleration"] = np.gradient(found["strut-speed"], motion.time_s, axis=0)
+        if motion.is_path and np.all(np.diff(motion.time_s) > 0.0):
+            # A spline, since differences are worst at the end of a run, and joints hide all of a smooth error but that.
+            path = CubicSpline(motion.time_s, struts.length_mm)
+            found["strut-speed"], found["strut-acceleration"] = path(motion.time_s, 1), path(motion.time_s, 2)
     found["position of the platform"] = motion.poses[:, :2]
     found["tilt of the platform"] = motion.poses[:, 3:5]
     if motion.setup is not None:

@@ -184,6 +184,8 @@ def _print_curve(curve: Mapping[str, Any]) -> None:
             f"  a wave of {curve['period_mm']:.2f} mm, from {points[0]['at']:.0f} to {points[-1]['at']:.0f} mm, up to "
             f"{max(abs(point['value_um']) for point in points):.2f} µm"
         )
+    elif curve["form"]:
+        click.echo(f"  {curve['form']}")
     step = -(-len(points) // MOST_POINTS)
     rows = [[f"{p['at']:.6g}", f"{p['value_um']:+.2f}", "±", f"{p['uncertainty_um']:.2f}"] for p in points[::step]]
     print_table([f"{curve['variable']} / {curve['unit']}", "error / µm", "", "std / µm"], rows)

@@ -102,7 +102,8 @@ class Curve:
         variable: what it is a function of.
         unit: of that.
         strut: 1 to 6; None where all struts follow it, or no strut's error is meant.
-        period_mm: of a wave [mm]; None for what is none.
+        form: which of its kind, such as the period of a wave or the place of a step, in words; empty where there is one.
+        period_mm: of a wave of strut length [mm]; None for what is none.
         convention: what was taken out of it because fitted parameters make that, in words; empty where nothing was.
         readings_um: root mean square of what it does to the readings [µm].
         unconcealed_um: of what the fitted machine parameters leave of that [µm].
@@ -112,6 +113,7 @@ class Curve:
     variable: str
     unit: str
     strut: int | None
+    form: str
     period_mm: float | None
     convention: str
     readings_um: float

@@ -40,9 +40,9 @@ class Form(ABC):
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         """Places between least and greatest value at which a curve is printed, shape (q,)."""
 
-    @property
-    def text(self) -> str:
-        """What tells it from others of its kind; empty where there are none."""
+    def text(self, unit: str) -> str:
+        """What tells it from others of its kind, values in the unit of its variable; empty where there are none."""
+        del unit
         return ""
 
 
@@ -80,10 +80,9 @@ class Wave(Form):
         """Two."""
         return 2
 
-    @property
-    def text(self) -> str:
+    def text(self, unit: str) -> str:
         """Its period."""
-        return f"period {1.0 / self.frequency:.6g}"
+        return f"period {1.0 / self.frequency:.6g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Cosine, sine."""
@@ -91,13 +90,14 @@ class Wave(Form):
         return np.stack([np.cos(phase), np.sin(phase)], axis=-1)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
-        """Eight per period, over one period at least and over all of the variable where that takes less than 2000."""
-        periods = min((high - low) * self.frequency, _MOST_PERIODS)
-        span = high - low if periods < _MOST_PERIODS else periods / self.frequency
+        """Eight per period, over all of the variable; over one period where it holds very many."""
+        periods = (high - low) * self.frequency
+        periods = periods if periods <= _MOST_PERIODS else 1.0
+        span = periods / self.frequency
         return np.linspace(low, low + span, max(2, int(np.ceil(periods * POINTS_PER_WAVE)) + 1))
 
 
-_MOST_PERIODS = 250.0
+_MOST_PERIODS = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,9 +114,9 @@ class WaveOfTurn(Form):
         """Cosine and sine for either direction."""
         return 4
 
-    @property
-    def text(self) -> str:
+    def text(self, unit: str) -> str:
         """Waves per turn."""
+        del unit
         return f"{self.frequency:.4g} per turn"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -143,9 +143,9 @@ class Lobes(Form):
         """Cosine and sine of each."""
         return 2 * len(self.numbers)
 
-    @property
-    def text(self) -> str:
+    def text(self, unit: str) -> str:
         """How many lobes, where it is one number alone."""
+        del unit
         return f"{self.numbers[0]} lobes" if len(self.numbers) == 1 else ""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -172,10 +172,9 @@ class Bump(Form):
         """Its height."""
         return 1
 
-    @property
-    def text(self) -> str:
+    def text(self, unit: str) -> str:
         """Where, how wide."""
-        return f"about {self.centre:.5g}, width {self.width:.3g}"
+        return f"about {self.centre:.5g} {unit}, {self.width:.3g} {unit} wide either way"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """One at its centre."""
@@ -188,7 +187,7 @@ class Bump(Form):
 
 @dataclass(frozen=True, eq=False)
 class Step(Form):
-    """Minus a half before one value, plus a half behind it, over a few widths."""
+    """Minus a half before one value, plus a half behind it, over a few widths either way."""
 
     at: float
     width: float
@@ -198,10 +197,9 @@ class Step(Form):
         """Its height."""
         return 1
 
-    @property
-    def text(self) -> str:
+    def text(self, unit: str) -> str:
         """Where."""
-        return f"at {self.at:.5g}"
+        return f"at {self.at:.5g} {unit}"
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """From minus to plus a half."""
@@ -270,9 +268,9 @@ class Plane(Form):
         """One per coordinate, and the constant."""
         return self.coordinates + self.constant
 
-    @property
-    def text(self) -> str:
+    def text(self, unit: str) -> str:
         """Whether with a constant."""
+        del unit
         return "with a constant" if self.constant else ""
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -298,15 +296,18 @@ class PlaneStep(Form):
         """Its height."""
         return 1
 
-    @property
-    def text(self) -> str:
+    def text(self, unit: str) -> str:
         """Where."""
-        return f"across {self.across_deg:.0f} deg at {self.at:.4g} mm"
+        return f"across a line {self.at:.4g} {unit} from the origin, at {self.across_deg:.0f} deg to +X"
+
+    @property
+    def across(self) -> NDArray[np.float64]:
+        """Direction across the line, shape (2,)."""
+        return np.array([np.cos(np.radians(self.across_deg)), np.sin(np.radians(self.across_deg))])
 
     def along(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance from the origin across the line, shape (n,)."""
-        across = np.radians(self.across_deg)
-        return np.asarray(values @ np.array([np.cos(across), np.sin(across)]), dtype=np.float64)
+        return np.asarray(values @ self.across, dtype=np.float64)
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """From minus to plus a half; values of shape (n, 2)."""

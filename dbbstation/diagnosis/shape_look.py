@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 STRONGEST = 2
 """Forms of each kind that are kept as shapes."""
 
+MADE_FINER = 6
+"""Waves of a grid that are looked at more finely: one that falls between two points of the grid loses a fifth there, and
+the side lobes of gaps between runs may stand out more."""
+
 PIECE_MM = 0.5
 """Of strut length, for waves down to 4 mm [mm]."""
 
@@ -138,7 +142,7 @@ class Look:
     ) -> Sums:
         """Add up over pieces of a variable, given the piece of each value."""
         values = np.concatenate([run.values[variable] for run in self._runs])
-        gain = np.vstack([run.gain[moves or EVERY] for run in self._runs])
+        gain = np.vstack([run.gain[moves] for run in self._runs])
         if strut is not None:
             gain = gain[:, strut - 1 : strut]
             values = values[:, strut - 1] if variable.startswith("strut-") else values
@@ -165,20 +169,22 @@ def looked_for(look: Look, extent: Ranges) -> list[Shape]:
     found: list[Shape] = []
     for strut in range(1, STRUTS + 1):
         low, high = (float(limit["strut-length"][strut - 1]) for limit in (extent.low, extent.high))
-        sums = look.sums("strut-length", strut, "", partial(_piece, low=low, width=PIECE_MM))
-        found += _waves("strut-length", strut, "", sums, np.arange(0.5, (high - low) / SHORTEST_MM, 0.5) / (high - low))
-        found += _best("strut-length", "bump", strut, "", sums, _bumps(low, high), _BUMPS_APART)
-        found += _best("strut-length", "step", strut, "", sums, _steps(low, high), 1.0)
+        sums = look.sums("strut-length", strut, EVERY, partial(_piece, low=low, width=PIECE_MM))
+        found += _waves(
+            "strut-length", strut, EVERY, sums, np.arange(0.5, (high - low) / SHORTEST_MM, 0.5) / (high - low)
+        )
+        found += _best("strut-length", "bump", strut, EVERY, sums, _bumps(low, high), _BUMPS_APART)
+        found += _best("strut-length", "step", strut, EVERY, sums, _steps(low, high), 1.0)
         if "strut-force" in extent.low:
             low, high = (float(limit["strut-force"][strut - 1]) for limit in (extent.low, extent.high))
             wide = max(high - low, 1e-6) / _FORCES
-            sums = look.sums("strut-force", strut, "", partial(_piece, low=low, width=wide))
-            found += _best("strut-force", "step", strut, "", sums, _steps(low, high), 1.0)
+            sums = look.sums("strut-force", strut, EVERY, partial(_piece, low=low, width=wide))
+            found += _best("strut-force", "step", strut, EVERY, sums, _steps(low, high), 1.0)
     if "time" in extent.low:
         low, high = float(extent.low["time"]), float(extent.high["time"])
         wide = max(SHORTEST_S / 4.0, (high - low) / PIECES)
         movers: list[tuple[int | None, str]] = [(None, READING), (None, BALL)]
-        movers += [(strut, "") for strut in range(1, STRUTS + 1)]
+        movers += [(strut, EVERY) for strut in range(1, STRUTS + 1)]
         for own, moves in movers:
             sums = look.sums("time", own, moves, partial(_piece, low=low, width=wide))
             found += _waves_of_time(own, moves, sums, low, wide, high - low)
@@ -239,13 +245,14 @@ def _best(
         return []
     curves = np.stack([form.columns(sums.at) for form in forms], axis=1)
     tried = max(len(forms) / apart, 1.0)
-    return [Shape(variable, kind, strut, moves, forms[k], tried) for k in _peaks(sums.explained(curves))]
+    return [Shape(variable, kind, strut, moves, forms[k], tried) for k in _peaks(sums.explained(curves), STRONGEST)]
 
 
-def _peaks(explained: NDArray[np.float64]) -> NDArray[np.int64]:
+def _peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
+    """Places that explain more than their neighbours, best first."""
     padded = np.concatenate([[-np.inf], explained, [-np.inf]])
     peaks = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
-    return np.asarray(peaks[np.argsort(-explained[peaks])][:STRONGEST])
+    return np.asarray(peaks[np.argsort(-explained[peaks])][:most])
 
 
 def _waves(variable: str, strut: int | None, moves: str, sums: Sums, grid: NDArray[np.float64]) -> list[Shape]:
@@ -266,14 +273,16 @@ def _finer(
 ) -> list[Shape]:
     extent = float(np.ptp(sums.at))
     found = []
-    for k in _peaks(explained):
+    for k in _peaks(explained, MADE_FINER):
         best = grid[k]
         for step in FINER:
             near = best + np.arange(-15, 16) * step / extent
             near = near[near > 0.25 / extent]
-            best = near[int(sums.explained(_cosines(sums.at, near)).argmax())]
-        found.append(Shape(variable, "wave", strut, moves, Wave(float(best)), len(grid) / 2.0))
-    return found
+            by_near = sums.explained(_cosines(sums.at, near))
+            best = near[int(by_near.argmax())]
+        found.append((float(by_near.max()), Wave(float(best))))
+    found.sort(key=lambda one: -one[0])
+    return [Shape(variable, "wave", strut, moves, wave, len(grid) / 2.0) for _, wave in found[:STRONGEST]]
 
 
 def _cosines(at: NDArray[np.float64], frequencies: NDArray[np.float64]) -> NDArray[np.float64]:

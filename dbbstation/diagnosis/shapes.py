@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from dbbstation.diagnosis.forms import Form, Hats, Lobes, Plane, Proportional, Sign
 from dbbstation.machine.geometry import STRUTS
@@ -37,16 +38,10 @@ LOBES = tuple(range(2, 11))
 LEVER_MM = 100.0
 """Turns and moments count by what they do at this distance [mm]."""
 
-READING, BALL, TABLE, TOOL, PULL, EVERY = (
-    "reading",
-    "ball on the table",
-    "table",
-    "ball on the tool",
-    "pull",
-    "every strut",
-)
-"""What moves, where it is no single strut: what the bar reads, a ball, the table as a body with the ball on it, all
-struts by a pull on the platform, or all struts alike."""
+EVERY, SIGNED = "every strut", "every strut by direction of travel"
+READING, BALL, TABLE, TOOL, PULL = "reading", "ball on the table", "table", "ball on the tool", "pull"
+"""What moves: struts, or struts one way while they lengthen and the other way while they shorten; what the bar reads; a
+ball; the table as a body with the ball on it; struts by a pull on the platform."""
 
 UNITS = {
     "strut-length": "mm",
@@ -88,7 +83,7 @@ class Shape:
         variable: what the error is a function of.
         kind: of curve, such as `wave`; empty for the usual one.
         strut: 1 to 6; None where all struts follow the same curve, or where it is no strut's error.
-        moves: what moves; empty for one strut.
+        moves: what moves; where that is every strut and a strut is given, only that one.
         form: of the curve.
         tried: how many independent forms it was picked from.
     """
@@ -113,10 +108,6 @@ class Shape:
         frequency = getattr(self.form, "frequency", None)
         return 1.0 / frequency if frequency and self.variable == "strut-length" else None
 
-    def given(self, samples: Samples) -> bool:
-        """Whether a run has what it needs."""
-        return self.variable in samples.values and (self.moves in samples.gain or self.strut is not None)
-
     def columns(self, samples: Samples) -> NDArray[np.float64]:
         """Effect of each amplitude on the readings of a run: directions that move times curves, shape (n, d p)."""
         values, gain = samples.values[self.variable], self._gain(samples)
@@ -125,15 +116,17 @@ class Shape:
                 values[:, self.strut - 1] if self.variable in OF_STRUTS and self.strut else values
             )
             return np.asarray((gain[:, :, None] * curve[:, None, :]).reshape(len(gain), -1))
-        return np.einsum("ni,nip->np", samples.gain[EVERY], self.form.columns(values))
+        return np.einsum("ni,nip->np", samples.gain[self.moves], self.form.columns(values))
 
     def _gain(self, samples: Samples) -> NDArray[np.float64]:
+        gain = samples.gain[self.moves]
         if self.strut is not None:
-            return samples.gain[EVERY][:, self.strut - 1 : self.strut]
-        return samples.gain[EVERY].sum(axis=1, keepdims=True) if self.moves == EVERY else samples.gain[self.moves]
+            return gain[:, self.strut - 1 : self.strut]
+        return gain.sum(axis=1, keepdims=True) if self.moves in {EVERY, SIGNED} else gain
 
 
 BEHIND = {
+    SIGNED: " by direction of travel",
     READING: " of the reading",
     BALL: " of the ball on the table",
     TABLE: " of the table",
@@ -179,9 +172,10 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
         found["strut-force"] = strut_tensions(struts, platform_weight(frames, machine.masses))
     if motion.time_s is not None:
         found["time"] = motion.time_s
-        if motion.is_path:
-            found["strut-speed"] = np.gradient(struts.length_mm, motion.time_s, axis=0)
-            found["strut-acceleration"] = np.gradient(found["strut-speed"], motion.time_s, axis=0)
+        if motion.is_path and np.all(np.diff(motion.time_s) > 0.0):
+            # A spline, since differences are worst at the end of a run, and joints hide all of a smooth error but that.
+            path = CubicSpline(motion.time_s, struts.length_mm)
+            found["strut-speed"], found["strut-acceleration"] = path(motion.time_s, 1), path(motion.time_s, 2)
     found["position of the platform"] = motion.poses[:, :2]
     found["tilt of the platform"] = motion.poses[:, 3:5]
     if motion.setup is not None:
@@ -203,6 +197,7 @@ def samples_of(
         reading: what a model predicts for it.
         pivot_mm: about which the table may turn with its balls, shape (3,) [mm]; None: it is not asked.
     """
+    known = {name: values[motion.kept] for name, values in variables(motion, machine).items()}
     gain = {
         EVERY: reading.by_parameters(Effect(strut_mm=np.eye(STRUTS))),
         READING: np.ones((len(reading.length_mm), 1)),
@@ -210,11 +205,13 @@ def samples_of(
         TOOL: reading.by_parameters(Effect(tool_tip_mm=np.eye(3))),
         PULL: reading.by_parameters(Effect(strut_mm=_pulled(_struts(motion, machine)))),
     }
+    if motion.is_path:
+        gain[SIGNED] = gain[EVERY] * known["strut-speed-sign"]
     if motion.setup is not None and pivot_mm is not None:
         # A small turn w moves the ball by w x arm.
         turns = np.cross(np.eye(3), (motion.setup.fixed_ball_mm - pivot_mm) / LEVER_MM).T
         gain[TABLE] = np.hstack([gain[BALL], gain[BALL] @ turns])
-    return Samples({name: values[motion.kept] for name, values in variables(motion, machine).items()}, gain)
+    return Samples(known, gain)
 
 
 def _struts(motion: Motion, machine: Machine) -> Struts:
@@ -249,12 +246,14 @@ def shapes(extent: Ranges) -> list[Shape]:
     for name in ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration", "time"):
         if name not in extent.low:
             continue
+        found += [Shape(name, "", strut, EVERY, _usual(name, extent, strut)) for strut in (*range(1, STRUTS + 1), None)]
+    if "strut-speed-sign" in extent.low:
         found += [
-            Shape(name, "", strut, "" if strut else EVERY, _usual(name, extent, strut))
-            for strut in (*range(1, STRUTS + 1), None)
+            Shape("strut-length", "", strut, SIGNED, _usual("strut-length", extent, strut))
+            for strut in range(1, STRUTS + 1)
         ]
     if "time" in extent.low:
-        found.append(Shape("time", "", None, READING, _usual("time", extent, None)))
+        found += [Shape("time", "", None, moves, _usual("time", extent, None)) for moves in (READING, BALL)]
     found.append(Shape("position of the platform", "", None, BALL, Plane(100.0, 2)))
     found.append(Shape("position of the platform", "", None, TABLE, Plane(100.0, 2)))
     found.append(Shape("tilt of the platform", "", None, TOOL, Plane(10.0, 2)))

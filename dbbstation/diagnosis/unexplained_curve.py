@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.findings import Curve, CurvePoint
-from dbbstation.diagnosis.forms import HATS, Hats, Plane, PlaneStep, WaveOfTurn
-from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, TABLE, TOOL, UNITS
+from dbbstation.diagnosis.forms import HATS, Hats, Plane, PlaneStep
+from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, READING, TABLE, TOOL, UNITS
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.race import free_directions
 
@@ -29,14 +29,13 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.unnamed import Best, Unnamed
     from dbbstation.inference.race import Amplitudes
 
-TAKEN_OUT = {
-    "strut-length": "less the straight line that fits it best over the readings: joints and reference length make that",
-    "strut-force": "less its mean over the readings: the reference length makes that",
-    "time": "less its mean over the readings: the reference length makes that",
+LINE_OUT = "less the straight line that fits it best over the readings: joints and reference length make that"
+MEAN_OUT = {
+    EVERY: "less its mean over the readings: the reference length makes that",
+    READING: "less its mean over the readings: the bar's offset makes that",
+    BALL: "less its mean over the readings: a shift of the ball makes that",
 }
-"""What is conventional of a piecewise linear curve and taken out of it."""
-
-OF_THE_READING = "less its mean over the readings: the bar's offset makes that"
+"""What is conventional of a piecewise linear curve and taken out of it, by what moves; nothing of the others."""
 
 SIZES = 2.0 ** np.arange(8)
 """Sizes that curves are tried with, as multiples of the one found: a large error must not be drawn towards zero."""
@@ -74,6 +73,7 @@ def curve_of(of: Unnamed, best: Best) -> Curve:
         variable=shape.name,
         unit=UNITS[shape.variable],
         strut=shape.strut,
+        form=shape.form.text(UNITS[shape.variable]),
         period_mm=shape.period,
         convention=words,
         readings_um=1e3 * signature.whole_rms,
@@ -102,48 +102,51 @@ def _along(
     of: Unnamed, shape: Shape, found: Amplitudes
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], str]:
     """Amplitudes less what is conventional, matrix from them to the points, places of the points, and words."""
-    form, amplitudes = shape.form, found.values
-    if isinstance(form, Hats):
-        order = 1 if shape.variable == "strut-length" else 0
-        keep = np.eye(HATS) - _line(np.linspace(-1.0, 1.0, HATS), _weights(of, shape), order)
-        words = (
-            TAKEN_OUT[shape.variable] if shape.variable in TAKEN_OUT and not _of_the_reading(shape) else OF_THE_READING
-        )
-        return keep @ amplitudes, keep, form.points(0.0, 0.0), words
-    by_direction = amplitudes.reshape(-1, form.count)
-    left, _, right = np.linalg.svd(by_direction)
-    way, line = left[:, 0], right[0]
-    if isinstance(form, Plane):
-        coordinates = form.coordinates
-        flat = line[:coordinates] / max(float(np.linalg.norm(line[:coordinates])), 1e-12)
-        at = form.points(*_extent(of, shape, flat))
-        curve = form.columns(at[:, None] * flat)
-        words = f"along the line at {np.degrees(np.arctan2(flat[1], flat[0])):.0f} deg to {_AXIS[shape.variable]}"
-    elif isinstance(form, PlaneStep):
-        across = np.radians(form.across_deg)
-        flat = np.array([np.cos(across), np.sin(across)])
-        at = form.points(*_extent(of, shape, flat))
-        curve = form.columns(at[:, None] * flat)
-        words = f"across a line, at {form.across_deg:.0f} deg to +X"
-    else:
-        at = form.points(*_extent(of, shape, None))
-        curve, words = form.columns(at), ""
-    if isinstance(form, WaveOfTurn):
-        words = "negative in clockwise runs"
+    keep, convention = _convention(of, shape)
+    directions = len(found.values) // shape.form.count
+    amplitudes = np.kron(np.eye(directions), keep) @ found.values
+    left, _, right = np.linalg.svd(amplitudes.reshape(directions, -1))
+    at, curve, over = _over(of, shape, right[0])
+    way, towards = np.ones(1), ""
     if shape.moves in AXES:
         # Signs so that the greatest part of the direction is positive.
-        way = way * np.sign(way[np.abs(way).argmax()])
-        words = ", ".join(part for part in (AXES[shape.moves].format(*way), words) if part)
-    else:
-        way = np.ones(1)
-    return amplitudes, np.kron(way, curve), at, words
+        way = left[:, 0] * np.sign(left[np.abs(left[:, 0]).argmax(), 0])
+        towards = AXES[shape.moves].format(*way)
+    words = ", ".join(part for part in (towards, over, convention) if part)
+    return amplitudes, np.asarray(np.kron(way, curve @ keep), dtype=np.float64), at, words
+
+
+def _convention(of: Unnamed, shape: Shape) -> tuple[NDArray[np.float64], str]:
+    """Matrix that takes what is conventional out of the amplitudes of a curve, and what that is."""
+    count = shape.form.count
+    if not isinstance(shape.form, Hats) or shape.moves not in MEAN_OUT:
+        return np.eye(count), ""
+    straight = shape.variable == "strut-length"
+    line = _line(np.linspace(-1.0, 1.0, count), _weights(of, shape), int(straight))
+    return np.eye(count) - line, LINE_OUT if straight else MEAN_OUT[shape.moves]
+
+
+def _over(of: Unnamed, shape: Shape, line: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+    """Points of the variable, matrix from amplitudes of one direction to them, and along what they lie.
+
+    Args:
+        of: all shapes about the fit.
+        shape: whose curve it is.
+        line: amplitudes of the direction that moves most, shape (p,).
+    """
+    form = shape.form
+    if isinstance(form, Plane | PlaneStep):
+        flat = form.across if isinstance(form, PlaneStep) else line[: form.coordinates]
+        flat = flat / max(float(np.linalg.norm(flat)), 1e-12)
+        at = form.points(*_extent(of, shape, flat))
+        towards = np.degrees(np.arctan2(flat[1], flat[0]))
+        return at, form.columns(at[:, None] * flat), f"over the line at {towards:.0f} deg to {_AXIS[shape.variable]}"
+    at = form.points(*_extent(of, shape, None))
+    words = "negative angles are those of clockwise runs" if shape.variable == "angle since the start" else ""
+    return at, form.columns(at), words
 
 
 _AXIS = {"position of the platform": "+X", "tilt of the platform": "that of tilt A"}
-
-
-def _of_the_reading(shape: Shape) -> bool:
-    return shape.strut is None and shape.moves != EVERY
 
 
 def _line(at: NDArray[np.float64], weights: NDArray[np.float64], order: int) -> NDArray[np.float64]:

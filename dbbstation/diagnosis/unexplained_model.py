@@ -94,7 +94,8 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> Kept:
         raise ModelError("nothing is left without a name that a curve describes", remedy="leave --keep-unexplained out")
     if curve.variable not in KEPT_AS:
         raise ModelError(
-            f"what is left follows {curve.variable}, which no program knows of itself: it cannot be compensated",
+            f"what is left follows {curve.variable}, which no program knows of itself or no model has a source for: it "
+            "cannot be compensated",
             remedy="leave --keep-unexplained out",
         )
     (source,) = sources_named([KEPT_AS[curve.variable]])
@@ -128,7 +129,7 @@ def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
     values = by[:, :2] @ (sine, cosine)
     sigma = np.sqrt(np.einsum("ni,ij,nj->n", by, kept.fit.solution.covariance[columns, columns], by))
     points = tuple(CurvePoint(*map(float, point)) for point in zip(at, values, sigma, strict=True))
-    return replace(rest, curve=replace(curve, period_mm=float(period), points=points))
+    return replace(rest, curve=replace(curve, form=f"period {period:.6g} mm", period_mm=float(period), points=points))
 
 
 def _to_all(each: int, strut: int | None) -> NDArray[np.float64]:

@@ -1,0 +1,108 @@
+"""Effects on no list: what they follow, on which strut, and how large, from recordings of mechanisms in time."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from dbbstation.calibration.fit import calibrate
+from dbbstation.calibration.outliers import calibrate_robust
+from dbbstation.diagnosis.channel import channel_of, thinned
+from dbbstation.diagnosis.naming import misfit_of
+from dbbstation.diagnosis.shapes import moves_struts, variable_of
+from dbbstation.diagnosis.unexplained import unexplained
+from dbbstation.recorded import load_sessions
+from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.mechanisms.oddities import CreepingSpindle, CyclingChiller, RockingTable, SpringyDrive, WindingCable
+from tests.plant.mechanisms.outsiders import BuildingSway, DentedScrew, HoseDrag, LobedSocket, SoftFloor
+from tests.plant.session import record
+
+KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
+
+
+def left(folder, seed, *mechanisms):
+    """What is said of a recording where no source has been named."""
+    record(folder, seed=seed, mechanisms=[KINEMATICS, *mechanisms], rate_hz=10.0)
+    recorded = load_sessions([folder])
+    runs = [thinned(observation) for observation in recorded.observations]
+    fit, _ = calibrate_robust(partial(calibrate, recorded.machine), runs)
+    misfit = misfit_of(fit)
+    race = channel_of(fit, []).race(misfit.noise)
+    return unexplained(fit, fit, race, misfit, misfit, [], significant=1e-4).finding
+
+
+def values_of(curve):
+    return np.array([[point.at, point.value_um, point.uncertainty_um] for point in curve.points]).T
+
+
+def test_a_building_that_sways_is_a_wave_of_time_along_its_direction(tmp_path):
+    found = left(tmp_path / "s", 31, BuildingSway(amplitude_um=0.8, period_s=23.0, towards_deg=65.0))
+    assert (found.variable, found.strut) == ("time wave of the ball on the table", None)
+    period, unit = found.curve.form.split()[1:]
+    assert (float(period), unit) == (pytest.approx(23.0, rel=1e-3), "s")
+    _, value, sigma = values_of(found.curve)
+    assert np.hypot(value.max(), value.min()) / np.sqrt(2) == pytest.approx(0.8, abs=4 * sigma.max())
+    along = np.array([float(part) for part in found.curve.convention.split("(")[1].split(")")[0].split(",")])
+    assert abs(along @ [np.cos(np.radians(65)), np.sin(np.radians(65)), 0]) > 0.95
+
+
+def test_a_belt_that_gives_way_follows_the_acceleration_of_its_strut(tmp_path):
+    found = left(tmp_path / "s", 32, SpringyDrive(strut=4, give_um_s2_m=500.0))
+    assert (found.variable, found.strut, found.curve.unit) == ("strut-acceleration", 4, "mm/s²")
+    at, value, sigma = values_of(found.curve)
+    # The strut stays behind by 0.5 µm per mm/s².
+    assert value == pytest.approx(-0.5 * at, abs=5 * sigma.max() + 0.02 * np.abs(0.5 * at).max())
+
+
+def test_a_socket_with_seven_lobes_is_their_wave(tmp_path):
+    socket = LobedSocket(amplitude_um=0.3, lobes=7, phase_deg=15.0)
+    found = left(tmp_path / "s", 33, socket)
+    assert (found.variable, found.strut, found.curve.form) == ("angle wave", None, "7 lobes")
+    at, value, sigma = values_of(found.curve)
+    assert np.sqrt(np.mean(((value - 0.3 * np.cos(np.radians(7 * at - 15.0))) / sigma) ** 2)) < 2.0
+
+
+def test_a_narrow_dent_is_a_bump_of_its_height(tmp_path):
+    found = left(tmp_path / "s", 34, DentedScrew(strut=5, at_mm=775.0, width_mm=6.0, height_um=3.0))
+    assert (found.variable, found.strut) == ("strut-length bump", 5)
+    at, value, _ = values_of(found.curve)
+    assert at[value.argmax()] == pytest.approx(775.0, abs=4.0)
+    assert value.max() == pytest.approx(3.0, rel=0.35)  # widths are tried in steps of 60 %
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "variable", "strut"),
+    [
+        (CyclingChiller(strut=6, height_um=1.0, period_s=43.0), "time wave", 6),
+        (RockingTable(tip_um=(3.0, 1.0, 1.0)), "position of the platform step", None),
+        (SoftFloor(lean_urad_mm=0.05), "position of the platform of the table", None),
+        (HoseDrag(stiffness_n_mm=0.8), "position of the platform with a pull on it", None),
+        (CreepingSpindle(runout_um=0.4, share=3.3), "angle since the start", None),
+        (WindingCable(pull_um=1.0), "angle since the start", None),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_an_effect_is_put_on_what_it_follows(tmp_path, mechanism, variable, strut):
+    found = left(tmp_path / "s", 35, mechanism)
+    assert (found.variable[: len(variable)], found.strut) == (variable, strut)
+    assert found.curve.strut == strut
+    _, value, sigma = values_of(found.curve)
+    assert np.abs(value).max() > 3 * np.median(sigma)
+
+
+@pytest.mark.parametrize("seed", [41, 42, 43])
+def test_nothing_is_found_where_nothing_is(tmp_path, seed):
+    found = left(tmp_path / "s", seed)
+    assert (found.variable, found.curve, found.text) == (None, None, "Nothing is left beyond noise.")
+
+
+def test_printed_names_tell_variable_and_what_moves():
+    assert variable_of("strut-speed-sign") == "strut-speed-sign"
+    assert variable_of("angle since the start wave of the reading") == "angle since the start"
+    assert variable_of("time wave of the ball on the table") == "time"
+    assert moves_struts("strut-length by direction of travel")
+    assert moves_struts("time step")
+    assert not moves_struts("time step of the reading")
+    assert not moves_struts("position of the platform with a pull on it")

@@ -29,8 +29,8 @@ MADE_UP_FOR = 0.2
 
 SHAPE_THRESHOLD = 8.0
 """Log evidence that an unnamed shape must bring, what picking it from many costs taken off. A misfit of the low harmonics
-as a whole is not asked for: a wave or a bump can hide in them. Of recordings with nothing to find one in thousands brings
-as much."""
+as a whole is not asked for: a wave or a bump can hide in them. Of forty recordings of the virtual
+machine with nothing to find the best brought 5.8, where chance falls by e for each unit more."""
 
 OVERRULES_BY = 5.0
 """Log evidence by which it must be better than names to overrule them, beside explaining more: one that can be bent to

@@ -99,8 +99,10 @@ class Channel:
 
 
 def thinned(observation: Observation) -> Observation:
-    """Return the run averaged over sectors, with what was commanded averaged alike."""
+    """Return the run averaged over sectors, with what was commanded averaged alike; as it is where it is short."""
     raw = observation.raw
+    if len(raw) <= SECTORS:
+        return observation
     sectors = min(SECTORS, max(len(raw) // FEWEST_PER_SECTOR, 1))
     commanded = observation.commanded
     if commanded is not None:

@@ -13,6 +13,7 @@ from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration, calibrate
 from dbbstation.calibration.outliers import MOST, Outlier, calibrate_robust, free_ball, free_bar
 from dbbstation.calibration.scatter import seats_of
 from dbbstation.diagnosis.channel import Channel, channel_of
+from dbbstation.diagnosis.unexplained import overruled
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.harmonics import Misfit, misfit
 from dbbstation.inference.race import AS_GOOD, Choice, Race, as_good, select, worth_of
@@ -52,8 +53,8 @@ class Round:
     """One round of naming: a joint fit, its noise, and the race that was run with that noise.
 
     Attributes:
-        chosen: sources that were named.
-        after: fit with them.
+        chosen: sources that were named; balls and bars among them where one is off.
+        after: fit with the sources.
         left: misfit of that.
         race: with its noise.
         off: ball or bar that is off by far more than stated; what is said of sources then does not count.
@@ -106,8 +107,8 @@ def best_look(
     """Name what is missing, with and without balls that stand out of the kinematic fit, and return the simpler story.
 
     Both can stand in for each other: tests that show missing physics for the first time look like badly seated balls,
-    and a badly seated ball looks like a warped plate. One ball or bar at a time competes with the sources themselves;
-    several that are far off are found beforehand only.
+    and a badly seated ball looks like a warped plate. One ball or bar at a time competes with the sources themselves, and
+    with errors that have no name; several that are far off are found beforehand only.
     """
     progress("kinematic calibration")
     fit = partial(calibrate, machine)
@@ -138,7 +139,9 @@ def _look(
         settled = _settle(channel, before, first, sources, progress)
         if settled.off is None:
             return Look(before, outliers, channel, first, settled)
-        step = _set_free(fit, before, settled.off) if len(outliers) < MOST else None
+        chosen = [choice.variant for choice in settled.chosen]
+        free = len(outliers) < MOST and not overruled(before, settled.race, settled.left.noise, chosen)
+        step = _set_free(fit, before, settled.off) if free else None
         if step is None:
             channel = replace(channel, set_up=())
             return Look(before, outliers, channel, first, _settle(channel, before, first, sources, progress))
@@ -188,7 +191,8 @@ def _settle(
         off = [choice for choice in chosen if choice.variant.of]
         if off:
             worst = max(off, key=lambda one: worth_of(race, chosen, one))
-            return replace(best, off=worst, alike=as_good(race, chosen, worst, candidates, AS_GOOD))
+            alike = as_good(race, chosen, worst, candidates, AS_GOOD)
+            return replace(best, chosen=tuple(chosen), race=race, off=worst, alike=alike)
         found = {choice.candidate.name for choice in chosen}
         if found == {choice.candidate.name for choice in best.chosen}:
             break

@@ -103,6 +103,20 @@ def unexplained(
     return Rest(Unexplained(rms_um, shape.strut, shape.name, best.gain, text, curve), overrules=overrules)
 
 
+def overruled(before: Calibration, race: Race, noise_mm: float, named: Sequence[Variant]) -> bool:
+    """Whether one unnamed shape explains recordings clearly better than what was chosen with a name.
+
+    Args:
+        before: the base fit.
+        race: of what has a name about it.
+        noise_mm: of one sample [mm].
+        named: what was chosen, balls and bars among it.
+    """
+    of = unnamed(before, noise_mm)
+    best = of.best()
+    return best.gain >= SHAPE_THRESHOLD and _overrules(race, named, of, best)
+
+
 def _overrules(race: Race, named: Sequence[Variant], of: Unnamed, best: Best) -> bool:
     """Whether one unnamed shape is clearly better than what has a name.
 

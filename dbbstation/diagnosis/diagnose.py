@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration
+from dbbstation.calibration.noise_level import fine_noise_mm
 from dbbstation.calibration.outliers import beside
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
@@ -20,6 +21,7 @@ from dbbstation.diagnosis.unexplained_model import with_exact_wave
 from dbbstation.diagnosis.verdicts import beside_outliers, crowded, doubted, judge, testable
 from dbbstation.diagnosis.workspace import WorkspaceError, workspace_error
 from dbbstation.errors import ModelError
+from dbbstation.inference.harmonics import LOW
 from dbbstation.inference.held_out import HeldOut, held_out
 from dbbstation.inference.stability import stability
 from dbbstation.sources.contract import Owner
@@ -79,7 +81,7 @@ def diagnose(
         findings = tuple(rest.demoted(findings))
     findings = beside_outliers(findings, outliers)
     findings = crowded(doubted(findings, rest.finding, by_name), chosen, settled.race)
-    predicted = _held_out(channel, chosen, settled.left.noise)
+    predicted = _held_out(channel, chosen, settled.left.noise, fine_noise_mm(after))
     steady = _stability(channel, findings, settled)
     findings = tuple(replace(f, stability=steady.get(f.name)) for f in findings)
     elsewhere = workspace_error(before, after) if chosen else None
@@ -161,15 +163,29 @@ def _stability(channel: Channel, findings: Sequence[SourceFinding], settled: Rou
     )
 
 
-def _held_out(channel: Channel, chosen: Sequence[Choice], noise_mm: float) -> tuple[HeldOut, HeldOut]:
-    """Predictions of left-out tests without and with the chosen sources [mm]."""
+def _held_out(channel: Channel, chosen: Sequence[Choice], noise_mm: float, fine_mm: float) -> tuple[HeldOut, HeldOut]:
+    """Predictions of left-out tests without and with the chosen sources [mm].
+
+    Where neighbouring samples resemble each other the low harmonics, few of all, have more noise than the fine ones.
+    """
+    samples = float(np.mean([len(o.raw) for o in channel.observations]))
+    low = min((2 * LOW + 1) / samples, 1.0)
+    single = float(np.sqrt(low * noise_mm**2 + (1.0 - low) * min(fine_mm, noise_mm) ** 2))
     tests = _tests(channel)
     folds = min(FOLDS, max(tests) + 1)
     groups = [test % folds for test in tests]
     base = np.arange(len(channel.base.prior))
     joint = np.concatenate([base, *(choice.variant.columns for choice in chosen)])
     without, having = (
-        held_out(channel.blocks, groups, channel.known, active, max(noise_mm, SMALLEST_NOISE_MM), channel.held)
+        held_out(
+            channel.blocks,
+            groups,
+            channel.known,
+            active,
+            max(noise_mm, SMALLEST_NOISE_MM),
+            channel.held,
+            max(single, SMALLEST_NOISE_MM),
+        )
         for active in (base, joint)
     )
     return without, having

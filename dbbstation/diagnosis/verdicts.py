@@ -11,7 +11,7 @@ from dbbstation.calibration.outliers import SOURCE_OF
 from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
 from dbbstation.diagnosis.shapes import variable_of
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.race import AS_GOOD, Race, as_good, free_directions, worth_of
+from dbbstation.inference.race import AS_GOOD, Race, as_good, contained, free_directions, worth_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -30,6 +30,9 @@ TESTABLE_SIGMA = 5.0
 
 TESTABLE_SHARE = 0.5
 """Share of the combinations of a source's amplitudes that must be seen for the source to be ruled out."""
+
+FEW = 8
+"""Amplitudes of a source, as those of one strut, up to which explaining the same makes it as likely as another."""
 
 OWN_LAW = 0.01
 """Share of its log evidence by which one source that grows with time must be better than another."""
@@ -131,7 +134,7 @@ def _likenesses(
         alike = as_good(race, chosen, choice, others, AS_GOOD)
         if lawful:
             alike += as_good(race, chosen, choice, lawful, max(AS_GOOD, OWN_LAW * worth_of(race, chosen, choice)))
-        for rival in alike:
+        for rival in dict.fromkeys((*alike, *contained(race, chosen, choice, channel.named, FEW))):
             likes.setdefault(own, []).append(rival)
             likes.setdefault(rival, []).append(own)
     return {name: tuple(sorted(alike)) for name, alike in likes.items()}

@@ -37,6 +37,7 @@ def held_out(
     active: NDArray[np.int64],
     noise: float,
     held: NDArray[np.float64],
+    single: float | None = None,
 ) -> HeldOut:
     """Leave groups of blocks out in turn and predict them from the others.
 
@@ -45,8 +46,10 @@ def held_out(
         groups: group of each block, such as the fold of its test.
         known: priors and scales of all columns.
         active: columns that the model uses, shape (a,).
-        noise: standard deviation of one measurement.
+        noise: standard deviation of one measurement, as anything smooth feels it.
         held: directions of the fitted columns to keep at zero, in units of their scales.
+        single: standard deviation of a single measurement, less than `noise` where neighbours resemble each other;
+            the same if None.
     """
     used = Columns(known.prior[active], known.scale[active], known.random[active])
     thin = [_restricted(block, active) for block in blocks]
@@ -57,7 +60,7 @@ def held_out(
         fitted = solve(kept, used, noise, held)
         square += _left(out, used, fitted.x, noise)
         count += sum(block.count for block in out)
-        inside, degrees = _weighted(out, fitted, noise)
+        inside, degrees = _weighted(out, fitted, noise if single is None else single)
         weighted += inside
         rows += degrees
     return HeldOut(float(np.sqrt(square / count)), float(np.sqrt(weighted / max(rows, 1))))

@@ -267,6 +267,35 @@ def worth_of(race: Race, chosen: Sequence[Choice], one: Choice) -> float:
     return together - race.evidence(others)
 
 
+def contained(
+    race: Race, chosen: Sequence[Choice], one: Choice, rivals: Sequence[Candidate], few: int
+) -> tuple[str, ...]:
+    """Names of rivals, not chosen themselves, that explain the same in the place of one of the chosen.
+
+    Only that they could explain more speaks against them: measurements cannot tell them from it.
+
+    Args:
+        race: on what the base leaves.
+        chosen: combination.
+        one: of them.
+        rivals: what might stand in its place.
+        few: amplitudes of a rival at the most; what has many explains anything.
+    """
+    names = {choice.candidate.name for choice in chosen}
+    others = [choice.variant for choice in chosen if choice is not one]
+    enough, beside = race.explained([*others, one.variant]) - SAME_SIGMAS**2, race.evidence(others)
+
+    def same(variant: Variant) -> bool:
+        own = [*others, variant]
+        return len(variant.columns) <= few and race.explained(own) > enough and race.evidence(own) > beside
+
+    return tuple(r.name for r in rivals if r.name not in names and any(same(v) for v in r.variants))
+
+
+SAME_SIGMAS = 3.0
+"""What explains less by this in standard deviations explains something else."""
+
+
 def as_good(
     race: Race, chosen: Sequence[Choice], one: Choice, rivals: Sequence[Candidate], enough: float
 ) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.harmonics import bands, coefficients, misfit, smooth
 from dbbstation.inference.held_out import held_out
-from dbbstation.inference.race import Candidate, Race, Variant, as_good, select
+from dbbstation.inference.race import Candidate, Race, Variant, as_good, contained, select
 from dbbstation.inference.square_root import Columns, compress, joined, solve
 from dbbstation.inference.stability import stability
 
@@ -163,6 +163,23 @@ def test_left_out_runs_in_units_of_their_predicted_covariance(rng):
     assert np.mean(np.square(wrong)) > 3.0
 
 
+def test_left_out_runs_with_correlated_noise_are_measured_by_that_of_a_single_sample(rng):
+    """A moving average of three has a third of the variance, and low harmonics feel it as the white noise before it."""
+    found = []
+    for _ in range(20):
+        noises = [np.convolve(rng.normal(0, NOISE, 62), np.ones(3) / 3, "valid") for _ in range(RUNS)]
+        targets = [terms(run)[:, :2] @ (3.0, -1.0) + noise for run, noise in enumerate(noises)]
+        blocks = [compress(np.arange(6), terms(run), target) for run, target in enumerate(targets)]
+        known = Columns(np.full(6, np.inf), np.ones(6), np.zeros(6, dtype=bool))
+        single = NOISE / np.sqrt(3)
+        told = held_out(blocks, list(range(RUNS)), known, np.array([0, 1]), NOISE, NONE_HELD, single)
+        plain = held_out(blocks, list(range(RUNS)), known, np.array([0, 1]), NOISE, NONE_HELD)
+        assert told.rms == plain.rms
+        found.append(told.normalised / plain.normalised)
+    # More than by the ratio of the noises alone, since what was fitted is as uncertain as before.
+    assert 1.0 < np.median(found) <= np.sqrt(3)
+
+
 def test_two_effects_that_hide_each_other_are_found_as_a_pair(rng):
     """Columns that are nearly opposite: each alone explains next to nothing of their sum, both explain it all."""
     line = rng.normal(size=240)
@@ -309,6 +326,17 @@ def test_rivals_are_as_good_where_little_evidence_tells_them_apart(rng):
     assert as_good(race, chosen, chosen[0], CANDIDATES, between[0] - 0.1) == ()
     nearest = min(gaps, key=gaps.__getitem__)
     assert as_good(race, chosen, chosen[0], CANDIDATES, (between[0] + between[1]) / 2) == (nearest,)
+
+
+def test_a_rival_that_contains_what_was_chosen_cannot_be_told_from_it(rng):
+    """Sine and parabola explain what the sine does; cosine and parabola do not."""
+    race, *_ = race_on(rng, [1.0, 0.0, 0.0, 0.0])
+    both = Candidate("sine and parabola", (Variant(np.array([2, 5]), np.array([2.0, 2.0])),))
+    other = Candidate("cosine and parabola", (Variant(np.array([3, 5]), np.array([2.0, 2.0])),))
+    chosen = select(race, CANDIDATES, 5.0, 1)
+    assert [choice.candidate.name for choice in chosen] == ["sine"]
+    assert contained(race, chosen, chosen[0], [both, other], 2) == ("sine and parabola",)
+    assert contained(race, chosen, chosen[0], [both, other], 1) == ()
 
 
 def test_the_whole_form_of_one_strut_alone_has_all_amplitudes_at_their_usual_sizes():

@@ -109,6 +109,10 @@ def diagnose(
             say(f"joint model written to {out}")
 
 
+UNPREDICTABLE_UM = 1000.0
+"""A prediction that is off by more says that nothing was predicted [µm]."""
+
+
 def _print(summary: Mapping[str, Any]) -> None:
     if summary["mismatch"]:
         click.echo(
@@ -125,13 +129,7 @@ def _print(summary: Mapping[str, Any]) -> None:
         click.echo("\nwhere the misfit is largest:")
         for location in summary["locations"][:5]:
             click.echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
-    residual, held_out = summary["residual_rms_um"], summary["held_out_rms_um"]
-    click.echo(f"\nresidual within mountings {residual['before']:.2f} -> {residual['after']:.2f} µm rms")
-    normalised = summary["held_out_normalised"]
-    click.echo(
-        f"left-out tests, predicted {held_out['before']:.2f} -> {held_out['after']:.2f} µm rms; in units of what "
-        f"noise and uncertainties allow {normalised['before']:.2f} -> {normalised['after']:.2f}"
-    )
+    _print_gain(summary)
     if summary["workspace"]:
         elsewhere = summary["workspace"]
         click.echo(
@@ -191,6 +189,20 @@ def _print_curve(curve: Mapping[str, Any]) -> None:
     print_table([f"{curve['variable']} / {curve['unit']}", "error / µm", "", "std / µm"], rows)
     if curve["convention"]:
         click.echo(f"  ({curve['convention']})")
+
+
+def _print_gain(summary: Mapping[str, Any]) -> None:
+    """Print residual and prediction of left-out tests before and after."""
+    residual, held_out = summary["residual_rms_um"], summary["held_out_rms_um"]
+    click.echo(f"\nresidual within mountings {residual['before']:.2f} -> {residual['after']:.2f} µm rms")
+    normalised = summary["held_out_normalised"]
+    if max(held_out.values()) > UNPREDICTABLE_UM:
+        click.echo("left-out tests cannot be predicted from the others: too few tests to know the machine without them")
+    else:
+        click.echo(
+            f"left-out tests, predicted {held_out['before']:.2f} -> {held_out['after']:.2f} µm rms; in units of what "
+            f"noise and uncertainties allow {normalised['before']:.2f} -> {normalised['after']:.2f}"
+        )
 
 
 def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:

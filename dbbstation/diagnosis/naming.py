@@ -14,7 +14,7 @@ from dbbstation.calibration.outliers import MOST, Outlier, calibrate_robust, fre
 from dbbstation.calibration.scatter import seats_of
 from dbbstation.diagnosis.channel import Channel, channel_of
 from dbbstation.diagnosis.unexplained import overruled
-from dbbstation.errors import CalibrationError
+from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.harmonics import Misfit, misfit
 from dbbstation.inference.race import AS_GOOD, Choice, Race, as_good, select, worth_of
 
@@ -199,8 +199,9 @@ def _settle(
         progress("joint fit with " + (", ".join(sorted(found)) or "nothing more"))
         try:
             after = _joint(channel, race, chosen, sources) if chosen else before
-        except CalibrationError:
-            # An amplitude of next to nothing leaves the time constant beside it without a hold.
+        except (CalibrationError, KinematicsError):
+            # An amplitude of next to nothing leaves the time constant beside it without a hold, and a step may leave
+            # what the machine can reach.
             dropped.add(min(chosen, key=lambda one: worth_of(race, chosen, one)).candidate.name)
             continue
         weak = {choice.candidate.name for choice in chosen if not _stands_out(after, choice)}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.compiled import compiled
+from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
@@ -19,20 +19,25 @@ if TYPE_CHECKING:
 
 MM_PER_UM = 1e-3
 
-DECAY_MM = tuple(float(f"{decay:.2g}") for decay in np.geomspace(0.02, 1.0, 8))
-"""Decay lengths worth trying: on a circle of 150 mm, spikes of about two to ten degrees [mm]."""
+DECAY_MM = tuple(float(f"{decay:.2g}") for decay in np.geomspace(0.0003, 1.1, 15))
+"""Decay lengths worth trying: spikes that fade in 0.05 to 0.5 s, on circles of 100 to 150 mm at 500 to 2500 mm/min [mm]."""
 
 TURNED_MM = 1e-3
 """A strut has turned round once it has come back by this: less is rounding of the program or of recorded angles."""
 
 
 class ReversalSpike(ErrorSource):
-    """A strut sticks when it turns round, and is drawn back over a short way: -s a (1 - exp(-d / 2|a|)) exp(-d / l).
+    """A strut sticks when it turns round, and is drawn back: -s a (1 - exp(-d / 2|a|)) exp(-sqrt(d / l)).
 
-    With d the way since the turning point and s the sign of the new movement. The way, not the time, because the
-    drive has to run through the friction of its guides and seals; at one feed the two cannot be told apart. The rise
-    is there because no strut stays behind by more than its drive has moved; with the 2 only half of that is lost,
-    so that the error can be compensated. It is over within a degree, and at a = 0 the error is proportional to a.
+    With d the way since the turning point and s the sign of the new movement. The position loop makes up for friction
+    exponentially in time; behind a turning point the way grows with the square of time, d = A t^2 / 2, so that
+    exp(-t / T) is exp(-sqrt(d / l)) with l = A T^2 / 2. The way needs no clock and holds for programs; at another feed
+    l is another, as the square of the feed.
+
+    The rise is there because no strut stays behind by more than its drive has moved. With the 2 the error changes at
+    most half as fast as the travel: the rise by up to 1/2, the fading the other way by up to 1 / 4e. Their sum always
+    grows, so that the error can be compensated. At a = 0 the error is proportional to a. Where the rise is as long as
+    the fading, 2|a| near l, much of a spike is cut off.
 
     Before the first turning point of a run there is no spike.
     """
@@ -51,10 +56,11 @@ class ReversalSpike(ErrorSource):
         "circle at another feed: the spike changes, backlash does not.",
         cure="Adjust the control's friction (quadrant) compensation for that strut; look after lubrication and seals. A "
         "negative amplitude is a friction compensation that is set too large.",
-        equation="actual minus driven length = -s a (1 - exp(-d / 2|a|)) exp(-d / l), d the travel since the strut turned "
-        "round, s its new direction",
+        equation="actual minus driven length = -s a (1 - exp(-d / 2|a|)) exp(-sqrt(d / l)), d the travel since the strut "
+        "turned round, s its new direction",
         origin="stick motion of a drive at reversal, as in Kakino, Ihara and Shinohara, Accuracy Inspection of NC "
-        "Machine Tools by Double Ball Bar Method, 1993; the exponential is the simplest decay",
+        "Machine Tools by Double Ball Bar Method, 1993; faded as a position loop of first order does in "
+        "time, d = A t^2 / 2 behind the turning point",
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
@@ -66,7 +72,7 @@ class ReversalSpike(ErrorSource):
             for i in range(STRUTS)
         )
         meaning = "travel of a strut over which its spike falls to 37 %, all struts alike"
-        return (*heights, Parameter("decay_mm", "mm", 0.2, meaning, DECAY_MM))
+        return (*heights, Parameter("decay_mm", "mm", 0.02, meaning, DECAY_MM))
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Spikes of each strut.
@@ -93,7 +99,7 @@ class ReversalSpike(ErrorSource):
         """Both factors of the spike and their derivatives, shapes (n, 6).
 
         Returns:
-            Rise -s a (1 - exp(-d / 2|a|)) [mm], its derivative by a [1], exp(-d / l) [1], its derivative by l [1/mm].
+            Rise -s a (1 - exp(-d / 2|a|)) [mm], its derivative by a [1], exp(-sqrt(d / l)) [1], its derivative by l [1/mm].
         """
         self.require(motion)
         frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
@@ -107,8 +113,9 @@ class ReversalSpike(ErrorSource):
         if length <= 0.0:  # the limit, which a fit may try: a spike without width
             decay, by_length = np.zeros_like(way), np.zeros_like(way)
         else:
-            decay = np.exp(-way / length)
-            by_length = way / length**2 * decay
+            root = np.sqrt(way / length)
+            decay = np.exp(-root)
+            by_length = root / (2.0 * length) * decay
         return -sign * height * (1.0 - lacking), by_height, decay, by_length
 
 
@@ -119,11 +126,54 @@ FULLY = 750.0
 def since_turning(travel: NDArray[np.float64]) -> NDArray[np.float64]:
     """Signed way of each column since it last turned round, shape (n, m).
 
-    Zero at the turning point itself, which is the outermost row, and before the first one.
+    The turning point lies between rows, in general: it is the vertex of the parabola through the outermost row and its
+    two neighbours, over the way of all columns together, so that rows need not be even. Zero before the first one.
+    Where the path has a corner or comes straight back, as a single column always does, the outermost row is the turning
+    point.
     """
     since = np.zeros_like(travel)
     _since(np.ascontiguousarray(travel), TURNED_MM, since)
     return since
+
+
+@inlined
+def _parabola(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, float, float, float]:
+    """Parabola of a column through row k and its neighbours, over the way of all columns from row to row.
+
+    Returns:
+        Slope at row k, half of minus the second derivative, both of `side` times the column, way from the row before
+        and way to the next; zeros where the path has a corner at k, or ends there.
+    """
+    if k < 1 or k + 1 >= travel.shape[0]:
+        return 0.0, 0.0, 0.0, 0.0
+    before = after = along = 0.0
+    for c in range(travel.shape[1]):
+        came, goes = travel[k, c] - travel[k - 1, c], travel[k + 1, c] - travel[k, c]
+        before, after, along = before + came * came, after + goes * goes, along + came * goes
+    if along <= 0.0:  # also where two rows are the same
+        return 0.0, 0.0, 0.0, 0.0
+    before, after = np.sqrt(before), np.sqrt(after)
+    rises = side * (travel[k, i] - travel[k - 1, i]) / before
+    falls = side * (travel[k, i] - travel[k + 1, i]) / after
+    return (rises * after - falls * before) / (before + after), (rises + falls) / (before + after), before, after
+
+
+@inlined
+def _vertex(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, bool]:
+    """Turning point of a column whose outermost row is k, on the high (1.0) or low (-1.0) side, and whether k is behind.
+
+    Of two rows almost equally far out each has its parabola. Were the turning point taken from one of them alone, it
+    would jump as the other becomes the outermost, and a compensation that moves them could go to and fro for ever;
+    hence no less than the neighbour's parabola in the middle between both.
+    """
+    slope, bend, before, after = _parabola(travel, i, k, side)
+    if bend <= 0.0:
+        return travel[k, i], True
+    top = side * travel[k, i] + slope * slope / (4.0 * bend)
+    beside, step = (k + 1, after) if slope > 0.0 else (k - 1, before)
+    middle = side * (travel[k, i] + travel[beside, i]) / 2.0
+    top = max(top, middle + _parabola(travel, i, beside, side)[1] * step * step / 4.0)
+    return side * top, slope <= 0.0
 
 
 @compiled
@@ -144,8 +194,10 @@ def _since(travel: NDArray[np.float64], turned: float, since: NDArray[np.float64
             if new != 0.0:
                 start = high if new < 0.0 else low
                 if way != 0.0:  # the first movement is one that was already under way
-                    turn, has_turned = travel[start, i], True
-                    for j in range(start, k):
+                    turn, is_behind = _vertex(travel, i, start, -new)
+                    has_turned = True
+                    # An outermost row that is still before the turning point belongs to the movement before.
+                    for j in range(start if is_behind else start + 1, k):
                         since[j, i] = travel[j, i] - turn
                 way, low, high = new, k, k
             if has_turned:

@@ -16,7 +16,7 @@ from dbbstation.diagnosis.channel import Channel, channel_of
 from dbbstation.diagnosis.unexplained import overruled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.harmonics import Misfit, misfit
-from dbbstation.inference.race import AS_GOOD, Choice, Race, as_good, select, worth_of
+from dbbstation.inference.race import AS_GOOD, Candidate, Choice, Race, as_good, select, worth_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -187,10 +187,14 @@ def _settle(
     for _ in range(MOST_ROUNDS):
         race = channel.race(best.left.noise)
         candidates = [candidate for candidate in channel.named if candidate.name not in dropped]
-        chosen = select(race, [*candidates, *channel.set_up], THRESHOLD, MOST_SOURCES)
+        set_up = [candidate for candidate in channel.set_up if candidate.name not in dropped]
+        chosen = select(race, [*candidates, *set_up], THRESHOLD, MOST_SOURCES)
         off = [choice for choice in chosen if choice.variant.of]
         if off:
             worst = max(off, key=lambda one: worth_of(race, chosen, one))
+            if not _beyond_scatter(race, channel.set_up, chosen, worst):
+                dropped.add(worst.candidate.name)
+                continue
             alike = as_good(race, chosen, worst, candidates, AS_GOOD)
             return replace(best, chosen=tuple(chosen), race=race, off=worst, alike=alike)
         found = {choice.candidate.name for choice in chosen}
@@ -214,6 +218,26 @@ def _settle(
     # Names, fit and what is left of it belong together, whatever ended the rounds.
     left = misfit_of(best.after)
     return replace(best, left=left, race=channel.race(left.noise))
+
+
+def _beyond_scatter(race: Race, set_up: Sequence[Candidate], chosen: Sequence[Choice], off: Choice) -> bool:
+    """Whether a ball is off by more than all balls scatter: that they scatter as stated is only roughly true.
+
+    By chance half of them lie beyond their median. One bar does not scatter.
+    """
+    if off.candidate.name == "bar-offset":
+        return True
+    others = [choice.variant for choice in chosen if choice is not off]
+    beside = race.explained(others) if others else 0.0
+    squares = {
+        (candidate.name, variant.of): (race.explained([*others, variant]) - beside, len(variant.columns))
+        for candidate in set_up
+        if candidate.name != "bar-offset"
+        for variant in candidate.variants
+    }
+    usual = max(1.0, float(np.median([square / chdtri(freedom, 0.5) for square, freedom in squares.values()])))
+    square, _ = squares[off.candidate.name, off.variant.of]
+    return worth_of(race, chosen, off) - 0.5 * square * (1.0 - 1.0 / usual) >= THRESHOLD
 
 
 def _stands_out(calibration: Calibration, choice: Choice) -> bool:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MM_PER_UM = 1e-3
 
-DECAY_MM = tuple(float(f"{decay:.2g}") for decay in np.geomspace(0.0003, 1.1, 15))
+DECAY_MM = tuple(float(f"{decay:.2g}") for decay in np.geomspace(0.0005, 0.8, 12))
 """Decay lengths worth trying: spikes that fade in 0.05 to 0.5 s, on circles of 100 to 150 mm at 500 to 2500 mm/min [mm]."""
 
 TURNED_MM = 1e-3

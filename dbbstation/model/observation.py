@@ -79,6 +79,7 @@ class Observation:
             setup=setup,
             put_up=None if self.setup.place_known else self._standing(None if time is None else time[0]),
             reading_mm=_held_back(raw.length_mm, before),
+            reading_is_measured=True,
         )
 
     def _standing(self, until_s: float | None) -> Motion:

@@ -126,6 +126,7 @@ class Motion:
         setup: None for poses that nobody measured.
         reading_mm: what the bar showed, shape (n,) [mm]: the place of its encoder, for errors of that encoder alone;
             None where nothing was measured.
+        reading_is_measured: that came from an instrument, with its noise; otherwise from a model.
         put_up: the machine standing still while the fixed ball was put up at its tool tip: the ball stands where the
             tip really was in the last row; None for a ball of known place.
     """
@@ -139,6 +140,7 @@ class Motion:
     load_n: NDArray[np.float64] | None = None
     setup: Setup | None = None
     reading_mm: NDArray[np.float64] | None = None
+    reading_is_measured: bool = False
     put_up: Motion | None = None
 
     def __len__(self) -> int:

@@ -13,7 +13,7 @@ from dbbstation.model.observation import Observation
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.sources.bar_cyclic import BarCyclic
 from dbbstation.sources.base_joints import BaseJoints
-from dbbstation.sources.contract import Fitted, Need
+from dbbstation.sources.contract import Fitted, Motion, Need
 from dbbstation.trace.circle import RawCircle
 from tests.sources.runs import random_run, run
 
@@ -108,3 +108,19 @@ def test_readings_that_sweep_a_fifth_of_a_period_tell_nothing_beside_shift_and_l
 def test_a_motion_without_readings_is_refused(reference, rng):
     with pytest.raises(ModelError, match=r"bar-cyclic needs reading, .* give recordings of the bar"):
         CYCLIC.effect(replace(random_run(rng), reading_mm=None), reference, np.array([0.1, 0.1, 20.0]))
+
+
+def test_noise_of_the_readings_is_not_taken_for_a_wave(rng):
+    """Readings with noise in them, which dwell about one phase of the wave; a wave at these would resemble the noise."""
+    count, noise_mm = 2000, 1e-3
+    true_mm = 150.0 + 0.002 * np.sin(np.linspace(0.0, 2.0 * np.pi, count))
+    alike = []
+    for _ in range(30):
+        noise = rng.normal(0.0, noise_mm, count)
+        motion = Motion(np.zeros((count, 6)), reading_mm=true_mm + noise, reading_is_measured=True)
+        waves = CYCLIC.derivative(motion, None, np.array([0.0, 0.0, 20.0])).reading_mm[:, :2]
+        left = waves - waves.mean(axis=0)
+        alike.append(left.T @ noise / (np.linalg.norm(left, axis=0) * noise_mm))
+    # Of size one for waves that know nothing of the noise; the sine of the readings themselves has 20 and more.
+    assert np.abs(np.mean(alike, axis=0)).max() < 3.0
+    assert np.std(alike, axis=0).max() < 3.0

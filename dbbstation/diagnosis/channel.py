@@ -12,6 +12,7 @@ from dbbstation.calibration.fit import SMALLEST_NOISE_MM
 from dbbstation.calibration.scatter import LEAST_STATED_MM
 from dbbstation.inference.race import Candidate, Race, Variant
 from dbbstation.inference.square_root import Block, Columns, compress, joined
+from dbbstation.machine.geometry import STRUTS
 from dbbstation.trace.average import averaged, means, sector_of
 
 if TYPE_CHECKING:
@@ -196,25 +197,46 @@ def _source_columns(
         derivative = reading.by_source(source, machine, values)[:, amplitudes]
         shape = tuple(float(values[k]) for k in shaped)
         numbers = book.source(source, source.shared_by(motion), shape, [parameters[k] for k in amplitudes])
+        if len(numbers) > len(amplitudes):
+            derivative = np.column_stack([derivative, derivative.sum(axis=1)])
         found.append((numbers, derivative))
     return found
 
 
-def _forms(whole: Variant, struts: NDArray[np.int64]) -> list[Variant]:
-    """Forms in which a source is looked for: all its amplitudes, at one size or two, and those of each strut alone.
+@dataclass(frozen=True, eq=False)
+class _Set:
+    """Columns of one variant of a source for one set that shares its values.
 
-    What wears or was made badly is often one strut only; all others free beside it would hide what is faint.
-
-    Args:
-        whole: all amplitudes.
+    Attributes:
+        columns: of its amplitudes, shape (p,).
+        prior: plausible sizes, shape (p,).
         struts: that each amplitude is of, 0 for none, shape (p,).
+        common: column of one amplitude that all struts share; none where they have several each, or none.
     """
-    sizes = SIZES if len(whole.columns) >= MANY else SIZES[:1]
+
+    columns: NDArray[np.int64]
+    prior: NDArray[np.float64]
+    struts: NDArray[np.int64]
+    common: NDArray[np.int64]
+
+
+def _forms(sets: Sequence[_Set], shape: tuple[float, ...]) -> list[Variant]:
+    """Forms in which a source is looked for: all amplitudes, at one size or two, those of each strut alone, one for all.
+
+    What wears or was made badly is often one strut, or all alike; all others free beside it would hide what is faint.
+    """
+    columns, prior, struts = (
+        np.concatenate([getattr(s, name) for s in sets]) for name in ("columns", "prior", "struts")
+    )
+    whole = Variant(columns, prior, shape)
+    sizes = SIZES if len(columns) >= MANY else SIZES[:1]
     forms = [whole.scaled(size) for size in sizes]
     single = np.unique(struts)
     if len(single) > 1:
         of = [struts == strut for strut in single]
-        forms += [replace(whole, columns=whole.columns[own], prior=whole.prior[own]) for own in of]
+        forms += [replace(whole, columns=columns[own], prior=prior[own]) for own in of]
+    if len(sets) == 1 and len(sets[0].common):
+        forms.append(replace(whole, columns=sets[0].common, prior=prior[:1]))
     return forms
 
 
@@ -223,20 +245,19 @@ class _Book:
 
     def __init__(self, first: int) -> None:
         self.count = first
-        self._sources: dict[
-            tuple[str, tuple[float, ...]], dict[str, tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]
-        ] = {}
+        self._sources: dict[tuple[str, tuple[float, ...]], dict[str, _Set]] = {}
         self._set_up: dict[str, dict[str, Variant]] = {}
 
     def source(
         self, source: ErrorSource, shared: str, shape: tuple[float, ...], amplitudes: Sequence[Parameter]
     ) -> NDArray[np.int64]:
-        """Columns of one variant of a source for one set that shares its values."""
+        """Columns of one variant of a source for one set that shares its values; that of all struts alike comes last."""
         sets = self._sources.setdefault((source.name, shape), {})
         if shared not in sets:
-            prior = np.array([p.plausible for p in amplitudes])
-            sets[shared] = (self._new(len(prior)), prior, np.array([p.strut or 0 for p in amplitudes]))
-        return sets[shared][0]
+            prior, struts = np.array([p.plausible for p in amplitudes]), np.array([p.strut or 0 for p in amplitudes])
+            each = sorted(struts.tolist()) == list(range(1, STRUTS + 1))
+            sets[shared] = _Set(self._new(len(prior)), prior, struts, self._new(1 if each else 0))
+        return np.concatenate([sets[shared].columns, sets[shared].common])
 
     def set_up(self, term: Term, prior: NDArray[np.float64]) -> NDArray[np.int64]:
         """Columns of a ball or bar that is off by far more than stated."""
@@ -253,10 +274,7 @@ class _Book:
         """Return the candidates with their variants."""
         variants: dict[str, list[Variant]] = {}
         for (name, form), sets in self._sources.items():
-            columns = np.concatenate([columns for columns, _, _ in sets.values()])
-            prior = np.concatenate([prior for _, prior, _ in sets.values()])
-            struts = np.concatenate([struts for _, _, struts in sets.values()])
-            variants.setdefault(name, []).extend(_forms(Variant(columns, prior, form), struts))
+            variants.setdefault(name, []).extend(_forms(list(sets.values()), form))
         return tuple(Candidate(name, tuple(forms)) for name, forms in variants.items())
 
     def _new(self, size: int) -> NDArray[np.int64]:

@@ -243,7 +243,7 @@ def _beyond_scatter(race: Race, set_up: Sequence[Candidate], chosen: Sequence[Ch
 def _stands_out(calibration: Calibration, choice: Choice) -> bool:
     """Whether the amplitudes that were chosen, in any of their combinations, stand out of their covariance.
 
-    In an exact fit of all amplitudes of the source, of which the others are then said to be zero.
+    In an exact fit of all amplitudes of the source, of which the others are then said to be zero, or all to be alike.
     """
     columns = np.array(
         [
@@ -254,15 +254,20 @@ def _stands_out(calibration: Calibration, choice: Choice) -> bool:
             if not parameter.shape
         ]
     )
-    scale = calibration.layout.known.scale[columns]
-    covariance = calibration.solution.covariance[np.ix_(columns, columns)] / np.outer(scale, scale)
+    known, solution = calibration.layout.known, calibration.solution
+    scale = known.scale[columns]
+    covariance = solution.covariance[np.ix_(columns, columns)] / np.outer(scale, scale)
     values = calibration.x[columns] / scale
-    own = np.isin(choice.candidate.whole(choice.variant).columns, choice.variant.columns)
-    if not own.all():
-        others = covariance[np.ix_(~own, ~own)]
-        gain = covariance[np.ix_(own, ~own)] @ np.linalg.pinv(others, rcond=HELD, hermitian=True)
-        values = values[own] - gain @ values[~own]
-        covariance = covariance[np.ix_(own, own)] - gain @ covariance[np.ix_(~own, own)]
+    spread = choice.candidate.spread(choice.variant)
+    if spread.shape[0] > spread.shape[1]:
+        # Held directions may be anything: struts that are late by what all have in common are one that is late alone.
+        held = np.zeros((len(solution.held), len(known.random)))
+        held[:, ~known.random] = solution.held
+        held = held[:, columns]
+        weight = np.linalg.pinv(covariance + held.T @ held, rcond=HELD, hermitian=True)
+        information = spread.T @ weight @ spread
+        values = np.linalg.solve(information, spread.T @ weight @ values)
+        covariance = np.linalg.inv(information)
     variance, axes = np.linalg.eigh(covariance)
     free = variance > HELD * variance.max(initial=0.0)  # directions that were held have none
     along = (axes.T @ values)[free]
@@ -275,11 +280,10 @@ def _joint(channel: Channel, race: Race, chosen: Sequence[Choice], sources: dict
     start: dict[str, NDArray[np.float64]] = {}
     for choice in chosen:
         source = sources[choice.candidate.name]
-        whole, own = choice.candidate.whole(choice.variant).columns, choice.variant.columns
-        found = np.zeros(len(whole))
-        found[np.isin(whole, own)] = amplitudes[: len(own)]
+        own = len(choice.variant.columns)
+        found = choice.candidate.spread(choice.variant) @ amplitudes[:own]
         start[source.name] = _with_shape(source, channel.machine, found, choice.variant.shape)
-        amplitudes = amplitudes[len(own) :]
+        amplitudes = amplitudes[own:]
     more = [sources[choice.candidate.name] for choice in chosen]
     return calibrate(channel.machine, channel.observations, [*default_sources(), *more], start)
 

@@ -34,7 +34,7 @@ TESTABLE_SHARE = 0.5
 FEW = 8
 """Amplitudes of a source, as those of one strut, up to which explaining the same makes it as likely as another."""
 
-OWN_LAW = 0.01
+OWN_LAW = 0.02
 """Share of its log evidence by which one source that grows with time must be better than another."""
 
 CROWD = 3

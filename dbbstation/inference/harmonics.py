@@ -34,7 +34,7 @@ CORNERS = np.geomspace(10.0, 240.0, 17)
 """Corners c of the noise's spectrum that are tried: neighbours resemble each other over 6 degrees of the period at
 the most. What is correlated over more is structure that a model should name."""
 
-WORTH = 5.0
+WORTH = 2.0
 """Log likelihood that correlation must bring over white noise to be believed."""
 
 

@@ -74,6 +74,12 @@ class Candidate:
         alike = [one for one in self.variants if one.shape == variant.shape and one.of == variant.of]
         return max(alike, key=lambda one: len(one.columns)).scaled(1.0)
 
+    def spread(self, variant: Variant) -> NDArray[np.float64]:
+        """Amplitudes of a form to those of the whole: some of these, or one for all of them, shape (p, q)."""
+        whole = self.whole(variant).columns
+        same = (whole[:, None] == variant.columns).astype(np.float64)
+        return same if same.any() else np.ones((len(whole), 1))
+
 
 @dataclass(frozen=True, eq=False)
 class Choice:

@@ -347,6 +347,10 @@ def test_the_whole_form_of_one_strut_alone_has_all_amplitudes_at_their_usual_siz
     assert candidate.whole(one).columns.tolist() == [0, 1, 2, 3, 4, 5]
     assert candidate.whole(whole.scaled(0.1)).prior.tolist() == [3.0] * 6
     assert candidate.whole(other).columns.tolist() == [6, 7, 8, 9, 10, 11]
+    assert candidate.spread(one).tolist() == [[0.0], [0.0], [1.0], [0.0], [0.0], [0.0]]
+    assert candidate.spread(whole).tolist() == np.eye(6).tolist()
+    alike = Variant(np.array([12]), np.array([3.0]), (1.0,))
+    assert Candidate("play", (whole, one, alike)).spread(alike).tolist() == [[1.0]] * 6
 
 
 def test_two_that_make_each_other_needless_do_not_hang_the_selection(rng):

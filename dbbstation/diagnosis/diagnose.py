@@ -36,8 +36,9 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
-SIGNIFICANT = 1e-4
-"""Probability below which a misfit that no source and no curve organises counts as one."""
+SIGNIFICANT = 1e-8
+"""Probability below which a misfit counts as one that nothing explains, with a name or without. The level of the noise is
+read from high harmonics: a sixth too low, as happens where neighbours resemble each other a little, makes 1e-6 of nothing."""
 
 RIVALS, DRAWS = 6, 20
 """Best sources that compete in each draw of a part of the tests, and draws."""

@@ -140,7 +140,10 @@ def _ambiguous(diagnosis):
 )
 def test_pairs_are_both_named(tmp_path, pair, names):
     _, diagnosis = diagnosed(tmp_path / "s", 25, *pair)
-    assert named(diagnosis) == names
+    assert named(diagnosis) | set(_ambiguous(diagnosis)) >= names
+    # A drift of the bar and one of the struts differ by less than a session's own law of warming can make.
+    assert named(diagnosis) >= names - {"bar-drift"}
+    assert set(_ambiguous(diagnosis)) <= {"bar-drift", "thermal-struts"}
     assert diagnosis.left.probability > 1e-3
 
 

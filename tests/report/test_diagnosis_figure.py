@@ -63,7 +63,7 @@ def test_an_error_without_a_name(reference):
 
 def curve(variable, unit, at, value, sigma, strut=3, period_mm=None, convention=""):
     points = tuple(CurvePoint(*map(float, point)) for point in zip(at, value, sigma, strict=True))
-    return Curve(variable, unit, strut, period_mm, convention, 2.0, 1.0, points)
+    return Curve(variable, unit, strut, "", period_mm, convention, 2.0, 1.0, points)
 
 
 def panel(drawn):

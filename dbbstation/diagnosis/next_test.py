@@ -38,8 +38,8 @@ FEEDS = (0.5, 2.0)
 """Of what was measured, for sources that act while the machine moves; tried on upright circles with a level bar."""
 
 MOST_PROPOSED = 3
-CLOSER_LOOK = 40
-"""Proposals that are looked at in both directions, beside those already chosen."""
+CLOSER_LOOK = 12
+"""Proposals that are looked at in both directions each time that one is chosen."""
 
 WORTHWHILE = 0.99
 """Share of the uncertainty that a further test must come below to be proposed."""
@@ -105,19 +105,21 @@ def propose(
         return _size(_told(covariance, rows, noise_mm, own), variant)
 
     proposals = _proposals(channel, frozenset[Need]().union(*(s.needs for s, _ in asked)))
-    # One direction tells well enough which tests are worth a closer look.
-    best = sorted(((left(seen(p, slice(1))), k) for k, p in enumerate(proposals)))[:CLOSER_LOOK]
-    looked = [(proposals[k], seen(proposals[k], slice(None))) for _, k in best]
+    # One direction tells well enough which tests are worth a closer look beside those already chosen.
+    one_way = {k: seen(proposal, slice(1)) for k, proposal in enumerate(proposals)}
+    both_ways: dict[int, NDArray[np.float64]] = {}
     found: list[NextTest] = []
-    while looked and len(found) < most:
+    while one_way and len(found) < most:
         before = _size(covariance[own, own], variant)
-        tried = [(left(rows), k) for k, (_, rows) in enumerate(looked)]
-        after, k = min(tried)
+        closer = sorted(one_way, key=lambda k: left(one_way[k]))[:CLOSER_LOOK]
+        for k in closer:
+            both_ways.setdefault(k, seen(proposals[k], slice(None)))
+        after, k = min((left(both_ways[k]), k) for k in closer)
         if after > WORTHWHILE * before:
             break
-        proposal, rows = looked.pop(k)
-        covariance = _told(covariance, rows, noise_mm, slice(None))
-        found.append(_in_words(channel, source, variant, proposal, before, after))
+        del one_way[k]
+        covariance = _told(covariance, both_ways[k], noise_mm, slice(None))
+        found.append(_in_words(channel, source, variant, proposals[k], before, after))
     return tuple(found)
 
 

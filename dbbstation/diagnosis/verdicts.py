@@ -134,7 +134,10 @@ def _likenesses(
         alike = as_good(race, chosen, choice, others, AS_GOOD)
         if lawful:
             alike += as_good(race, chosen, choice, lawful, max(AS_GOOD, OWN_LAW * worth_of(race, chosen, choice)))
-        for rival in dict.fromkeys((*alike, *contained(race, chosen, choice, channel.named, FEW))):
+        if choice.candidate.whole(choice.variant).columns.size > choice.variant.columns.size:
+            # One strut alone, or all alike: what other sources do to the same struts may look the same.
+            alike = tuple(dict.fromkeys((*alike, *contained(race, chosen, choice, channel.named, FEW))))
+        for rival in alike:
             likes.setdefault(own, []).append(rival)
             likes.setdefault(rival, []).append(own)
     return {name: tuple(sorted(alike)) for name, alike in likes.items()}

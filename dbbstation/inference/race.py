@@ -147,6 +147,10 @@ class Race:
         fitted, *_ = np.linalg.lstsq(columns, self._left[:, -1], rcond=1e-9)
         return float(np.sum((columns @ fitted) ** 2))
 
+    def agreement(self, variants: Sequence[Variant]) -> float:
+        """Weighted sum of squares that variants take out of what the base leaves, less what their sizes cost."""
+        return self.chi2 - self._solved(variants)[1]
+
     def amplitudes(self, variants: Sequence[Variant]) -> Amplitudes:
         """Most probable amplitudes of a combination, and their covariance."""
         columns = np.concatenate([v.columns for v in variants]) - self._first
@@ -276,7 +280,7 @@ def worth_of(race: Race, chosen: Sequence[Choice], one: Choice) -> float:
 def contained(
     race: Race, chosen: Sequence[Choice], one: Choice, rivals: Sequence[Candidate], few: int
 ) -> tuple[str, ...]:
-    """Names of rivals, not chosen themselves, that explain the same in the place of one of the chosen.
+    """Names of rivals, not chosen themselves, that explain the same in the place of one of the chosen, at thinkable sizes.
 
     Only that they could explain more speaks against them: measurements cannot tell them from it.
 
@@ -289,14 +293,19 @@ def contained(
     """
     names = {choice.candidate.name for choice in chosen}
     others = [choice.variant for choice in chosen if choice is not one]
-    enough, beside = race.explained([*others, one.variant]) - SAME_SIGMAS**2, race.evidence(others)
+    enough = race.agreement([*others, one.variant.scaled(THINKABLE)]) - SAME_SIGMAS**2
+    beside = race.evidence(others)
 
     def same(variant: Variant) -> bool:
-        own = [*others, variant]
-        return len(variant.columns) <= few and race.explained(own) > enough and race.evidence(own) > beside
+        if len(variant.columns) > few or race.agreement([*others, variant.scaled(THINKABLE)]) <= enough:
+            return False
+        return race.evidence([*others, variant]) > beside
 
     return tuple(r.name for r in rivals if r.name not in names and any(same(v) for v in r.variants))
 
+
+THINKABLE = 5.0
+"""Times the plausible size that an amplitude may have."""
 
 SAME_SIGMAS = 3.0
 """What explains less by this in standard deviations explains something else."""

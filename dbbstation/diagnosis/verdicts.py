@@ -134,8 +134,8 @@ def _likenesses(
         alike = as_good(race, chosen, choice, others, AS_GOOD)
         if lawful:
             alike += as_good(race, chosen, choice, lawful, max(AS_GOOD, OWN_LAW * worth_of(race, chosen, choice)))
-        if choice.candidate.whole(choice.variant).columns.size > choice.variant.columns.size:
-            # One strut alone, or all alike: what other sources do to the same struts may look the same.
+        if any(v.columns.size < choice.candidate.whole(v).columns.size for v in choice.candidate.variants):
+            # A source of struts: what others do to the same struts may look the same.
             alike = tuple(dict.fromkeys((*alike, *contained(race, chosen, choice, channel.named, FEW))))
         for rival in alike:
             likes.setdefault(own, []).append(rival)

@@ -32,7 +32,7 @@ SHAPE_THRESHOLD = 8.0
 as a whole is not asked for: a wave or a bump can hide in them. Of forty recordings of the virtual
 machine with nothing to find the best brought 5.8, where chance falls by e for each unit more."""
 
-EXACT_LAWS = 5e-3
+EXACT_LAWS = 1e-3
 """Share of the evidence of names below which what is left beside them may be their own: their laws are not more exact, such
 as the way through a gap while a strut turns round."""
 

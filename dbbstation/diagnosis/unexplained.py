@@ -32,10 +32,6 @@ SHAPE_THRESHOLD = 8.0
 as a whole is not asked for: a wave or a bump can hide in them. Of forty recordings of the virtual
 machine with nothing to find the best brought 5.8, where chance falls by e for each unit more."""
 
-EXACT_LAWS = 1e-3
-"""Share of the evidence of names below which what is left beside them may be their own: their laws are not more exact, such
-as the way through a gap while a strut turns round."""
-
 OVERRULES_BY = 5.0
 """Log evidence by which it must be better than names to overrule them, beside explaining more: one that can be bent to
 nearly anything explains a little more of any noise."""
@@ -95,8 +91,7 @@ def unexplained(
         best = of.best()
     misfit = left.probability < significant or overrules
     rms_um = 1e3 * (first.rms if overrules else left.rms)
-    enough = SHAPE_THRESHOLD if overrules else max(SHAPE_THRESHOLD, EXACT_LAWS * race.evidence(named))
-    if best.gain < enough:
+    if best.gain < SHAPE_THRESHOLD:
         if not misfit:
             return Rest(Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."), overrules=False)
         text = "Something is left beyond noise, and no variable organises it clearly."

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from dbbstation.calibration.noise_level import fine_noise_mm
-from dbbstation.calibration.scatter import UNKNOWN_MM, Seat, seats_of
+from dbbstation.calibration.scatter import LEAST_STATED_MM, UNKNOWN_MM, Seat, seats_of
 from dbbstation.inference.square_root import solve
 
 if TYPE_CHECKING:
@@ -384,8 +384,8 @@ def _bar(calibration: Calibration, session: str, why: str) -> Outlier:
     )
 
 
-UNKNOWN_BAR_MM = 0.1
-"""Stated size of the error of a bar that nobody set on a calibrator [mm]."""
+UNKNOWN_BAR_MM = LEAST_STATED_MM
+"""Stated size of the error of a bar that nobody set on a calibrator: no scatter that anybody states [mm]."""
 
 _TAIL = 5.7e-7
 """Chance of a normal variable beyond `SIGMAS`."""

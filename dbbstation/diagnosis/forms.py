@@ -28,9 +28,9 @@ class Form(ABC):
     """One family of curves over a variable; p amplitudes."""
 
     @property
-    @abstractmethod
     def count(self) -> int:
-        """Number of amplitudes, p."""
+        """Number of amplitudes, p: one, the height of the curve, where a form does not say otherwise."""
+        return 1
 
     @abstractmethod
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -167,11 +167,6 @@ class Bump(Form):
     centre: float
     width: float
 
-    @property
-    def count(self) -> int:
-        """Its height."""
-        return 1
-
     def text(self, unit: str) -> str:
         """Where, how wide."""
         return f"about {self.centre:.5g} {unit}, {self.width:.3g} {unit} wide either way"
@@ -191,11 +186,6 @@ class Step(Form):
 
     at: float
     width: float
-
-    @property
-    def count(self) -> int:
-        """Its height."""
-        return 1
 
     def text(self, unit: str) -> str:
         """Where."""
@@ -220,11 +210,6 @@ def _across(at: float, width: float, low: float, high: float) -> NDArray[np.floa
 class Sign(Form):
     """One way round plus, the other way minus."""
 
-    @property
-    def count(self) -> int:
-        """One."""
-        return 1
-
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sign of the variable."""
         return np.sign(values)[..., None]
@@ -240,11 +225,6 @@ class Proportional(Form):
     """In proportion to the variable; the amplitude belongs to `unit` of it."""
 
     unit: float
-
-    @property
-    def count(self) -> int:
-        """One."""
-        return 1
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variable in its unit."""
@@ -290,11 +270,6 @@ class PlaneStep(Form):
     across_deg: float
     at: float
     width: float
-
-    @property
-    def count(self) -> int:
-        """Its height."""
-        return 1
 
     def text(self, unit: str) -> str:
         """Where."""

@@ -50,6 +50,10 @@ CONVERGED_SIGMA = 1e-3
 """The same as a share of their standard deviations, for what the runs hardly see."""
 FIRST_NOISE_MM = 1e-3
 
+SETTLED_NOISE = 3e-3
+"""Share by which the correlation of the noise may still move: how noise is weighted against what is known of balls decides
+what is left to be called noise, and where physics is missing that creeps towards its answer for a hundred steps."""
+
 AT_NODES = frozenset({Need.POSE, Need.TIME})
 """What a source may need for its effect to be as smooth as the circle; a path's history and logged values are not."""
 
@@ -169,7 +173,9 @@ def calibrate(
             break
         blocks, left = linearise(layout, runs, x)
         blocks += current_blocks(layout, channel, x)
-        noise = noise_of(left, solution.freedom_used)
+        read = noise_of(left, solution.freedom_used)
+        if abs(read.correlation_samples / noise.correlation_samples - 1.0) > SETTLED_NOISE:
+            noise = read
     else:
         raise CalibrationError(
             f"the fit still moves, {change:.2g} times more than it should after {MOST_STEPS} steps",

@@ -105,7 +105,11 @@ class Outlier:
 
 
 def calibrate_robust(
-    fit: Fit, observations: Sequence[Observation], *, balls: bool = True
+    fit: Fit,
+    observations: Sequence[Observation],
+    *,
+    balls: bool = True,
+    begun: tuple[Calibration, tuple[Outlier, ...]] | None = None,
 ) -> tuple[Calibration, tuple[Outlier, ...]]:
     """Fit, and fit again without what does not belong.
 
@@ -113,6 +117,7 @@ def calibrate_robust(
         fit: calibrates runs.
         observations: all runs.
         balls: look for balls off their place too, not only for runs that are no circle of this machine.
+        begun: what was returned for these runs without balls, to go on from.
 
     Returns:
         The last fit, and what was found, in the order in which it stood out.
@@ -120,8 +125,8 @@ def calibrate_robust(
     Raises:
         CalibrationError: as `fit` does.
     """
-    runs, found = list(observations), list[Outlier]()
-    calibration = fit(runs)
+    calibration, before = begun or (fit(list(observations)), ())
+    runs, found = list(calibration.observations), list(before)
     while len(found) < MOST:
         step = _next(fit, calibration, runs, balls=balls)
         if step is None:
@@ -284,7 +289,9 @@ def _off_its_place(fit: Fit, calibration: Calibration, runs: Sequence[Observatio
     return free_ball(fit, runs, worst.mounting, seats)
 
 
-def free_ball(fit: Fit, runs: Sequence[Observation], mounting: str, seats: Sequence[Seat]) -> Step:
+def free_ball(
+    fit: Fit, runs: Sequence[Observation], mounting: str, seats: Sequence[Seat], *, together: bool | None = None
+) -> Step:
     """Let the ball of a mounting stand anywhere, with all its other mountings if it stands alike in them.
 
     Args:
@@ -292,13 +299,15 @@ def free_ball(fit: Fit, runs: Sequence[Observation], mounting: str, seats: Seque
         runs: all runs.
         mounting: name of the putting-up that is off.
         seats: of a fit of these runs.
+        together: whether it stands alike in all of them, where that is known; seen from the seats if None.
 
     Returns:
         What was found, the runs without its pull, and their fit.
     """
     worst = next(seat for seat in seats if seat.mounting == mounting)
     alike = [seat for seat in seats if seat.ball == worst.ball and seat is not worst]
-    together = bool(alike) and all(_same(seat, worst) for seat in alike)
+    if together is None:
+        together = bool(alike) and all(_same(seat, worst) for seat in alike)
     names = {worst.mounting} | ({seat.mounting for seat in alike} if together else set())
     freed = [_freed(run) if run.setup.mounting in names else run for run in runs]
     if together:

@@ -10,7 +10,7 @@ import numpy as np
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM
 from dbbstation.calibration.scatter import LEAST_STATED_MM
-from dbbstation.inference.race import Candidate, Race, Variant
+from dbbstation.inference.race import Candidate, Race, Variant, race_on
 from dbbstation.inference.square_root import Block, Columns, compress, joined
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.trace.average import averaged, means, sector_of
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 SECTORS = 720
 """Samples per turn that a diagnosis works on, at the most: every half degree."""
 
-MANY, SIZES = 6, (1.0, 0.1)
-"""Amplitudes from which on a source is looked for at both sizes, in units of the plausible one: that all of many are
-small is likely when one of them is, and the plausible size alone would count it as a miracle."""
+SIZES = (1.0, 0.3, 0.1, 0.03)
+"""Sizes at which a source is looked for, in units of the plausible one: a thirtieth of it may be seen clearly, and the plausible
+size alone would count it as a miracle that several amplitudes are all small."""
 
 SET_UP = ("mounting", "ball-coordinate", "bar-offset")
 """Random effects of the base that may be far larger than stated."""
@@ -75,7 +75,7 @@ class Channel:
 
     def race(self, noise_mm: float) -> Race:
         """Candidates on what the base leaves, at a noise of one sample [mm]."""
-        return Race([self.joined], self.base, self.held, self.columns, max(noise_mm, SMALLEST_NOISE_MM))
+        return race_on([self.joined], self.base, self.held, self.columns, max(noise_mm, SMALLEST_NOISE_MM))
 
     @property
     def base(self) -> Columns:
@@ -221,7 +221,7 @@ class _Set:
 
 
 def _forms(sets: Sequence[_Set], shape: tuple[float, ...]) -> list[Variant]:
-    """Forms in which a source is looked for: all amplitudes, at one size or two, those of each strut alone, one for all.
+    """Forms in which a source is looked for: all amplitudes, those of each strut alone, one for all struts.
 
     What wears or was made badly is often one strut, or all alike; all others free beside it would hide what is faint.
     """
@@ -229,8 +229,7 @@ def _forms(sets: Sequence[_Set], shape: tuple[float, ...]) -> list[Variant]:
         np.concatenate([getattr(s, name) for s in sets]) for name in ("columns", "prior", "struts")
     )
     whole = Variant(columns, prior, shape)
-    sizes = SIZES if len(columns) >= MANY else SIZES[:1]
-    forms = [whole.scaled(size) for size in sizes]
+    forms = [whole]
     single = np.unique(struts)
     if len(single) > 1:
         of = [struts == strut for strut in single]
@@ -275,7 +274,7 @@ class _Book:
         variants: dict[str, list[Variant]] = {}
         for (name, form), sets in self._sources.items():
             variants.setdefault(name, []).extend(_forms(list(sets.values()), form))
-        return tuple(Candidate(name, tuple(forms)) for name, forms in variants.items())
+        return tuple(Candidate(name, tuple(forms), SIZES) for name, forms in variants.items())
 
     def _new(self, size: int) -> NDArray[np.int64]:
         self.count += size

@@ -11,7 +11,7 @@ from dbbstation.calibration.fit import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.channel import base_columns
 from dbbstation.diagnosis.shape_look import Look, looked_for
 from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Samples, Shape, ranges, samples_of, shapes
-from dbbstation.inference.race import Race, Variant
+from dbbstation.inference.race import Race, Variant, race_on, together
 from dbbstation.inference.square_root import Block, compress, joined
 
 if TYPE_CHECKING:
@@ -68,11 +68,9 @@ class Unnamed:
         """
         found = []
         for shape, usual in self.shapes:
-            sized = [usual.scaled(size) for size in SIZES]
-            evidences = np.array([self.race.evidence([variant]) for variant in sized])
-            top = float(evidences.max())
-            together = top + float(np.log(np.mean(np.exp(evidences - top)))) - float(np.log(shape.tried))
-            found.append(Best(shape, sized[int(evidences.argmax())], together))
+            gains = self.race.gains(usual, SIZES)
+            gain = together(gains) - float(np.log(shape.tried))
+            found.append(Best(shape, usual.scaled(SIZES[int(gains.argmax())]), gain))
         return max(found, key=lambda best: best.gain)
 
 
@@ -108,7 +106,7 @@ def unnamed(calibration: Calibration, noise_mm: float) -> Unnamed:
         variants.append((shape, Variant(np.arange(total, total + size), np.full(size, PLAUSIBLE_MM))))
         total += size
     block = joined(blocks, total)
-    race = Race([block], layout.known, held, total, noise)
+    race = race_on([block], layout.known, held, total, noise)
     return Unnamed(race, tuple(variants), block, layout.known, held, tuple(runs))
 
 

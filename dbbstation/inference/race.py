@@ -8,7 +8,7 @@ punished by the evidence itself [MacKay, Bayesian interpolation, Neural Computat
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +30,14 @@ PAIRED = 8
 
 AS_GOOD = 5.0
 """Difference in log evidence below which one candidate explains measurements about as well as another."""
+
+
+INDEPENDENT = 1e-9
+"""Share of the largest column by which another must differ from the others to explain anything itself."""
+
+FURTHER = 1.5
+"""Log evidence that each candidate more must bring beyond what the one before it must: one cause is likelier than two, and what
+is not quite as a first one's formula says calls for a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +72,18 @@ class Variant:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Something that the base model may lack; its variants share the prior probability equally."""
+    """Something that the base model may lack; its variants share the prior probability equally, and so do its sizes.
+
+    Attributes:
+        name: of it.
+        variants: its forms, at plausible sizes.
+        sizes: at which each of them is looked for, in units of the plausible one. How large an effect is, is known only
+            roughly: where it can be seen at a fraction of its usual size, that it is not larger is no sign against it.
+    """
 
     name: str
     variants: tuple[Variant, ...]
+    sizes: tuple[float, ...] = (1.0,)
 
     def whole(self, variant: Variant) -> Variant:
         """Return the form with all its amplitudes, where a variant has some of them, at their plausible sizes."""
@@ -97,40 +113,23 @@ class Amplitudes:
     covariance: NDArray[np.float64]
 
 
+@dataclass(eq=False)
 class Race:
-    """Candidates on what a base model leaves.
+    """Candidates on what a base model leaves; `race_on` makes it.
 
-    Args:
-        blocks: compressed runs over all columns, base first.
-        base: what is known of the base columns.
-        held: orthonormal rows of fitted base directions that the fit kept at zero, in units of the scales. They have
-            their usual size here: where it is seen at all, as the curvature of a model lets it be beside very little
-            noise, it is no sign of a candidate.
-        columns: number of all columns.
-        noise: standard deviation of one measurement, where a block does not state its own.
+    Attributes:
+        left: triangle of the candidates' columns and of what is to be explained, last, the base eliminated, weighted.
+        first: number of the first candidates' column.
     """
 
-    def __init__(
-        self, blocks: Sequence[Block], base: Columns, held: NDArray[np.float64], columns: int, noise: float
-    ) -> None:
-        count = len(base.prior)
-        whole = _whole(blocks, columns, noise)
-        random, fitted = np.flatnonzero(base.random), np.flatnonzero(~base.random)
-        free = free_directions(base, fitted, held)
-        along = base.scale[fitted][:, None] * held.T
-        eliminated = np.hstack([whole[:, random], whole[:, fitted] @ along, whole[:, fitted] @ free])
-        sizes = np.concatenate([base.prior[random], np.ones(len(held))])
-        priors = np.zeros((len(sizes), eliminated.shape[1] + columns - count + 1))
-        np.fill_diagonal(priors, 1.0 / sizes)
-        (triangle,) = qr(np.vstack([np.hstack([eliminated, whole[:, count:]]), priors]), mode="r")
-        skip = eliminated.shape[1]
-        self._first = count
-        self._left = np.asarray(triangle, dtype=np.float64)[skip : skip + columns - count + 1, skip:]
+    left: NDArray[np.float64]
+    first: int
+    _last: tuple[tuple[bytes, bytes], Race] | None = field(default=None, repr=False)
 
     @property
     def chi2(self) -> float:
         """Weighted sum of squares that the base leaves."""
-        return float(self._left[:, -1] @ self._left[:, -1])
+        return float(self.left[:, -1] @ self.left[:, -1])
 
     def evidence(self, variants: Sequence[Variant]) -> float:
         """Log evidence of base and variants over that of the base alone."""
@@ -143,9 +142,11 @@ class Race:
 
     def explained(self, variants: Sequence[Variant]) -> float:
         """Weighted sum of squares that variants take out of what the base leaves, without their priors."""
-        columns = self._left[:, np.concatenate([v.columns for v in variants]) - self._first]
-        fitted, *_ = np.linalg.lstsq(columns, self._left[:, -1], rcond=1e-9)
-        return float(np.sum((columns @ fitted) ** 2))
+        columns = self.left[:, np.concatenate([v.columns for v in variants]) - self.first]
+        # Pivoted QR: the divide and conquer behind NumPy's lstsq gives up on some finite columns.
+        axes, triangle, _ = qr(columns, mode="economic", pivoting=True)
+        size = np.abs(np.diag(triangle))
+        return float(np.sum((axes[:, size > INDEPENDENT * size[0]].T @ self.left[:, -1]) ** 2))
 
     def agreement(self, variants: Sequence[Variant]) -> float:
         """Weighted sum of squares that variants take out of what the base leaves, less what their sizes cost."""
@@ -153,10 +154,10 @@ class Race:
 
     def amplitudes(self, variants: Sequence[Variant]) -> Amplitudes:
         """Most probable amplitudes of a combination, and their covariance."""
-        columns = np.concatenate([v.columns for v in variants]) - self._first
+        columns = np.concatenate([v.columns for v in variants]) - self.first
         prior = np.concatenate([v.prior for v in variants])
-        stacked = np.vstack([self._left[:, columns], np.diag(1.0 / prior)])
-        target = np.concatenate([self._left[:, -1], np.zeros(len(prior))])
+        stacked = np.vstack([self.left[:, columns], np.diag(1.0 / prior)])
+        target = np.concatenate([self.left[:, -1], np.zeros(len(prior))])
         inverse = np.linalg.pinv(stacked)
         return Amplitudes(inverse @ target, np.asarray(inverse @ inverse.T, dtype=np.float64))
 
@@ -167,9 +168,7 @@ class Race:
         """
         columns = [variant.columns, *(other.columns for other in others)]
         prior = [np.full(len(variant.columns), np.inf), *(other.prior for other in others)]
-        stacked = np.vstack(
-            [self._left[:, np.concatenate(columns) - self._first], np.diag(1.0 / np.concatenate(prior))]
-        )
+        stacked = np.vstack([self.left[:, np.concatenate(columns) - self.first], np.diag(1.0 / np.concatenate(prior))])
         scaled = stacked * np.concatenate([variant.prior, *(other.prior for other in others)])
         _, s, vt = np.linalg.svd(scaled, full_matrices=False)
         with np.errstate(divide="ignore"):
@@ -182,34 +181,91 @@ class Race:
         Singular values of the signature in units of plausible sizes, base and others fitted: along each direction of
         the amplitudes the plausible size over its standard deviation.
         """
-        columns = self._left[:, variant.columns - self._first] * variant.plausible
+        columns = self.left[:, variant.columns - self.first] * variant.plausible
         if others:
-            beside = np.concatenate([other.columns for other in others]) - self._first
+            beside = np.concatenate([other.columns for other in others]) - self.first
             prior = np.concatenate([other.prior for other in others])
-            explained = np.vstack([self._left[:, beside], np.diag(1.0 / prior)])
+            explained = np.vstack([self.left[:, beside], np.diag(1.0 / prior)])
             padded = np.vstack([columns, np.zeros((len(prior), columns.shape[1]))])
-            fitted, *_ = np.linalg.lstsq(explained, padded, rcond=None)
-            columns = padded - explained @ fitted
+            axes, _ = qr(explained, mode="economic")
+            columns = padded - axes @ (axes.T @ padded)
         return np.asarray(np.linalg.svd(columns, compute_uv=False), dtype=np.float64)
 
     def best_variant(self, candidate: Candidate, others: Sequence[Variant]) -> tuple[Variant, float]:
-        """Best form of a candidate beside others, and the log evidence of all its forms together."""
-        evidences = np.array([self.evidence([*others, variant]) for variant in candidate.variants])
-        top = float(evidences.max())
-        together = top + float(np.log(np.mean(np.exp(evidences - top))))
-        return candidate.variants[int(evidences.argmax())], together
+        """Best form of a candidate beside others, at its best size, and the log evidence of all its forms together."""
+        rest = self._beside(others)
+        gains = np.array([rest.gains(variant, candidate.sizes) for variant in candidate.variants])
+        form, size = np.unravel_index(int(gains.argmax()), gains.shape)
+        best, scale = candidate.variants[int(form)], candidate.sizes[int(size)]
+        return best if scale == best.scale else best.scaled(scale), self.evidence(others) + together(gains)
+
+    def gains(self, variant: Variant, sizes: Sequence[float]) -> NDArray[np.float64]:
+        """Log evidence of base and one variant over that of the base alone, for each size in plausible ones, (s,)."""
+        columns = self.left[:, variant.columns - self.first] * variant.plausible
+        seen, axes = np.linalg.eigh(columns.T @ columns)
+        along = (axes.T @ (columns.T @ self.left[:, -1])) ** 2
+        scales = np.square(sizes)[:, None]
+        information = 1.0 + scales * np.maximum(seen, 0.0)
+        return np.asarray(0.5 * np.sum(scales * along / information - np.log(information), axis=1), dtype=np.float64)
+
+    def _beside(self, variants: Sequence[Variant]) -> Race:
+        """Race on what base and variants leave, the variants in any size that their priors allow."""
+        if not variants:
+            return self
+        columns = np.concatenate([v.columns for v in variants])
+        prior = np.concatenate([v.prior for v in variants])
+        key = (columns.tobytes(), prior.tobytes())
+        if self._last is None or self._last[0] != key:
+            own = columns - self.first
+            priors = np.zeros((len(own), len(own) + self.left.shape[1]))
+            np.fill_diagonal(priors, 1.0 / prior)
+            (triangle,) = qr(np.vstack([np.hstack([self.left[:, own], self.left]), priors]), mode="r")
+            self._last = key, Race(np.asarray(triangle, dtype=np.float64)[len(own) :, len(own) :], self.first)
+        return self._last[1]
 
     def _solved(self, variants: Sequence[Variant]) -> tuple[NDArray[np.float64], float]:
-        columns = np.concatenate([v.columns for v in variants]) - self._first
+        columns = np.concatenate([v.columns for v in variants]) - self.first
         prior = np.concatenate([v.prior for v in variants])
         size = len(columns)
-        stacked = np.zeros((len(self._left) + size, size + 1))
-        stacked[: len(self._left), :size] = self._left[:, columns]
-        stacked[: len(self._left), -1] = self._left[:, -1]
-        stacked[len(self._left) :, :size] = np.diag(1.0 / prior)
+        stacked = np.zeros((len(self.left) + size, size + 1))
+        stacked[: len(self.left), :size] = self.left[:, columns]
+        stacked[: len(self.left), -1] = self.left[:, -1]
+        stacked[len(self.left) :, :size] = np.diag(1.0 / prior)
         (factor,) = qr(stacked, mode="r")
         triangle = np.asarray(factor, dtype=np.float64)
         return triangle[:size, :size], float(triangle[size, -1] ** 2)
+
+
+def race_on(blocks: Sequence[Block], base: Columns, held: NDArray[np.float64], columns: int, noise: float) -> Race:
+    """Eliminate the base once.
+
+    Args:
+        blocks: compressed runs over all columns, base first.
+        base: what is known of the base columns.
+        held: orthonormal rows of fitted base directions that the fit kept at zero, in units of the scales. They have
+            their usual size here: where it is seen at all, as the curvature of a model lets it be beside very little
+            noise, it is no sign of a candidate.
+        columns: number of all columns.
+        noise: standard deviation of one measurement, where a block does not state its own.
+    """
+    count = len(base.prior)
+    whole = _whole(blocks, columns, noise)
+    random, fitted = np.flatnonzero(base.random), np.flatnonzero(~base.random)
+    free = free_directions(base, fitted, held)
+    along = base.scale[fitted][:, None] * held.T
+    eliminated = np.hstack([whole[:, random], whole[:, fitted] @ along, whole[:, fitted] @ free])
+    sizes = np.concatenate([base.prior[random], np.ones(len(held))])
+    priors = np.zeros((len(sizes), eliminated.shape[1] + columns - count + 1))
+    np.fill_diagonal(priors, 1.0 / sizes)
+    (triangle,) = qr(np.vstack([np.hstack([eliminated, whole[:, count:]]), priors]), mode="r")
+    skip = eliminated.shape[1]
+    return Race(np.asarray(triangle, dtype=np.float64)[skip : skip + columns - count + 1, skip:], count)
+
+
+def together(gains: NDArray[np.float64]) -> float:
+    """Log of the mean evidence of forms that are as likely."""
+    top = float(gains.max())
+    return top + float(np.log(np.mean(np.exp(gains - top))))
 
 
 def select(race: Race, candidates: Sequence[Candidate], threshold: float, most: int) -> list[Choice]:
@@ -220,7 +276,7 @@ def select(race: Race, candidates: Sequence[Candidate], threshold: float, most: 
     Args:
         race: what the base leaves.
         candidates: to choose from.
-        threshold: log evidence that a candidate must bring.
+        threshold: log evidence that a candidate must bring; `FURTHER` more for each that there is already.
         most: candidates at the most.
     """
     chosen: list[Choice] = []
@@ -231,8 +287,9 @@ def select(race: Race, candidates: Sequence[Candidate], threshold: float, most: 
         trials = [(c, *race.best_variant(c, others)) for c in candidates if c.name not in names]
         if not trials:
             break
-        candidate, variant, together = max(trials, key=lambda trial: trial[2])
-        step = [] if together - before < threshold else [Choice(candidate, variant)]
+        candidate, variant, evidence = max(trials, key=lambda trial: trial[2])
+        enough = threshold + FURTHER * len(chosen)
+        step = [] if evidence - before < enough else [Choice(candidate, variant)]
         if not chosen and most > 1:
             step = _best_pair(race, trials, step, threshold)
         if not step:
@@ -253,9 +310,10 @@ def _best_pair(
     leading = sorted(trials, key=lambda trial: -trial[2])[:PAIRED]
     for k, (first, first_variant, _) in enumerate(leading):
         for second, second_variant, _ in leading[k + 1 :]:
-            together = race.evidence([first_variant, second_variant])
-            if together - evidence > threshold * (2 - len(best)):
-                best, evidence = [Choice(first, first_variant), Choice(second, second_variant)], together
+            both = race.evidence([first_variant, second_variant])
+            wanted = (2.0 * threshold + FURTHER, threshold + FURTHER, 0.0)[len(best)]
+            if both - evidence > wanted:
+                best, evidence = [Choice(first, first_variant), Choice(second, second_variant)], both
     return best
 
 
@@ -264,7 +322,7 @@ def _pruned(race: Race, chosen: list[Choice], threshold: float) -> list[Choice]:
     while chosen:
         worth = [worth_of(race, chosen, one) for one in chosen]
         least = int(np.argmin(worth))
-        if worth[least] >= threshold:
+        if worth[least] >= threshold + FURTHER * (len(chosen) - 1):
             break
         chosen = [one for k, one in enumerate(chosen) if k != least]
     return chosen
@@ -273,8 +331,7 @@ def _pruned(race: Race, chosen: list[Choice], threshold: float) -> list[Choice]:
 def worth_of(race: Race, chosen: Sequence[Choice], one: Choice) -> float:
     """Log evidence that one of the chosen brings beside the others."""
     others = [c.variant for c in chosen if c is not one]
-    _, together = race.best_variant(one.candidate, others)
-    return together - race.evidence(others)
+    return race.best_variant(one.candidate, others)[1] - race.evidence(others)
 
 
 def contained(
@@ -316,6 +373,8 @@ def as_good(
 ) -> tuple[str, ...]:
     """Names of rivals, not chosen themselves, that do about as well in the place of one of the chosen.
 
+    A rival has to bring half of what it brings, at least: what does little itself is none.
+
     Args:
         race: on what the base leaves.
         chosen: combination.
@@ -326,6 +385,7 @@ def as_good(
     names = {choice.candidate.name for choice in chosen}
     others = [choice.variant for choice in chosen if choice is not one]
     _, own = race.best_variant(one.candidate, others)
+    enough = min(enough, 0.5 * (own - race.evidence(others)))
     return tuple(r.name for r in rivals if r.name not in names and own - race.best_variant(r, others)[1] < enough)
 
 

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.race import Candidate, Race, select
+from dbbstation.inference.race import race_on, select
 from dbbstation.inference.square_root import Block, Columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+
+    from dbbstation.inference.race import Candidate
 
 SHARE = 0.7
 """Of the groups of blocks that each draw keeps."""
@@ -54,7 +56,8 @@ def stability(
     place = {int(column): k for k, column in enumerate(wanted)}
     thin = [_thin(block, place) for block in blocks]
     moved = [
-        Candidate(c.name, tuple(replace(v, columns=_placed(v.columns, place)) for v in c.variants)) for c in candidates
+        replace(c, variants=tuple(replace(v, columns=_placed(v.columns, place)) for v in c.variants))
+        for c in candidates
     ]
     names = np.array(sorted(set(groups)))
     kept_groups = max(int(np.ceil(SHARE * len(names))), min(len(names), 2))
@@ -62,7 +65,7 @@ def stability(
     for _ in range(draws):
         kept = set(rng.choice(names, kept_groups, replace=False).tolist())
         drawn = [block for block, group in zip(thin, groups, strict=True) if group in kept]
-        race = Race(drawn, base, held, len(wanted), noise)
+        race = race_on(drawn, base, held, len(wanted), noise)
         for choice in select(race, moved, threshold, most):
             times[choice.candidate.name] += 1
     return {name: count / draws for name, count in times.items()}

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.harmonics import bands, coefficients, misfit, smooth
 from dbbstation.inference.held_out import held_out
-from dbbstation.inference.race import Candidate, Race, Variant, as_good, contained, select
+from dbbstation.inference.race import Candidate, Variant, as_good, contained, race_on, select
 from dbbstation.inference.square_root import Columns, compress, joined, solve
 from dbbstation.inference.stability import stability
 
@@ -41,16 +41,16 @@ CANDIDATES = tuple(
 )
 
 
-def race_on(rng, amplitudes, noise=NOISE):
+def raced(rng, amplitudes, noise=NOISE):
     x = np.concatenate([[3.0, -1.0], amplitudes])
     targets = [terms(run) @ x + rng.normal(0, noise, 60) for run in range(RUNS)]
     blocks = [compress(np.arange(6), terms(run), target) for run, target in enumerate(targets)]
-    return Race(blocks, BASE, NONE_HELD, 6, noise), blocks, targets
+    return race_on(blocks, BASE, NONE_HELD, 6, noise), blocks, targets
 
 
 def test_evidence_is_the_ratio_of_marginal_likelihoods(rng):
     """Against the dense Gaussian integral, with a base prior wide enough to be flat."""
-    race, _, targets = race_on(rng, [0.4, 0.0, 0.0, 0.0])
+    race, _, targets = raced(rng, [0.4, 0.0, 0.0, 0.0])
     whole, target = np.vstack([terms(run) for run in range(RUNS)]), np.concatenate(targets)
     flat = 1e4 * whole[:, :2] @ whole[:, :2].T + NOISE**2 * np.eye(len(target))
 
@@ -64,7 +64,7 @@ def test_evidence_is_the_ratio_of_marginal_likelihoods(rng):
 
 
 def test_amplitudes_are_those_of_the_full_fit(rng):
-    race, blocks, _ = race_on(rng, [0.4, 0.0, 0.0, 0.1])
+    race, blocks, _ = raced(rng, [0.4, 0.0, 0.0, 0.1])
     variants = [CANDIDATES[0].variants[0], CANDIDATES[3].variants[0]]
     known = Columns(np.array([np.inf, np.inf, 2.0, 2.0]), np.ones(4), np.array([False, False, True, True]))
     thin = [compress(np.arange(4), terms(run)[:, [0, 1, 2, 5]], _target(blocks[run], run)) for run in range(RUNS)]
@@ -83,21 +83,21 @@ def _target(block, run):
 def test_the_right_terms_are_selected_and_nothing_when_there_is_nothing(rng):
     wrong = 0
     for _ in range(40):
-        race, _, _ = race_on(rng, [0.0, 0.0, 0.0, 0.0])
+        race, _, _ = raced(rng, [0.0, 0.0, 0.0, 0.0])
         wrong += bool(select(race, CANDIDATES, 6.0, 3))
-        race, _, _ = race_on(rng, [0.6, 0.0, 0.0, 0.5])
+        race, _, _ = raced(rng, [0.6, 0.0, 0.0, 0.5])
         assert {c.candidate.name for c in select(race, CANDIDATES, 6.0, 3)} == {"sine", "parabola"}
     assert wrong == 0
 
 
 def test_a_square_is_not_taken_for_a_sine(rng):
-    race, _, _ = race_on(rng, [0.0, 0.0, 0.6, 0.0])
+    race, _, _ = raced(rng, [0.0, 0.0, 0.6, 0.0])
     assert [c.candidate.name for c in select(race, CANDIDATES, 6.0, 3)] == ["square"]
 
 
 def test_the_best_variant_is_found_and_its_choice_is_paid_for(rng):
     """Two forms of one candidate: evidence together is at most that of the best, less at the most log 2."""
-    race, _, _ = race_on(rng, [0.6, 0.0, 0.0, 0.0])
+    race, _, _ = raced(rng, [0.6, 0.0, 0.0, 0.0])
     both = Candidate("either", (CANDIDATES[0].variants[0], CANDIDATES[1].variants[0]))
     variant, together = race.best_variant(both, [])
     alone = race.evidence([CANDIDATES[0].variants[0]])
@@ -105,10 +105,36 @@ def test_the_best_variant_is_found_and_its_choice_is_paid_for(rng):
     assert alone - np.log(2) - 1e-9 <= together <= alone
 
 
+def test_gains_at_several_sizes_are_the_evidence_at_each_also_beside_others(rng):
+    race, _, _ = raced(rng, [0.6, 0.02, -0.01, 0.3])
+    sizes = (3.0, 1.0, 0.1, 0.01)
+    both = Variant(np.array([3, 4]), np.array([2.0, 1.0]))
+    by_size = [race.evidence([both.scaled(size)]) for size in sizes]
+    assert race.gains(both, sizes) == pytest.approx(by_size, abs=1e-7)
+
+    others = [CANDIDATES[0].variants[0], CANDIDATES[3].variants[0]]
+    beside = np.array([race.evidence([*others, both.scaled(size)]) for size in sizes])
+    variant, found = race.best_variant(Candidate("both", (both,), sizes), others)
+    assert variant.scale == sizes[int(beside.argmax())]
+    assert variant.prior == pytest.approx(variant.scale * both.prior)
+    assert found == pytest.approx(np.log(np.mean(np.exp(beside - beside.max()))) + beside.max(), abs=1e-7)
+
+
+def test_an_effect_far_smaller_than_usual_is_found_at_its_own_size_and_nothing_is_still_nothing(rng):
+    """Three amplitudes of a hundredth of the usual: at the usual size alone they count as a miracle."""
+    small, nothing = raced(rng, [0.02, 0.02, -0.02, 0.0], 0.02)[0], raced(rng, [0.0] * 4, 0.02)[0]
+    three = Variant(np.array([2, 3, 4]), np.full(3, 2.0))
+    at_its_size = Candidate("three", (three,), (1.0, 0.1, 0.01))
+    variant, found = small.best_variant(at_its_size, [])
+    assert variant.scale == 0.01
+    assert found > small.evidence([three]) + 5.0
+    assert nothing.best_variant(at_its_size, [])[1] < 1.0
+
+
 def test_sigma_is_infinite_for_what_the_base_swallows(rng):
     columns = np.column_stack([np.ones(60), T, T * 2.0])
     block = compress(np.arange(3), columns, rng.normal(size=60))
-    race = Race([block], BASE, NONE_HELD, 3, NOISE)
+    race = race_on([block], BASE, NONE_HELD, 3, NOISE)
     assert race.sigma(Variant(np.array([2]), np.array([1.0])))[0] > 1e6
 
 
@@ -129,7 +155,7 @@ def test_concealed_share_by_hand():
 
 
 def test_left_out_runs_are_predicted_as_by_hand(rng):
-    _, blocks, targets = race_on(rng, [0.6, 0.0, 0.0, 0.0])
+    _, blocks, targets = raced(rng, [0.6, 0.0, 0.0, 0.0])
     known = Columns(
         np.concatenate([np.full(2, np.inf), np.full(4, 2.0)]),
         np.ones(6),
@@ -188,7 +214,7 @@ def test_two_effects_that_hide_each_other_are_found_as_a_pair(rng):
     jacobian = np.column_stack([np.ones(240), line, other, third])
     target = jacobian @ [1.0, 10.0, 10.0, 0.0] + rng.normal(0, 0.1, 240)
     base = Columns(np.full(1, np.inf), np.ones(1), np.zeros(1, dtype=bool))
-    race = Race([compress(np.arange(4), jacobian, target)], base, np.zeros((0, 1)), 4, 0.1)
+    race = race_on([compress(np.arange(4), jacobian, target)], base, np.zeros((0, 1)), 4, 0.1)
     candidates = [
         Candidate(name, (Variant(np.array([k]), np.array([20.0])),)) for k, name in enumerate(("a", "b", "c"), start=1)
     ]
@@ -196,7 +222,7 @@ def test_two_effects_that_hide_each_other_are_found_as_a_pair(rng):
 
 
 def test_visible_is_plausible_size_over_standard_deviation(rng):
-    race, _, _ = race_on(rng, [0.0, 0.0, 0.0, 0.0])
+    race, _, _ = raced(rng, [0.0, 0.0, 0.0, 0.0])
     for candidate in CANDIDATES:
         variant = candidate.variants[0]
         assert race.visible(variant) == pytest.approx(variant.prior / race.sigma(variant))
@@ -208,7 +234,7 @@ def test_of_two_amplitudes_that_only_their_sum_shows_one_combination_is_visible(
     line = rng.normal(size=200)
     jacobian = np.column_stack([np.ones(200), line, line])
     base = Columns(np.full(1, np.inf), np.ones(1), np.zeros(1, dtype=bool))
-    race = Race([compress(np.arange(3), jacobian, line)], base, np.zeros((0, 1)), 3, 0.1)
+    race = race_on([compress(np.arange(3), jacobian, line)], base, np.zeros((0, 1)), 3, 0.1)
     both = Variant(np.array([1, 2]), np.ones(2))
     seen = race.visible(both)
     # Along (1, 1) / sqrt(2) the column is sqrt(2) times the line.
@@ -217,14 +243,14 @@ def test_of_two_amplitudes_that_only_their_sum_shows_one_combination_is_visible(
 
 
 def test_what_is_there_is_chosen_from_parts_of_the_runs_and_what_is_not_is_not(rng):
-    _, blocks, _ = race_on(rng, [0.6, 0.0, 0.0, 0.0])
+    _, blocks, _ = raced(rng, [0.6, 0.0, 0.0, 0.0])
     again = stability(blocks, list(range(RUNS)), BASE, NONE_HELD, CANDIDATES, NOISE, 3.0, 2, 10, rng)
     assert again == {"sine": 1.0, "cosine": 0.0, "square": 0.0, "parabola": 0.0}
 
 
 def test_joined_blocks_say_what_they_said_apart(rng):
-    race, blocks, _ = race_on(rng, [0.6, 0.0, 0.3, 0.0])
-    together = Race([joined(blocks, 6)], BASE, NONE_HELD, 6, NOISE)
+    race, blocks, _ = raced(rng, [0.6, 0.0, 0.3, 0.0])
+    together = race_on([joined(blocks, 6)], BASE, NONE_HELD, 6, NOISE)
     assert together.chi2 == pytest.approx(race.chi2)
     variants = [candidate.variants[0] for candidate in CANDIDATES[:2]]
     assert together.evidence(variants) == pytest.approx(race.evidence(variants))
@@ -303,7 +329,7 @@ def test_what_was_held_may_still_be_seen_a_little_and_is_then_no_sign_of_a_candi
         columns = [np.column_stack([np.ones(60), T, T + 0.02 * np.sin(2 * np.pi * T)]) for _ in range(RUNS)]
         targets = [slope * T + rng.normal(0, noise, 60) for _ in columns]
         blocks = [compress(np.arange(3), c, t) for c, t in zip(columns, targets, strict=True)]
-        race = Race(blocks, nearly, held, 3, noise)
+        race = race_on(blocks, nearly, held, 3, noise)
         flat = np.vstack(columns)[:, :2] * [1e2, 2.0]
         spread = flat @ flat.T + noise**2 * np.eye(60 * RUNS)
         own = np.vstack(columns)[:, 2:]
@@ -314,7 +340,7 @@ def test_what_was_held_may_still_be_seen_a_little_and_is_then_no_sign_of_a_candi
 
 
 def test_rivals_are_as_good_where_little_evidence_tells_them_apart(rng):
-    race, *_ = race_on(rng, [1.0, 0.0, 0.0, 0.0])
+    race, *_ = raced(rng, [1.0, 0.0, 0.0, 0.0])
     chosen = select(race, CANDIDATES, 5.0, 3)
     assert [choice.candidate.name for choice in chosen] == ["sine"]
     gaps = {
@@ -328,9 +354,20 @@ def test_rivals_are_as_good_where_little_evidence_tells_them_apart(rng):
     assert as_good(race, chosen, chosen[0], CANDIDATES, (between[0] + between[1]) / 2) == (nearest,)
 
 
+def test_what_brings_little_itself_is_no_rival_of_a_faint_effect(rng):
+    race, *_ = raced(rng, [0.16, 0.0, 0.0, 0.0])
+    (one,) = select(race, CANDIDATES, 1.0, 3)
+    alone = {c.name: race.evidence([c.variants[0]]) for c in CANDIDATES}
+    own = alone.pop(one.candidate.name)
+    assert own < 10.0
+    wanted = {name for name, evidence in alone.items() if evidence > 0.5 * own}
+    assert 0 < len(wanted) < len(alone)
+    assert set(as_good(race, [one], one, CANDIDATES, 20.0)) == wanted
+
+
 def test_a_rival_that_contains_what_was_chosen_cannot_be_told_from_it(rng):
     """Sine and parabola explain what the sine does; cosine and parabola do not."""
-    race, *_ = race_on(rng, [1.0, 0.0, 0.0, 0.0])
+    race, *_ = raced(rng, [1.0, 0.0, 0.0, 0.0])
     both = Candidate("sine and parabola", (Variant(np.array([2, 5]), np.array([2.0, 2.0])),))
     other = Candidate("cosine and parabola", (Variant(np.array([3, 5]), np.array([2.0, 2.0])),))
     chosen = select(race, CANDIDATES, 5.0, 1)
@@ -358,7 +395,7 @@ def test_two_that_make_each_other_needless_do_not_hang_the_selection(rng):
     x = np.sign(np.sin(2 * np.pi * T))
     columns = np.column_stack([np.ones(60), T, x, x + 0.02 * rng.normal(size=60), x + 0.02 * rng.normal(size=60)])
     target = columns @ np.array([1.0, 0.0, 0.5, 0.5, 0.5]) + rng.normal(0, NOISE, 60)
-    race = Race([compress(np.arange(5), columns, target)], BASE, NONE_HELD, 5, NOISE)
+    race = race_on([compress(np.arange(5), columns, target)], BASE, NONE_HELD, 5, NOISE)
     candidates = [Candidate(str(k), (Variant(np.array([k]), np.array([2.0])),)) for k in (2, 3, 4)]
     assert len(select(race, candidates, 6.0, 3)) == 1
 

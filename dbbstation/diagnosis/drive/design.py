@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.diagnosis.drive.shapes import PLAUSIBLE_SHARE, shapes
 from dbbstation.diagnosis.drive.signals import derivatives
 from dbbstation.inference.noise import Noise, noise_of
-from dbbstation.inference.race import Candidate, Race, Variant
+from dbbstation.inference.race import Candidate, Race, Variant, race_on
 from dbbstation.inference.square_root import Columns, compress
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class Design:
         count = base.shape[1]
         whole = np.hstack([base, self.columns[:, len(BASE) :]])
         known = Columns(np.full(count, np.inf), 1.0 / _norms(base), np.zeros(count, dtype=bool))
-        race = Race(self.blocks(whole), known, np.zeros((0, count)), whole.shape[1], self.noise_n)
+        race = race_on(self.blocks(whole), known, np.zeros((0, count)), whole.shape[1], self.noise_n)
         shift = count - len(BASE)
         return race, _shifted(self.named, shift), _shifted(self.unnamed, shift)
 

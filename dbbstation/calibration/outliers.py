@@ -188,6 +188,33 @@ def _strange_run(calibration: Calibration) -> list[int]:
     return [worst] if rest[worst] > max(STANDS_OUT * float(np.median(rest)), LEAST_UM) else []
 
 
+def in_place_after_all(
+    calibration: Calibration, runs: Sequence[Observation], outliers: Sequence[Outlier]
+) -> tuple[list[Observation], tuple[Outlier, ...]]:
+    """Runs that belong, and the outliers that stay, where a fit knows physics that was not known when runs were left out.
+
+    Args:
+        calibration: of the runs that were kept, with that physics.
+        runs: all runs.
+        outliers: runs that were left out; others stay as they are.
+    """
+
+    def named(run: Observation) -> tuple[str, str]:
+        return run.setup.session, run.label
+
+    kept = {named(run) for run in calibration.observations}
+    usual = float(np.median([_rms_um(_without_shift(o, r)) for o, r in _left(calibration)]))
+
+    def fits(run: Observation) -> bool:
+        left = run.raw.length_mm - calibration.model.bar(run.motion()).length_mm
+        return _rms_um(_without_shift(run, left)) < max(STANDS_OUT * usual, LEAST_UM)
+
+    out = {named(run) for run in runs if named(run) not in kept and not fits(run)}
+    labels = {label for _, label in out}
+    staying = tuple(o for o in outliers if o.freed or labels & set(o.run.split(", ")))
+    return [run for run in runs if named(run) not in out], staying
+
+
 def _without(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> Step:
     """Leave runs of one test out, and see under the fit of the others what they are."""
     kept = [run for i, run in enumerate(runs) if i not in strange]

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration, calibrate, default_sources
-from dbbstation.calibration.outliers import MOST, Outlier, calibrate_robust, free_ball, free_bar
+from dbbstation.calibration.outliers import MOST, Outlier, calibrate_robust, free_ball, free_bar, in_place_after_all
 from dbbstation.calibration.scatter import seats_of
 from dbbstation.diagnosis.channel import Channel, channel_of
 from dbbstation.diagnosis.unexplained import overruled
@@ -109,13 +109,18 @@ def best_look(
 
     Both can stand in for each other: tests that show missing physics for the first time look like badly seated balls,
     and a badly seated ball looks like a warped plate. One ball or bar at a time competes with the sources themselves, and
-    with errors that have no name; several that are far off are found beforehand only.
+    with errors that have no name; several that are far off are found beforehand only. Runs that were left out for being no
+    circle of this machine are taken back where the physics that was found explains them.
     """
     progress("kinematic calibration")
     fit = partial(calibrate, machine)
     plain = calibrate_robust(fit, runs, balls=False)
     robust = calibrate_robust(fit, runs, begun=plain)
     first = _look(fit, *plain, sources, progress)
+    if first.settled.chosen:
+        belonging, staying = in_place_after_all(first.settled.after, runs, plain[1])
+        if len(staying) < len(plain[1]):
+            return _look(fit, fit(belonging), staying, sources, progress)
     if len(robust[1]) == len(plain[1]):
         return first
     second = _look(fit, *robust, sources, progress)

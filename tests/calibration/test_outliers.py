@@ -11,12 +11,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.calibration.fit import calibrate
+from dbbstation.calibration.fit import calibrate, default_sources
 from dbbstation.calibration.noise_level import fine_noise_mm
-from dbbstation.calibration.outliers import Kind, calibrate_robust
+from dbbstation.calibration.outliers import Kind, Outlier, calibrate_robust, in_place_after_all
 from dbbstation.recorded import load_sessions
+from dbbstation.sources.registry import sources_named
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.plan import elevated, table_ii_plan
 from tests.plant.session import record
 
 
@@ -170,3 +172,29 @@ def test_gravity_is_no_reason_to_doubt_anything(tmp_path):
     calibration, outliers = robust(found, found.observations)
     assert outliers == ()
     assert 1e3 * fine_noise_mm(calibration) == pytest.approx(0.5, rel=0.05)
+
+
+def test_runs_left_out_for_want_of_physics_are_taken_back_with_it_and_bumped_ones_are_not(tmp_path):
+    """A raised test far out on the plate shows what level ones hide: without gravity it is no circle of this machine."""
+    plan = elevated(table_ii_plan(9), 8.0, ["h"])
+    record(tmp_path / "s", seed=9, plan=plan, mechanisms=[Gravity(4e-5)], rate_hz=20.0)
+    recorded = load_sessions([tmp_path / "s"])
+    strange = [k for k, run in enumerate(recorded.observations) if run.test == "h"]
+    bumped = number(recorded, "c", "cw")
+    runs = list(recorded.observations)
+    step = np.where(np.arange(len(runs[bumped].raw)) > 200, 0.1, 0.0)
+    raw = runs[bumped].raw
+    runs[bumped] = replace(runs[bumped], raw=replace(raw, length_mm=raw.length_mm + step))
+    left_out = tuple(
+        Outlier(Kind.RUN, runs[k].test, runs[k].label, 10.0, None, "no circle of this machine")
+        for k in (*strange, bumped)
+    )
+    kept = [run for k, run in enumerate(runs) if k not in {*strange, bumped}]
+    without = calibrate(recorded.machine, kept)
+    with_it = calibrate(recorded.machine, kept, [*default_sources(), *sources_named(["gravity"])])
+
+    belonging, staying = in_place_after_all(without, runs, left_out)
+    assert (belonging, staying) == (kept, left_out)
+    belonging, staying = in_place_after_all(with_it, runs, left_out)
+    assert [run.label for run in belonging] == [run.label for k, run in enumerate(runs) if k != bumped]
+    assert staying == left_out[-1:]

@@ -50,9 +50,9 @@ CONVERGED_SIGMA = 1e-3
 """The same as a share of their standard deviations, for what the runs hardly see."""
 FIRST_NOISE_MM = 1e-3
 
-SETTLED_NOISE = 3e-3
-"""Share by which the correlation of the noise may still move: how noise is weighted against what is known of balls decides
-what is left to be called noise, and where physics is missing that creeps towards its answer for a hundred steps."""
+NOISE_STEPS = 12
+"""Steps in which the noise is read anew. What is left to be called noise depends on how it is weighted against what is known
+of balls; where physics is missing the two creep, or run, after each other without an end."""
 
 AT_NODES = frozenset({Need.POSE, Need.TIME})
 """What a source may need for its effect to be as smooth as the circle; a path's history and logged values are not."""
@@ -155,12 +155,15 @@ def calibrate(
     nominal += current_blocks(layout, channel, x)
     blocks, before, share = nominal, np.zeros_like(x), 1.0
     lost, held = np.zeros((0, 0)), None
-    for _ in range(MOST_STEPS):
+    for steps in range(MOST_STEPS):
         seen = lost_directions(nominal, layout.known, noise.effective)
         if len(seen) != len(lost) or held is None:
             lost = seen
             held = lost if prescribe is None else prescribed(layout, lost, prescribe)
-        solution, noise = _settled(blocks, layout, noise, held)
+        if steps < NOISE_STEPS:
+            solution, noise = _settled(blocks, layout, noise, held)
+        else:
+            solution = solve(blocks, layout.known, noise.effective, held)
         update = layout.nominal + solution.x
         sigma = np.sqrt(np.diag(solution.covariance))
         settled_at = np.maximum(CONVERGED * layout.known.scale, CONVERGED_SIGMA * sigma)
@@ -173,9 +176,8 @@ def calibrate(
             break
         blocks, left = linearise(layout, runs, x)
         blocks += current_blocks(layout, channel, x)
-        read = noise_of(left, solution.freedom_used)
-        if abs(read.correlation_samples / noise.correlation_samples - 1.0) > SETTLED_NOISE:
-            noise = read
+        if steps < NOISE_STEPS:
+            noise = noise_of(left, solution.freedom_used)
     else:
         raise CalibrationError(
             f"the fit still moves, {change:.2g} times more than it should after {MOST_STEPS} steps",

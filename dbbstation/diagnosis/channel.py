@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -188,14 +189,11 @@ def _source_columns(
     parameters = source.parameters(machine)
     amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
     shaped = [k for k, p in enumerate(parameters) if p.shape]
-    grid = parameters[shaped[0]].shape if shaped else ((),)
     found = []
-    for value in grid:
+    for shape in product(*(parameters[k].shape for k in shaped)):
         values = np.zeros(len(parameters))
-        if shaped:
-            values[shaped] = value
+        values[shaped] = shape
         derivative = reading.by_source(source, machine, values)[:, amplitudes]
-        shape = tuple(float(values[k]) for k in shaped)
         numbers = book.source(source, source.shared_by(motion), shape, [parameters[k] for k in amplitudes])
         if len(numbers) > len(amplitudes):
             derivative = np.column_stack([derivative, derivative.sum(axis=1)])

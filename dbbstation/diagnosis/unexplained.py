@@ -31,6 +31,10 @@ ABOUT_AS_MUCH = 0.9
 """Share of its evidence from which on an unnamed curve explains about as much: of a hose's pull 0.93 to 0.98, where joints
 stand in for it; of joints that really are off, beside something else, 0.8."""
 
+CLEARLY_MORE = 1.1
+"""Times the evidence of an unnamed curve from which on several names are no patchwork in its place: up to 1.09 where the cause was
+on no list."""
+
 SHAPE_THRESHOLD = 8.0
 """Log evidence that an unnamed shape must bring, what picking it from many costs taken off. A misfit of the low harmonics
 as a whole is not asked for: a wave or a bump can hide in them. Of forty recordings of the virtual
@@ -125,12 +129,13 @@ def _overrules(race: Race, named: Sequence[Variant], of: Unnamed, best: Best) ->
     """Whether one unnamed shape is clearly better than what has a name.
 
     The first of the chosen explains most. Where even it falls short of one unnamed curve, the others were only called in
-    to make up for that.
+    to make up for that, unless all together bring clearly more: then there are two causes.
     """
     if _imitates(race, named, best):
         return True
     enough = NAMED_EXPLAINS * of.race.explained([best.variant])
-    for some in (named[:1], named):
+    several = race.evidence(named) > CLEARLY_MORE * best.gain
+    for some in [named] if several else [named[:1], named]:
         if race.explained(some) < enough and best.gain > race.evidence(some) + OVERRULES_BY:
             return True
     return False

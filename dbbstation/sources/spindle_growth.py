@@ -16,15 +16,20 @@ if TYPE_CHECKING:
 
 MM_PER_UM = 1e-3
 
+BEGUN_PERCENT = (-100.0, 0.0, 40.0)
+"""Worth trying: cooling from warm, from cold, and ten minutes of work before at a time constant of half an hour [%]."""
+
 _OUT_OF_THE_SPINDLE = np.array([0.0, 0.0, -1.0])
 """Which way the tool tip moves, platform frame: away from the platform, which lies above it [1]."""
 
 
 class SpindleGrowth(ErrorSource):
-    """The tool tip moves out of the spindle along its axis by the growth g(t) of `warm_up`.
+    """The tool tip moves out of the spindle along its axis by the growth g(t) of `warm_up`, and by what it had grown before.
 
-    Counted from the session's first sample, where the growth is zero by definition. A bar level with its ball does not
-    see it while the spindle is upright; tilted circles are shifted by g sin(tilt).
+    What struts and frame had grown before the first sample is part of their lengths and places; a spindle has no such
+    parameter. It had grown by a share b of what is still to come, or has yet to shrink by all of it (b = -1) where it was
+    warm and cools. A bar level with its ball does not see it while the spindle is upright; tilted circles are shifted by
+    (g + b a) sin(tilt).
     """
 
     name = "spindle-growth"
@@ -33,21 +38,23 @@ class SpindleGrowth(ErrorSource):
     varies_with = "time"
     texts = Texts(
         what="The spindle and its nose warm up and push the tool out of the platform. The growth given is counted from "
-        "the first sample of the session.",
+        "the first sample of the session; begun says how much of it was there already, against the cold spindle.",
         shows="Tilted circles wander sideways in the direction that the tool points to, upright ones stay; both "
         "directions drift alike.",
         confirm="Touch the ball or a tool with a dial gauge along the spindle's axis, cold, and again after the same "
         "time and speed as in the measurement.",
         cure="Measure with the spindle at rest and cool; else let it warm up at working speed first, or enter its growth "
         "as a tool length that follows the spindle's temperature.",
-        equation=f"tool tip moves along -z of the platform by g(t) = {EQUATION}",
+        equation=f"tool tip moves along -z of the platform by g(t) + begun a, g(t) = {EQUATION}",
         origin=f"thermal distortion caused by a rotating spindle, ISO 230-3; {ORIGIN}",
     )
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
-        """Growth in the end, time constant, what pauses take back."""
-        meaning = "way of the tool tip out of the spindle, from the first sample on"
-        return warm_up_parameters(Parameter("growth_um", "µm", 10.0, meaning), 1800.0)
+        """Growth in the end, time constant, what pauses take back, and how much of the growth had been before."""
+        growth = Parameter("growth_um", "µm", 10.0, "way of the tool tip out of the spindle, from the first sample on")
+        before = "growth before the first sample, of that after it; -100 where a warm spindle cools"
+        begun = Parameter("begun_percent", "percent", 40.0, before, BEGUN_PERCENT, newer=True)
+        return (*warm_up_parameters(growth, 1800.0), begun)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Shift of the tool tip.
@@ -56,14 +63,19 @@ class SpindleGrowth(ErrorSource):
             ModelError: the motion has no time.
         """
         self.require(motion)
-        return Effect(tool_tip_mm=MM_PER_UM * grown(motion, values)[:, None] * _OUT_OF_THE_SPINDLE)
+        growth, *_, percent = values
+        out_um = grown(motion, values[:-1]) + percent / 100.0 * growth
+        return Effect(tool_tip_mm=MM_PER_UM * out_um[:, None] * _OUT_OF_THE_SPINDLE)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
-        """By the three parameters of the law.
+        """By the three parameters of the law, and by what had been before.
 
         Raises:
             ModelError: the motion has no time.
         """
         self.require(motion)
-        law = MM_PER_UM * grown_by(motion, values)
-        return Effect(tool_tip_mm=_OUT_OF_THE_SPINDLE[:, None] * law[:, None, :])
+        growth, *_, percent = values
+        law = grown_by(motion, values[:-1])
+        law[:, 0] += percent / 100.0
+        by = MM_PER_UM * np.column_stack([law, np.full(len(law), growth / 100.0)])
+        return Effect(tool_tip_mm=_OUT_OF_THE_SPINDLE[:, None] * by[:, None, :])

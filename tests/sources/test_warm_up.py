@@ -169,16 +169,28 @@ def test_a_grown_spindle_pushes_the_tip_where_the_tool_points(reference):
     """Tilted about X by -20 degrees the tool points to -Y and down: sin and cos of the tilt, in closed form."""
     poses = np.array([[0.0, 0.0, -1008.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1008.0, -20.0, 0.0, 0.0]])
     motion = Motion(poses, time_s=np.full(2, FOR_EVER_S))
-    reached = MachineModel(reference, (Fitted(SPINDLE, np.array([12.0, 600.0, 0.0])),)).actual_poses(motion)
+    reached = MachineModel(reference, (Fitted(SPINDLE, np.array([12.0, 600.0, 0.0, 0.0])),)).actual_poses(motion)
     shift_um = 1e3 * (reached - poses)[:, :3]
     tilt = np.radians(20.0)
     assert np.allclose(shift_um, [[0, 0, -12], [0, -12 * np.sin(tilt), -12 * np.cos(tilt)]], atol=1e-6)
     assert np.allclose(reached[:, 3:], poses[:, 3:], atol=1e-9)
 
 
+@pytest.mark.parametrize(("growth_um", "percent", "z_um"), [(-18.0, -100.0, (-18.0, 0.0)), (18.0, 25.0, (-4.5, -22.5))])
+def test_a_spindle_that_was_warm_before_cools_to_nominal_and_one_that_had_begun_grows_on(
+    reference, growth_um, percent, z_um
+):
+    """Where the tip stands at the first sample and in the end, counted by hand."""
+    poses = np.tile([0.0, 0.0, -1008.0, 0.0, 0.0, 0.0], (2, 1))
+    motion = Motion(poses, time_s=np.array([0.0, FOR_EVER_S]))
+    fitted = Fitted(SPINDLE, np.array([growth_um, 600.0, 0.0, percent]))
+    reached = MachineModel(reference, (fitted,)).actual_poses(motion)
+    assert 1e3 * (reached - poses)[:, 2] == pytest.approx(z_um, abs=1e-6)
+
+
 def test_an_upright_circle_level_with_its_ball_does_not_see_the_spindle_grow(reference):
     motion = run((100, 0, -1008), (0, 0), started_s=1800.0)
-    grown = MachineModel(reference, (Fitted(SPINDLE, np.array([10.0, 600.0, 0.0])),)).bar(motion).length_mm
+    grown = MachineModel(reference, (Fitted(SPINDLE, np.array([10.0, 600.0, 0.0, 30.0])),)).bar(motion).length_mm
     assert np.abs(grown - MachineModel(reference).bar(motion).length_mm).max() < 1e-6
 
 

@@ -120,6 +120,7 @@ def calibrate(
     start: Mapping[str, NDArray[np.float64]] | None = None,
     *,
     prescribe: Sequence[Name] | None = None,
+    shapes_within: float | None = None,
 ) -> Calibration:
     """Fit error sources to raw circles.
 
@@ -136,6 +137,8 @@ def calibrate(
             at zero amplitude cannot see.
         prescribe: parameters to hold at nominal in place of the lost directions, as many as are lost; an empty
             sequence has them chosen among the base joints; None holds the directions themselves.
+        shapes_within: share of their starting values to which parameters of shape are known; None where they are
+            known to their usual sizes only.
 
     Raises:
         CalibrationError: centred circles, too few tests, parameters that cannot stand in for what is lost, or no
@@ -146,7 +149,7 @@ def calibrate(
     _check_enough(observations)
     layout = lay_out(machine, default_sources() if sources is None else sources, observations)
     if start:
-        layout = _near(layout, start)
+        layout = _near(layout, start, shapes_within)
     channel = current_channel(layout, observations)
     x = _start_values(layout, {**current_start(layout, channel), **(start or {})})
     noise = Noise(FIRST_NOISE_MM, 1.0)
@@ -224,14 +227,21 @@ def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64
     return float(np.clip(share / (1.0 - ratio), SMALLEST_SHARE, 1.0))
 
 
-def _near(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> Layout:
-    """Layout whose parameters of shape are nominally those of the start."""
-    nominal = layout.nominal.copy()
+def _near(layout: Layout, start: Mapping[str, NDArray[np.float64]], within: float | None) -> Layout:
+    """Layout whose parameters of shape are nominally those of the start, and known to a share of them."""
+    nominal, prior = layout.nominal.copy(), layout.known.prior.copy()
     for term in layout.terms:
         for k, parameter in enumerate(term.parameters):
             if parameter.shape and term.source.name in start:
-                nominal[term.columns.start + k] = start[term.source.name][k]
-    return replace(layout, nominal=nominal)
+                column = term.columns.start + k
+                nominal[column] = start[term.source.name][k]
+                if within is not None:
+                    prior[column] = within * max(abs(nominal[column]), SMALLEST_SHAPE * parameter.plausible)
+    return replace(layout, nominal=nominal, known=replace(layout.known, prior=prior))
+
+
+SMALLEST_SHAPE = 0.1
+"""Of its plausible size: a parameter of shape that starts at less is known to no less than a share of this."""
 
 
 def _start_values(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:

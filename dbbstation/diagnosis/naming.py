@@ -39,6 +39,9 @@ MOST_ROUNDS = 6
 BY_CHANCE = 1e-3
 """Chance below which amplitudes stand out in the exact fit, of those that the race has already chosen."""
 
+GRID = 0.3
+"""Share to which parameters of shape are known from the grid that the race tried, about its spacing."""
+
 HELD = 1e-12
 """Share of the greatest variance below which a direction was held, not fitted."""
 
@@ -231,42 +234,41 @@ def _settle(
 
 
 def _beyond_scatter(race: Race, set_up: Sequence[Candidate], chosen: Sequence[Choice], off: Choice) -> bool:
-    """Whether a ball is off by more than all balls scatter: that they scatter as stated is only roughly true.
+    """Whether a ball is off by more than all others scatter beside it: that they scatter as stated is only roughly true.
 
     By chance half of them lie beyond their median. One bar does not scatter.
     """
     if off.candidate.name == "bar-offset":
         return True
     others = [choice.variant for choice in chosen if choice is not off]
-    beside = race.explained(others) if others else 0.0
-    squares = {
-        (candidate.name, variant.of): (race.explained([*others, variant]) - beside, len(variant.columns))
-        for candidate in set_up
-        if candidate.name != "bar-offset"
-        for variant in candidate.variants
-    }
-    usual = max(1.0, float(np.median([square / chdtri(freedom, 0.5) for square, freedom in squares.values()])))
-    square, _ = squares[off.candidate.name, off.variant.of]
+    beside = race.explained([*others, off.variant])
+    square = beside - (race.explained(others) if others else 0.0)
+    balls = [variant for candidate in set_up if candidate.name != "bar-offset" for variant in candidate.variants]
+    scatter = [
+        (race.explained([*others, off.variant, ball]) - beside) / float(chdtri(len(ball.columns), 0.5))
+        for ball in balls
+        if ball is not off.variant
+    ]
+    usual = max(1.0, float(np.median(scatter))) if scatter else 1.0
     return worth_of(race, chosen, off) - 0.5 * square * (1.0 - 1.0 / usual) >= THRESHOLD
 
 
 def _stands_out(calibration: Calibration, choice: Choice) -> bool:
     """Whether the amplitudes that were chosen, in any of their combinations, stand out of their covariance.
 
-    In an exact fit of all amplitudes of the source, of which the others are then said to be zero, or all to be alike.
+    In an exact fit of all amplitudes of the source, of which the others are then said to be zero, or all to be alike. Of
+    the shape that was found: where there is no amplitude there is no shape, and that one was picked is paid for.
     """
-    columns = np.array(
-        [
-            term.columns.start + k
-            for term in calibration.layout.terms
-            if term.source.name == choice.candidate.name
-            for k, parameter in enumerate(term.parameters)
-            if not parameter.shape
-        ]
-    )
+    of_source = [term for term in calibration.layout.terms if term.source.name == choice.candidate.name]
+    numbered = [(term.columns.start + k, p) for term in of_source for k, p in enumerate(term.parameters)]
+    columns = np.array([number for number, parameter in numbered if not parameter.shape])
+    shapes = np.array([number for number, parameter in numbered if parameter.shape], dtype=np.int64)
     known, solution = calibration.layout.known, calibration.solution
     scale = known.scale[columns]
     covariance = solution.covariance[np.ix_(columns, columns)] / np.outer(scale, scale)
+    if len(shapes):
+        across = solution.covariance[np.ix_(columns, shapes)] / scale[:, None]
+        covariance -= across @ np.linalg.pinv(solution.covariance[np.ix_(shapes, shapes)], hermitian=True) @ across.T
     values = calibration.x[columns] / scale
     spread = choice.candidate.spread(choice.variant)
     if spread.shape[0] > spread.shape[1]:
@@ -294,8 +296,12 @@ def _joint(channel: Channel, race: Race, chosen: Sequence[Choice], sources: dict
         found = choice.candidate.spread(choice.variant) @ amplitudes[:own]
         start[source.name] = _with_shape(source, channel.machine, found, choice.variant.shape)
         amplitudes = amplitudes[own:]
-    more = [sources[choice.candidate.name] for choice in chosen]
-    return calibrate(channel.machine, channel.observations, [*default_sources(), *more], start)
+    every = [*default_sources(), *(sources[choice.candidate.name] for choice in chosen)]
+    try:
+        return calibrate(channel.machine, channel.observations, every, start)
+    except CalibrationError:
+        # A shape that these runs hardly see, such as a decay shorter than their samples, runs away with its amplitude.
+        return calibrate(channel.machine, channel.observations, every, start, shapes_within=GRID)
 
 
 def _with_shape(

@@ -37,6 +37,10 @@ FEW = 8
 OWN_LAW = 0.02
 """Share of its log evidence by which one source that grows with time must be better than another."""
 
+MAKES_UP = 0.2
+"""Share of another's evidence below which a source that grows with time may only make up for its law: a warm-up in two stages
+calls for a second source with a seventh of what the first brings."""
+
 CROWD = 3
 """Causes at once that are more than happens."""
 
@@ -200,30 +204,37 @@ def _text(source: ErrorSource, verdict: Verdict, alike: Sequence[str]) -> str:
 def doubted(
     findings: Sequence[SourceFinding], rest: Unexplained, sources: Mapping[str, ErrorSource]
 ) -> tuple[SourceFinding, ...]:
-    """Findings where several named sources follow the variable that still organises what is left.
+    """Findings where several named sources may be one whose law is not quite what the machine does.
 
-    Then the law of one of them is not quite what the machine does, such as a warm-up in two stages, and another may
-    have been called in only to make up for that: each stands, but not beside the others.
+    A warm-up in two stages, for instance: another source that follows the same variable is then called in to make up for
+    that. So it may be where this variable still organises what is left, and where of what grows with time one source brings
+    little beside another. Each stands, but not beside the others.
 
     Args:
         findings: as judged.
         rest: what is left.
         sources: by name.
     """
+    said = [f for f in findings if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}]
     variable = variable_of(rest.variable) if rest.variable else ""
-    of_it = {
-        f.name
-        for f in findings
-        if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS} and sources[f.name].varies_with == variable
-    }
-    if not variable or len(of_it) < 2:  # noqa: PLR2004 - one alone makes up for nothing
-        return tuple(findings)
+    of_it = {f.name for f in said if variable and sources[f.name].varies_with == variable}
+    if len(of_it) > 1:
+        return _not_beside(findings, of_it, f"What is left follows {variable} too, so it")
+    needed = [f for f in said if sources[f.name].varies_with == "time" and f.gain > 0.0]
+    named = [f.gain for f in needed if f.verdict is Verdict.IDENTIFIED or f.gain > AS_GOOD]
+    if len(named) > 1 and min(named) < MAKES_UP * max(named):
+        return _not_beside(findings, {f.name for f in needed}, "One of them brings little beside the other, so it")
+    return tuple(findings)
+
+
+def _not_beside(findings: Sequence[SourceFinding], names: set[str], why: str) -> tuple[SourceFinding, ...]:
+    """Findings of which those named are in doubt beside each other."""
     told = []
     for finding in findings:
-        alike = tuple(sorted((of_it | set(finding.ambiguous_with)) - {finding.name}))
-        text = f"What is left follows {variable} too, so it may only make up for another law of {', '.join(alike)}."
+        alike = tuple(sorted((names | set(finding.ambiguous_with)) - {finding.name}))
+        text = f"{why} may only make up for another law of {', '.join(alike)}."
         doubtful = replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text)
-        told.append(doubtful if finding.name in of_it else finding)
+        told.append(doubtful if finding.name in names else finding)
     return tuple(told)
 
 

@@ -60,3 +60,24 @@ def test_a_skew_is_found_by_the_machines_own_errors(clean):
     assert abs(own_ms[0]) < 5
     # At this rate every run's start is uncertain too, and takes a share of what all have in common.
     assert ms[0] - own_ms[0] == pytest.approx(20.0, rel=0.08)
+
+
+def test_a_time_constant_stays_where_it_is_said_to_be_known_and_is_found_where_it_is_not(clean):
+    """A bar that drifted with 1500 s; a fit begun at 2000 s, which is once said to be right to a hundredth."""
+    recorded, _ = clean
+    drift = known_sources()["bar-drift"]
+    runs = []
+    for run in recorded.observations:
+        grown_um = 8.0 * (1.0 - np.exp(-run.raw.t_s / 1500.0))
+        runs.append(replace(run, raw=replace(run.raw, length_mm=run.raw.length_mm + 1e-3 * grown_um)))
+    found = []
+    for within in (None, 0.01):
+        start = {"bar-drift": np.array([6.0, 2000.0, 0.0])}
+        fit = calibrate(recorded.machine, runs, [*default_sources(), drift], start, shapes_within=within)
+        column = [(source, name) for source, _, name in fit.layout.names].index(("bar-drift", "time_constant_s"))
+        found.append((fit.x[column], float(np.sqrt(fit.solution.covariance[column, column]))))
+    (free_s, free_sigma_s), (kept_s, kept_sigma_s) = found
+    assert free_s == pytest.approx(1500.0, abs=4.0 * free_sigma_s)
+    assert free_sigma_s > 50.0
+    assert kept_s == pytest.approx(2000.0, abs=60.0)
+    assert kept_sigma_s < 20.1

@@ -1,0 +1,29 @@
+"""A faint effect beside a loud one, in sessions of the independent plant."""
+
+from __future__ import annotations
+
+import pytest
+
+from dbbstation.diagnosis.diagnose import diagnose
+from dbbstation.diagnosis.findings import Verdict
+from dbbstation.recorded import load_sessions
+from dbbstation.sources.registry import sources_named
+from tests.plant.mechanisms.gravity import Gravity
+from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.mechanisms.servo import ReversalSpike
+from tests.plant.session import record
+
+NAMES = ("gravity", "backlash", "servo-lag", "reversal-spike", "joint-friction", "screw-lead")
+
+
+@pytest.mark.parametrize("decay_s", [0.15, 0.4])
+def test_short_spikes_are_found_beside_gravity_however_uncertain_their_height_is(tmp_path, decay_s):
+    """Ten readings a second hardly tell a high short spike from a low long one; that there is one they tell."""
+    kinematics = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
+    record(
+        tmp_path / "s", seed=61, mechanisms=[kinematics, Gravity(), ReversalSpike((1.2,) * 6, decay_s)], rate_hz=10.0
+    )
+    recorded = load_sessions([tmp_path / "s"])
+    diagnosis = diagnose(recorded.machine, recorded.observations, sources_named(NAMES))
+    found = {f.name for f in diagnosis.sources if f.verdict is Verdict.IDENTIFIED}
+    assert found == {"gravity", "reversal-spike"}

@@ -27,9 +27,9 @@ FLEXIBLE = 16
 MADE_UP_FOR = 0.2
 """Share of its evidence below which what others bring beside a flexible source only makes up for its failings."""
 
-ABOUT_AS_MUCH = 0.9
-"""Share of its evidence from which on an unnamed curve explains about as much: of a hose's pull 0.93 to 0.98, where joints
-stand in for it; of joints that really are off, beside something else, 0.8."""
+AS_MUCH, ABOUT_AS_MUCH = 0.95, 0.9
+"""Shares of its evidence from which on an unnamed curve explains as much, alone and where the source needs helpers: of a hose's
+pull 0.93 to 0.99, where joints stand in for it; of joints that really are off 0.45 to 0.86."""
 
 CLEARLY_MORE = 1.1
 """Times the evidence of an unnamed curve from which on several names are no patchwork in its place: up to 1.09 where the cause was
@@ -145,14 +145,14 @@ def _imitates(race: Race, named: Sequence[Variant], best: Best) -> bool:
     """Whether a source of many amplitudes only imitates an error that has no name.
 
     It can follow nearly anything that is smooth in the pose. It has to bring more evidence than an unnamed curve of no
-    more amplitudes. Where such a curve brings about as much, it has to leave nothing that others have to make up for,
+    more amplitudes, clearly. Where such a curve brings about as much, it has to leave nothing that others have to make up for,
     too: what they then bring is little beside it.
     """
     first = named[0]
     if len(first.columns) < FLEXIBLE:
         return False
     alone = race.evidence([first])
-    if len(best.variant.columns) <= len(first.columns) and best.gain > alone:
+    if len(best.variant.columns) <= len(first.columns) and best.gain > AS_MUCH * alone:
         return True
     beside = race.evidence(named) - alone
     return len(named) > 1 and beside < MADE_UP_FOR * alone and best.gain > ABOUT_AS_MUCH * alone

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.fit import Calibration
     from dbbstation.inference.square_root import Columns
 
-SIZES = (1.0, 0.1, 0.02)
+SIZES = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Sizes that shapes are looked for at, in units of the usual one: what is just seen is a hundredth of a micrometre."""
 
 

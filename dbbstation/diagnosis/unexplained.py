@@ -97,8 +97,8 @@ def unexplained(
         # The names stand; what is left beside them is looked at about the joint fit.
         of = unnamed(after, left.noise)
         best = of.best()
-    misfit = left.probability < significant or overrules
-    rms_um = 1e3 * (first.rms if overrules else left.rms)
+    told = first if overrules else left
+    misfit, rms_um = told.probability < significant, 1e3 * told.rms
     if best.gain < SHAPE_THRESHOLD:
         if not misfit:
             return Rest(Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."), overrules=False)

@@ -207,8 +207,8 @@ def doubted(
     """Findings where several named sources may be one whose law is not quite what the machine does.
 
     A warm-up in two stages, for instance: another source that follows the same variable is then called in to make up for
-    that. So it may be where this variable still organises what is left, and where of what grows with time one source brings
-    little beside another. Each stands, but not beside the others.
+    that. Where this variable still organises what is left, each of them stands, but not beside the others. Where all is
+    explained, but of what grows with time one source brings little beside another, that one is in doubt.
 
     Args:
         findings: as judged.
@@ -220,18 +220,21 @@ def doubted(
     of_it = {f.name for f in said if variable and sources[f.name].varies_with == variable}
     if len(of_it) > 1:
         return _not_beside(findings, of_it, f"What is left follows {variable} too, so it")
-    needed = [f for f in said if sources[f.name].varies_with == "time" and f.gain > 0.0]
-    named = [f.gain for f in needed if f.verdict is Verdict.IDENTIFIED or f.gain > AS_GOOD]
-    if len(named) > 1 and min(named) < MAKES_UP * max(named):
-        return _not_beside(findings, {f.name for f in needed}, "One of them brings little beside the other, so it")
-    return tuple(findings)
+    lawful = [f for f in said if sources[f.name].varies_with == "time" and f.gain > AS_GOOD]
+    first = max(lawful, key=lambda f: f.gain, default=None)
+    little = {f.name for f in lawful if first is not None and f.gain < MAKES_UP * first.gain}
+    if first is None or not little:
+        return tuple(findings)
+    return _not_beside(findings, little, f"It brings little beside {first.name}, so it", (first.name,))
 
 
-def _not_beside(findings: Sequence[SourceFinding], names: set[str], why: str) -> tuple[SourceFinding, ...]:
-    """Findings of which those named are in doubt beside each other."""
+def _not_beside(
+    findings: Sequence[SourceFinding], names: set[str], why: str, sure: tuple[str, ...] = ()
+) -> tuple[SourceFinding, ...]:
+    """Findings of which those named are in doubt beside each other and beside those that are sure."""
     told = []
     for finding in findings:
-        alike = tuple(sorted((names | set(finding.ambiguous_with)) - {finding.name}))
+        alike = tuple(sorted({*names, *sure, *finding.ambiguous_with} - {finding.name}))
         text = f"{why} may only make up for another law of {', '.join(alike)}."
         doubtful = replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text)
         told.append(doubtful if finding.name in names else finding)

@@ -183,9 +183,19 @@ def _strange_test(calibration: Calibration) -> list[int]:
 
 def _strange_run(calibration: Calibration) -> list[int]:
     """Index of the run that leaves most beside a shift of its own ball, if that is far more than usual."""
-    rest = np.array([_rms_um(_without_shift(o, r)) for o, r in _left(calibration)])
+    rest = _rests_um(calibration)
     worst = int(np.argmax(rest))
-    return [worst] if rest[worst] > max(STANDS_OUT * float(np.median(rest)), LEAST_UM) else []
+    return [worst] if rest[worst] > _strange_from_um(rest) else []
+
+
+def _rests_um(calibration: Calibration) -> NDArray[np.float64]:
+    """What every run leaves beside a shift of its own ball, shape (r,) [µm]."""
+    return np.array([_rms_um(_without_shift(run, left)) for run, left in _left(calibration)])
+
+
+def _strange_from_um(rests_um: NDArray[np.float64]) -> float:
+    """What a run must leave to be no circle of the machine [µm]."""
+    return max(STANDS_OUT * float(np.median(rests_um)), LEAST_UM)
 
 
 def in_place_after_all(
@@ -203,11 +213,11 @@ def in_place_after_all(
         return run.setup.session, run.label
 
     kept = {named(run) for run in calibration.observations}
-    usual = float(np.median([_rms_um(_without_shift(o, r)) for o, r in _left(calibration)]))
+    limit_um = _strange_from_um(_rests_um(calibration))
 
     def fits(run: Observation) -> bool:
         left = run.raw.length_mm - calibration.model.bar(run.motion()).length_mm
-        return _rms_um(_without_shift(run, left)) < max(STANDS_OUT * usual, LEAST_UM)
+        return _rms_um(_without_shift(run, left)) < limit_um
 
     out = {named(run) for run in runs if named(run) not in kept and not fits(run)}
     labels = {label for _, label in out}
@@ -231,7 +241,7 @@ def _looks_like(
     calibration: Calibration, others: Sequence[Observation], run: Observation, residual: NDArray[np.float64]
 ) -> tuple[Kind, str]:
     """What a run that does not belong most resembles."""
-    noise = max(STANDS_OUT * float(np.median([_rms_um(left) for _, left in _left(calibration)])), LEAST_UM)
+    noise = _strange_from_um(np.array([_rms_um(left) for _, left in _left(calibration)]))
     best, where = np.inf, run
     for other in others:
         if other.raw.circle == run.raw.circle or other.raw.circle.bar_mm != run.raw.circle.bar_mm:

@@ -118,12 +118,12 @@ def best_look(
     progress("kinematic calibration")
     fit = partial(calibrate, machine)
     plain = calibrate_robust(fit, runs, balls=False)
-    robust = calibrate_robust(fit, runs, begun=plain)
     first = _look(fit, *plain, sources, progress)
     if first.settled.chosen:
         belonging, staying = in_place_after_all(first.settled.after, runs, plain[1])
         if len(staying) < len(plain[1]):
             return _look(fit, fit(belonging), staying, sources, progress)
+    robust = calibrate_robust(fit, runs, begun=plain)
     if len(robust[1]) == len(plain[1]):
         return first
     second = _look(fit, *robust, sources, progress)

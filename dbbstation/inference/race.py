@@ -124,7 +124,7 @@ class Race:
 
     left: NDArray[np.float64]
     first: int
-    _last: tuple[tuple[bytes, bytes], Race] | None = field(default=None, repr=False)
+    _last: tuple[tuple[bytes, bytes], tuple[Race, float]] | None = field(default=None, repr=False)
 
     @property
     def chi2(self) -> float:
@@ -181,23 +181,17 @@ class Race:
         Singular values of the signature in units of plausible sizes, base and others fitted: along each direction of
         the amplitudes the plausible size over its standard deviation.
         """
-        columns = self.left[:, variant.columns - self.first] * variant.plausible
-        if others:
-            beside = np.concatenate([other.columns for other in others]) - self.first
-            prior = np.concatenate([other.prior for other in others])
-            explained = np.vstack([self.left[:, beside], np.diag(1.0 / prior)])
-            padded = np.vstack([columns, np.zeros((len(prior), columns.shape[1]))])
-            axes, _ = qr(explained, mode="economic")
-            columns = padded - axes @ (axes.T @ padded)
+        rest, _ = self._beside(others)
+        columns = rest.left[:, variant.columns - self.first] * variant.plausible
         return np.asarray(np.linalg.svd(columns, compute_uv=False), dtype=np.float64)
 
     def best_variant(self, candidate: Candidate, others: Sequence[Variant]) -> tuple[Variant, float]:
         """Best form of a candidate beside others, at its best size, and the log evidence of all its forms together."""
-        rest = self._beside(others)
+        rest, beside = self._beside(others)
         gains = np.array([rest.gains(variant, candidate.sizes) for variant in candidate.variants])
         form, size = np.unravel_index(int(gains.argmax()), gains.shape)
         best, scale = candidate.variants[int(form)], candidate.sizes[int(size)]
-        return best if scale == best.scale else best.scaled(scale), self.evidence(others) + together(gains)
+        return best if scale == best.scale else best.scaled(scale), beside + together(gains)
 
     def gains(self, variant: Variant, sizes: Sequence[float]) -> NDArray[np.float64]:
         """Log evidence of base and one variant over that of the base alone, for each size in plausible ones, (s,)."""
@@ -208,19 +202,17 @@ class Race:
         information = 1.0 + scales * np.maximum(seen, 0.0)
         return np.asarray(0.5 * np.sum(scales * along / information - np.log(information), axis=1), dtype=np.float64)
 
-    def _beside(self, variants: Sequence[Variant]) -> Race:
-        """Race on what base and variants leave, the variants in any size that their priors allow."""
+    def _beside(self, variants: Sequence[Variant]) -> tuple[Race, float]:
+        """Race on what base and variants leave, these in any size that their priors allow, and their log evidence."""
         if not variants:
-            return self
+            return self, 0.0
         columns = np.concatenate([v.columns for v in variants])
         prior = np.concatenate([v.prior for v in variants])
         key = (columns.tobytes(), prior.tobytes())
+        # All candidates are asked for beside the same others, one after the other.
         if self._last is None or self._last[0] != key:
-            own = columns - self.first
-            priors = np.zeros((len(own), len(own) + self.left.shape[1]))
-            np.fill_diagonal(priors, 1.0 / prior)
-            (triangle,) = qr(np.vstack([np.hstack([self.left[:, own], self.left]), priors]), mode="r")
-            self._last = key, Race(np.asarray(triangle, dtype=np.float64)[len(own) :, len(own) :], self.first)
+            rest = Race(_eliminated(self.left[:, columns - self.first], prior, self.left), self.first)
+            self._last = key, (rest, self.evidence(variants))
         return self._last[1]
 
     def _solved(self, variants: Sequence[Variant]) -> tuple[NDArray[np.float64], float]:
@@ -255,11 +247,19 @@ def race_on(blocks: Sequence[Block], base: Columns, held: NDArray[np.float64], c
     along = base.scale[fitted][:, None] * held.T
     eliminated = np.hstack([whole[:, random], whole[:, fitted] @ along, whole[:, fitted] @ free])
     sizes = np.concatenate([base.prior[random], np.ones(len(held))])
-    priors = np.zeros((len(sizes), eliminated.shape[1] + columns - count + 1))
+    return Race(_eliminated(eliminated, sizes, whole[:, count:])[: columns - count + 1], count)
+
+
+def _eliminated(
+    known: NDArray[np.float64], sizes: NDArray[np.float64], rest: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Triangle of what is left of columns beside others, of which the first have sizes and the further ones are free."""
+    stacked = np.hstack([known, rest])
+    priors = np.zeros((len(sizes), stacked.shape[1]))
     np.fill_diagonal(priors, 1.0 / sizes)
-    (triangle,) = qr(np.vstack([np.hstack([eliminated, whole[:, count:]]), priors]), mode="r")
-    skip = eliminated.shape[1]
-    return Race(np.asarray(triangle, dtype=np.float64)[skip : skip + columns - count + 1, skip:], count)
+    (triangle,) = qr(np.vstack([stacked, priors]), mode="r")
+    skip = known.shape[1]
+    return np.asarray(triangle, dtype=np.float64)[skip:, skip:]
 
 
 def together(gains: NDArray[np.float64]) -> float:
@@ -288,7 +288,7 @@ def select(race: Race, candidates: Sequence[Candidate], threshold: float, most: 
         if not trials:
             break
         candidate, variant, evidence = max(trials, key=lambda trial: trial[2])
-        enough = threshold + FURTHER * len(chosen)
+        enough = _price(threshold, len(chosen), len(chosen) + 1)
         step = [] if evidence - before < enough else [Choice(candidate, variant)]
         if not chosen and most > 1:
             step = _best_pair(race, trials, step, threshold)
@@ -302,6 +302,11 @@ def select(race: Race, candidates: Sequence[Candidate], threshold: float, most: 
     return chosen
 
 
+def _price(threshold: float, have: int, more: int) -> float:
+    """Log evidence that candidates must bring to be so many where there were fewer."""
+    return sum(threshold + FURTHER * k for k in range(have, more))
+
+
 def _best_pair(
     race: Race, trials: Sequence[tuple[Candidate, Variant, float]], single: list[Choice], threshold: float
 ) -> list[Choice]:
@@ -311,8 +316,7 @@ def _best_pair(
     for k, (first, first_variant, _) in enumerate(leading):
         for second, second_variant, _ in leading[k + 1 :]:
             both = race.evidence([first_variant, second_variant])
-            wanted = (2.0 * threshold + FURTHER, threshold + FURTHER, 0.0)[len(best)]
-            if both - evidence > wanted:
+            if both - evidence > _price(threshold, len(best), 2):
                 best, evidence = [Choice(first, first_variant), Choice(second, second_variant)], both
     return best
 
@@ -322,7 +326,7 @@ def _pruned(race: Race, chosen: list[Choice], threshold: float) -> list[Choice]:
     while chosen:
         worth = [worth_of(race, chosen, one) for one in chosen]
         least = int(np.argmin(worth))
-        if worth[least] >= threshold + FURTHER * (len(chosen) - 1):
+        if worth[least] >= _price(threshold, len(chosen) - 1, len(chosen)):
             break
         chosen = [one for k, one in enumerate(chosen) if k != least]
     return chosen

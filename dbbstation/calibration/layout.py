@@ -68,6 +68,17 @@ class Layout:
         """Source, set and parameter of every column."""
         return tuple((term.source.name, term.shared, p.name) for term in self.terms for p in term.parameters)
 
+    def columns_of(self, source: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Columns of a source's amplitudes, of all its sets, and those of its parameters of shape."""
+        numbered = [
+            (term.columns.start + k, bool(parameter.shape))
+            for term in self.terms
+            if term.source.name == source
+            for k, parameter in enumerate(term.parameters)
+        ]
+        amplitudes = np.array([number for number, shape in numbered if not shape], dtype=np.int64)
+        return amplitudes, np.array([number for number, shape in numbered if shape], dtype=np.int64)
+
     @property
     def bounded(self) -> NDArray[np.bool_]:
         """Columns that a tolerance of the machine file bounds, shape (k,)."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.fit import Calibration
     from dbbstation.calibration.layout import Term
-    from dbbstation.calibration.outliers import Outlier
+    from dbbstation.calibration.outlier import Outlier
     from dbbstation.calibration.scatter import ScatterCheck
     from dbbstation.calibration.visibility import Visibility
     from dbbstation.trace.analysis import CircleFigures

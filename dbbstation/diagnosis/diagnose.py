@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration
 from dbbstation.calibration.noise_level import fine_noise_mm
-from dbbstation.calibration.outliers import beside
+from dbbstation.calibration.stray_balls import beside
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
 from dbbstation.diagnosis.locate import locate, strut_contributions

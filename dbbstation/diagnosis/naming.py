@@ -10,8 +10,10 @@ import numpy as np
 from scipy.special import chdtri
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration, calibrate, default_sources
-from dbbstation.calibration.outliers import MOST, Outlier, calibrate_robust, free_ball, free_bar, in_place_after_all
+from dbbstation.calibration.outliers import MOST, calibrate_robust
 from dbbstation.calibration.scatter import seats_of
+from dbbstation.calibration.strange_runs import in_place_after_all
+from dbbstation.calibration.stray_balls import free_ball, free_bar
 from dbbstation.diagnosis.channel import Channel, channel_of
 from dbbstation.diagnosis.unexplained import overruled
 from dbbstation.errors import CalibrationError, KinematicsError
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.outliers import Fit, Step
+    from dbbstation.calibration.outlier import Fit, Outlier, Step
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
@@ -259,17 +261,14 @@ def _stands_out(calibration: Calibration, choice: Choice) -> bool:
     In an exact fit of all amplitudes of the source, of which the others are then said to be zero, or all to be alike. Of
     the shape that was found: where there is no amplitude there is no shape, and that one was picked is paid for.
     """
-    of_source = [term for term in calibration.layout.terms if term.source.name == choice.candidate.name]
-    numbered = [(term.columns.start + k, p) for term in of_source for k, p in enumerate(term.parameters)]
-    columns = np.array([number for number, parameter in numbered if not parameter.shape])
-    shapes = np.array([number for number, parameter in numbered if parameter.shape], dtype=np.int64)
+    columns, shapes = calibration.layout.columns_of(choice.candidate.name)
     known, solution = calibration.layout.known, calibration.solution
     scale = known.scale[columns]
-    covariance = solution.covariance[np.ix_(columns, columns)] / np.outer(scale, scale)
+    covariance: NDArray[np.floating] = solution.covariance[np.ix_(columns, columns)] / np.outer(scale, scale)
     if len(shapes):
         across = solution.covariance[np.ix_(columns, shapes)] / scale[:, None]
         covariance -= across @ np.linalg.pinv(solution.covariance[np.ix_(shapes, shapes)], hermitian=True) @ across.T
-    values = calibration.x[columns] / scale
+    values: NDArray[np.floating] = calibration.x[columns] / scale
     spread = choice.candidate.spread(choice.variant)
     if spread.shape[0] > spread.shape[1]:
         # Held directions may be anything: struts that are late by what all have in common are one that is late alone.

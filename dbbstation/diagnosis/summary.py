@@ -6,14 +6,14 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.calibration.evaluation import rms_um
-from dbbstation.calibration.outliers import SOURCE_OF, Kind
+from dbbstation.calibration.outlier import SOURCE_OF, Kind
 from dbbstation.calibration.summary import outlier_summary
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.calibration.outliers import Outlier
+    from dbbstation.calibration.outlier import Outlier
     from dbbstation.diagnosis.findings import Diagnosis, Location, NextTest, SourceFinding
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.outliers import SOURCE_OF
+from dbbstation.calibration.outlier import SOURCE_OF
 from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
 from dbbstation.diagnosis.shapes import variable_of
 from dbbstation.inference.concealment import concealment
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
-    from dbbstation.calibration.outliers import Outlier
+    from dbbstation.calibration.outlier import Outlier
     from dbbstation.diagnosis.channel import Channel
     from dbbstation.inference.race import Choice, Variant
     from dbbstation.machine.geometry import Machine
@@ -173,14 +173,8 @@ def _held_variance(after: Calibration) -> NDArray[np.float64]:
 
 def _fitted_amplitudes(after: Calibration, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Columns of a source's amplitudes in the joint fit and their values: its signature with its shape as fitted."""
-    columns = [
-        term.columns.start + k
-        for term in after.layout.terms
-        if term.source.name == name
-        for k, parameter in enumerate(term.parameters)
-        if not parameter.shape
-    ]
-    return np.array(columns, dtype=np.int64), after.x[columns]
+    columns, _ = after.layout.columns_of(name)
+    return columns, after.x[columns]
 
 
 def _best_values(source: ErrorSource, machine: Machine, race: Race, variant: Variant) -> dict[str, Value]:

@@ -13,7 +13,9 @@ import pytest
 
 from dbbstation.calibration.fit import calibrate, default_sources
 from dbbstation.calibration.noise_level import fine_noise_mm
-from dbbstation.calibration.outliers import Kind, Outlier, calibrate_robust, in_place_after_all
+from dbbstation.calibration.outlier import Kind, Outlier
+from dbbstation.calibration.outliers import calibrate_robust
+from dbbstation.calibration.strange_runs import in_place_after_all
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
 from tests.plant.mechanisms.gravity import Gravity

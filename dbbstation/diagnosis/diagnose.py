@@ -13,6 +13,7 @@ from dbbstation.calibration.noise_level import fine_noise_mm
 from dbbstation.calibration.stray_balls import beside
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
+from dbbstation.diagnosis.held import held_beside, held_variance
 from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.naming import MOST_SOURCES, THRESHOLD, Round, best_look
 from dbbstation.diagnosis.next_test import propose
@@ -206,7 +207,8 @@ def _shifts(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
     if after is before:
         return ()
     row_of = {name: k for k, name in enumerate(after.layout.names)}
-    sigma = np.sqrt(np.diag(after.solution.covariance))
+    unseen = held_variance(after, held_beside(before, after))
+    sigma = np.sqrt(np.diag(after.solution.covariance) + unseen)
     shifts = []
     for term in before.layout.terms:
         if term.source.belongs_to is not Owner.MACHINE:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.outlier import SOURCE_OF
 from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
+from dbbstation.diagnosis.held import held_variance
 from dbbstation.diagnosis.shapes import variable_of
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.race import AS_GOOD, Race, as_good, contained, free_directions, worth_of
@@ -148,7 +149,8 @@ def _likenesses(
 
 
 def _fitted_values(after: Calibration, name: str) -> dict[str, Value]:
-    sigma = np.sqrt(np.maximum(np.diag(after.solution.covariance), 0.0) + _held_variance(after))
+    unseen = held_variance(after, after.solution.held)
+    sigma = np.sqrt(np.maximum(np.diag(after.solution.covariance), 0.0) + unseen)
     values: dict[str, Value] = {}
     for term in after.layout.terms:
         if term.source.name == name:
@@ -157,18 +159,6 @@ def _fitted_values(after: Calibration, name: str) -> dict[str, Value]:
                 key = parameter.name if not values.get(parameter.name) else f"{parameter.name} ({term.shared})"
                 values[key] = Value(float(after.x[column]), float(sigma[column]), parameter.unit)
     return values
-
-
-def _held_variance(after: Calibration) -> NDArray[np.float64]:
-    """Variance of every column along the directions that were held at nominal: their plausible size, shape (k,).
-
-    Nobody knows more of them. A parameter that lies in such a direction would otherwise look well known at zero.
-    """
-    known = after.layout.known
-    fitted = np.flatnonzero(~known.random)
-    variance = np.zeros(len(known.random))
-    variance[fitted] = np.sum((after.solution.held * known.scale[fitted]) ** 2, axis=0)
-    return variance
 
 
 def _fitted_amplitudes(after: Calibration, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,9 @@ from dbbstation.files.session import RunEntry, RunState, SessionFolder, read_ses
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.model.observation import Observation
 from dbbstation.nc.commanded import commanded_poses
+from dbbstation.sources.contract import Thermometer
 from dbbstation.trace.cut import cut
+from dbbstation.trace.thermometers import logged_curve
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -76,7 +79,7 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
     if not observations:
         places = ", ".join(str(session.folder) for session in sessions)
         raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
-    observations = _with_shared_balls(observations, sessions)
+    observations = _with_thermometers(_with_shared_balls(observations, sessions))
     hashes = {session.name: session.sha256 for session in sessions}
     return Recorded(sessions[0].machine, tuple(observations), hashes, tuple(warnings))
 
@@ -117,6 +120,25 @@ def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[S
         name = names.setdefault(sheet, observation.setup.ball)
         shared.append(replace(observation, setup=replace(observation.setup, ball=name)))
     return shared
+
+
+def _with_thermometers(observations: Sequence[Observation]) -> list[Observation]:
+    """Tell every run what the thermometers of its session showed in all of them, where their times are known."""
+    runs: dict[str, list[tuple[float, RawCircle]]] = {}
+    for one in observations:
+        if one.started_s is not None:
+            runs.setdefault(one.setup.session, []).append((one.started_s, one.raw))
+    of = {session: _thermometers(sorted(own, key=itemgetter(0))) for session, own in runs.items()}
+    return [replace(o, setup=replace(o.setup, thermometers=of.get(o.setup.session, {}))) for o in observations]
+
+
+def _thermometers(runs: Sequence[tuple[float, RawCircle]]) -> dict[str, Thermometer]:
+    names = {name for _, raw in runs for name in raw.temperature_degc}
+    logged = {
+        name: [(began + raw.t_s, raw.temperature_degc[name]) for began, raw in runs if name in raw.temperature_degc]
+        for name in sorted(names)
+    }
+    return {name: Thermometer(*logged_curve(curves)) for name, curves in logged.items()}
 
 
 def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:

@@ -115,6 +115,8 @@ class PlaneFigures:
 def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel | None = None) -> PlaneFigures:
     """Flatness over eight points of X, Y = ±190 mm and parallelism of a move along X through its middle.
 
+    Of what hangs on the pose alone: backlash has no place of its own, and a machine that warms none that stays.
+
     Args:
         model: the machine as it is.
         height_mm: commanded Z [mm].
@@ -139,8 +141,8 @@ def _error_mm(
     poses = np.zeros((len(xy_mm), 6))
     poses[:, :2], poses[:, 2] = xy_mm, height_mm
     motion = Motion(poses)
-    actual = model.of_the_machine().actual_poses(motion)
-    believed = poses if corrected is None else corrected.of_the_machine().actual_poses(motion)
+    actual = model.anywhere().actual_poses(motion)
+    believed = poses if corrected is None else corrected.anywhere().actual_poses(motion)
     return actual[:, :3] - believed[:, :3]
 
 

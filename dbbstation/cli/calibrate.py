@@ -13,6 +13,9 @@ from dbbstation.cli.source_files import source_file_option
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource
+
 
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
@@ -100,6 +103,7 @@ def calibrate(
     recorded = load_sessions(sessions, exclude)
     for warning in recorded.warnings:
         say(f"note: {warning}")
+    fitted = _following_thermometers(fitted, recorded.observations)
     known = as_known(Method(method), recorded.machine, recorded.observations)
     held = _prescribed(prescribe, method)
     calibration, outliers = calibrate_robust(lambda runs: fit(recorded.machine, runs, fitted, prescribe=held), known)
@@ -209,3 +213,17 @@ def _print_scatter(check: Mapping[str, Any]) -> None:
         else "NOT as stated: another plate or CMM sheet, loose holders, or a wrong convention of tilts in the machine file?"
     )
     click.echo(f"{stated} scatter by {check['found_um']:.2f} ({low:.2f} to {high:.2f}) µm, {fits}")
+
+
+def _following_thermometers(
+    fitted: tuple[ErrorSource, ...], observations: tuple[Observation, ...]
+) -> tuple[ErrorSource, ...]:
+    """Sources that grow with time by their thermometers where those were logged; said, since it is another model."""
+    from dbbstation.cli.output import say
+    from dbbstation.sources.by_temperature import following_thermometers
+
+    forms = following_thermometers(fitted, [observation.motion() for observation in observations])
+    for source, form in zip(fitted, forms, strict=True):
+        if form is not source:
+            say(f"note: {form.name} follows the logged temperatures, not a law over time")
+    return forms

@@ -65,6 +65,10 @@ def evaluate(
     click.echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
     click.echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
     click.echo(f"uncompensated at Z {height_mm:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
+    held = {fitted.source.name for fitted in identified.model.anywhere().sources}
+    elsewhere = [f.source.name for f in identified.model.of_the_machine().sources if f.source.name not in held]
+    if elsewhere:
+        click.echo(f"(without {', '.join(elsewhere)}: no pose alone says what they do)")
     click.echo(f"flatness               {summary['flatness_um']:8.1f} µm")
     click.echo(f"parallelism along X    {summary['parallelism_um']:8.1f} µm")
 

@@ -58,6 +58,7 @@ class Channel:
         named: sources that have a name, as candidates.
         set_up: balls and bars that are off by far more than stated, as candidates: a variant for each of them.
         residual_mm: per run, what the base fit leaves, measurement's effects included [mm].
+        sources: by name and values of shape parameters.
     """
 
     observations: tuple[Observation, ...]
@@ -68,6 +69,7 @@ class Channel:
     named: tuple[Candidate, ...]
     set_up: tuple[Candidate, ...]
     residual_mm: tuple[NDArray[np.float64], ...]
+    sources: dict[tuple[str, tuple[float, ...]], ErrorSource]
 
     @cached_property
     def joined(self) -> Block:
@@ -82,6 +84,10 @@ class Channel:
     def base(self) -> Columns:
         """Priors and scales of the base columns."""
         return self.layout.known
+
+    def source_of(self, name: str, variant: Variant) -> ErrorSource:
+        """Source that a form of a candidate is of: a cause may have one form over time, and one by thermometers."""
+        return self.sources[name, variant.shape]
 
     @property
     def machine(self) -> Machine:
@@ -149,6 +155,7 @@ def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Chan
         columns=book.count,
         named=book.candidates(),
         set_up=book.of_the_set_up(),
+        sources=book.sources,
         residual_mm=tuple(left),
     )
 
@@ -242,14 +249,16 @@ class _Book:
 
     def __init__(self, first: int) -> None:
         self.count = first
-        self._sources: dict[tuple[str, tuple[float, ...]], dict[str, _Set]] = {}
+        self.sources: dict[tuple[str, tuple[float, ...]], ErrorSource] = {}
+        self._sets: dict[tuple[str, tuple[float, ...]], dict[str, _Set]] = {}
         self._set_up: dict[str, dict[str, Variant]] = {}
 
     def source(
         self, source: ErrorSource, shared: str, shape: tuple[float, ...], amplitudes: Sequence[Parameter]
     ) -> NDArray[np.int64]:
         """Columns of one variant of a source for one set that shares its values; that of all struts alike comes last."""
-        sets = self._sources.setdefault((source.name, shape), {})
+        self.sources[source.name, shape] = source
+        sets = self._sets.setdefault((source.name, shape), {})
         if shared not in sets:
             prior, struts = np.array([p.plausible for p in amplitudes]), np.array([p.strut or 0 for p in amplitudes])
             each = sorted(struts.tolist()) == list(range(1, STRUTS + 1))
@@ -270,7 +279,7 @@ class _Book:
     def candidates(self) -> tuple[Candidate, ...]:
         """Return the candidates with their variants."""
         variants: dict[str, list[Variant]] = {}
-        for (name, form), sets in self._sources.items():
+        for (name, form), sets in self._sets.items():
             variants.setdefault(name, []).extend(_forms(list(sets.values()), form))
         return tuple(Candidate(name, tuple(forms), SIZES) for name, forms in variants.items())
 

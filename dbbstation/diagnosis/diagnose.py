@@ -25,7 +25,7 @@ from dbbstation.errors import ModelError
 from dbbstation.inference.harmonics import LOW
 from dbbstation.inference.held_out import HeldOut, held_out
 from dbbstation.inference.stability import stability
-from dbbstation.sources.contract import Owner
+from dbbstation.sources.contract import Need, Owner
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.race import Choice
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
-    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.sources.contract import ErrorSource, Motion
 
 SIGNIFICANT = 1e-8
 """Probability below which a misfit counts as one that nothing explains, with a name or without. The level of the noise is
@@ -59,16 +59,17 @@ def diagnose(
     Args:
         machine: nominal machine.
         observations: raw runs.
-        sources: named candidates; those that lack what they need are left out by the caller.
+        sources: named candidates, several forms of one cause under one name; those that lack what they need are left out
+            by the caller.
         progress: told what is being done.
 
     Raises:
         CalibrationError: the base model cannot be fitted.
         ModelError: a source needs what the runs or the machine file do not give.
     """
-    by_name = {source.name: source for source in sources}
+    by_name = {source.name: source for source in reversed(sources)}
     runs = [thinned(observation) for observation in observations]
-    look = best_look(machine, runs, by_name, progress)
+    look = best_look(machine, runs, sources, progress)
     before, outliers, channel, first, settled = look.before, look.outliers, look.channel, look.first, look.settled
     chosen, after = settled.chosen, settled.after
     progress("verdicts")
@@ -82,14 +83,14 @@ def diagnose(
         settled = Round((), before, first, settled.race)
         findings = tuple(rest.demoted(findings))
     findings = beside_outliers(findings, outliers)
-    findings = crowded(doubted(findings, rest.finding, by_name), chosen, settled.race)
+    found = {c.candidate.name: channel.source_of(c.candidate.name, c.variant) for c in chosen}
+    findings = crowded(doubted(findings, rest.finding, {**by_name, **found}), chosen, settled.race)
     predicted = _held_out(channel, chosen, settled.left.noise, fine_noise_mm(after))
     steady = _stability(channel, findings, settled)
     findings = tuple(replace(f, stability=steady.get(f.name)) for f in findings)
     elsewhere = workspace_error(before, after) if chosen else None
     progress("next test")
     mismatch = first.probability < SIGNIFICANT or bool(chosen) or bool(outliers) or rest.found
-    found = [by_name[choice.candidate.name] for choice in chosen]
     return Diagnosis(
         mismatch=mismatch,
         misfit=replace(first, probability=min(first.probability, _by_chance(channel, settled))),
@@ -99,33 +100,42 @@ def diagnose(
         held_out=predicted,
         outliers=tuple(beside(outlier, after) for outlier in outliers),
         workspace=elsewhere,
-        locations=_locations(before, after, found, first, rest.finding.variable) if mismatch else (),
+        locations=_locations(before, after, [*found.values()], first, rest.finding.variable) if mismatch else (),
         sources=findings,
         unexplained=with_exact_wave(rest.finding, after),
         shifts=_shifts(before, after),
-        next_tests=_next_tests(channel, settled, findings, by_name, known=_known_elsewhere(elsewhere)),
+        next_tests=_next_tests(channel, settled, findings, known=_known_elsewhere(elsewhere)),
     )
 
 
 def usable_sources(
     machine: Machine, observations: Sequence[Observation], sources: Sequence[ErrorSource]
 ) -> tuple[list[ErrorSource], dict[str, str]]:
-    """Sources that have what they need, and why the others have not, by name."""
-    usable, lacking = [], {}
+    """Sources that have what they need, in every form for which that is so, and why the others have not, by name."""
+    usable: list[ErrorSource] = []
+    lacking = {}
     motions = [observation.motion() for observation in observations]
     for source in sources:
-        try:
-            source.parameters(machine)
-            for motion in motions:
-                source.require(motion)
-        except ModelError as error:
-            lacking[source.name] = error.what
-            continue
-        if source.of_currents:
-            lacking[source.name] = f"{source.name} shows in motor currents only: fit it with `calibrate --sources`"
-        else:
-            usable.append(source)
+        logged = source.by_temperature()
+        forms = [source] if logged is None else [source, logged]
+        missing = [_missing(form, machine, motions) for form in forms]
+        usable += [form for form, what in zip(forms, missing, strict=True) if not what]
+        if all(missing):
+            lacking[source.name] = missing[0]
     return usable, lacking
+
+
+def _missing(source: ErrorSource, machine: Machine, motions: Sequence[Motion]) -> str:
+    """Return why a source cannot be a candidate; empty where it can."""
+    try:
+        source.parameters(machine)
+        for motion in motions:
+            source.require(motion)
+    except ModelError as error:
+        return error.what
+    if source.of_currents:
+        return f"{source.name} shows in motor currents only: fit it with `calibrate --sources`"
+    return ""
 
 
 def _by_chance(channel: Channel, settled: Round) -> float:
@@ -230,7 +240,6 @@ def _next_tests(
     channel: Channel,
     settled: Round,
     findings: Sequence[SourceFinding],
-    sources: dict[str, ErrorSource],
     *,
     known: bool,
 ) -> tuple[NextTest, ...]:
@@ -251,7 +260,12 @@ def _next_tests(
         beside = {**{name: variants[name] for name in likes}, **chosen}
         beside.pop(finding.name, None)
         asked = {finding.name: variants[finding.name], **beside}
-        found = propose(channel, [(sources[name], v) for name, v in asked.items()], settled.left.noise)
+        # Nobody knows what a thermometer would show in a test to come: what follows one is taken as known.
+        forms = [(channel.source_of(name, variant), variant) for name, variant in asked.items()]
+        foreseen = [(source, variant) for source, variant in forms if Need.TEMPERATURE not in source.needs]
+        if not foreseen or foreseen[0][0].name != finding.name:
+            continue
+        found = propose(channel, foreseen, settled.left.noise)
         if found:
             return found
     return ()

@@ -107,7 +107,7 @@ class Look:
 def best_look(
     machine: Machine,
     runs: Sequence[Observation],
-    sources: dict[str, ErrorSource],
+    sources: Sequence[ErrorSource],
     progress: Callable[[str], None],
 ) -> Look:
     """Name what is missing, with and without balls that stand out of the kinematic fit, and return the simpler story.
@@ -137,15 +137,15 @@ def _look(
     fit: Fit,
     before: Calibration,
     outliers: tuple[Outlier, ...],
-    sources: dict[str, ErrorSource],
+    sources: Sequence[ErrorSource],
     progress: Callable[[str], None],
 ) -> Look:
     """Name sources; set free what balls and bars the race needs beside them, and name again."""
     while True:
         progress("candidates")
-        channel = channel_of(before, list(sources.values()))
+        channel = channel_of(before, sources)
         first = misfit_of(before)
-        settled = _settle(channel, before, first, sources, progress)
+        settled = _settle(channel, before, first, progress)
         if settled.off is None:
             return Look(before, outliers, channel, first, settled)
         chosen = [choice.variant for choice in settled.chosen]
@@ -153,7 +153,7 @@ def _look(
         step = _set_free(fit, before, settled.off) if free else None
         if step is None:
             channel = replace(channel, set_up=())
-            return Look(before, outliers, channel, first, _settle(channel, before, first, sources, progress))
+            return Look(before, outliers, channel, first, _settle(channel, before, first, progress))
         outliers = (*outliers, replace(step[0], alike=settled.alike))
         before = step[2]
 
@@ -184,7 +184,6 @@ def _settle(
     channel: Channel,
     before: Calibration,
     first: Misfit,
-    sources: dict[str, ErrorSource],
     progress: Callable[[str], None],
 ) -> Round:
     """Name, fit jointly, drop what the exact fit does not need, read the noise anew, until the names stay.
@@ -217,7 +216,7 @@ def _settle(
             break
         progress("joint fit with " + (", ".join(sorted(found)) or "nothing more"))
         try:
-            after = _joint(channel, race, chosen, sources) if chosen else before
+            after = _joint(channel, race, chosen) if chosen else before
         except (CalibrationError, KinematicsError):
             # An amplitude of next to nothing leaves the time constant beside it without a hold, and a step may leave
             # what the machine can reach.
@@ -285,17 +284,17 @@ def _stands_out(calibration: Calibration, choice: Choice) -> bool:
     return float(np.sum(along**2 / variance[free])) > float(chdtri(max(int(free.sum()), 1), BY_CHANCE))
 
 
-def _joint(channel: Channel, race: Race, chosen: Sequence[Choice], sources: dict[str, ErrorSource]) -> Calibration:
+def _joint(channel: Channel, race: Race, chosen: Sequence[Choice]) -> Calibration:
     """Fit base and chosen sources together, exactly, from the amplitudes that the race found."""
     amplitudes = race.amplitudes([choice.variant for choice in chosen]).values
     start: dict[str, NDArray[np.float64]] = {}
-    for choice in chosen:
-        source = sources[choice.candidate.name]
+    sources = [channel.source_of(choice.candidate.name, choice.variant) for choice in chosen]
+    for choice, source in zip(chosen, sources, strict=True):
         own = len(choice.variant.columns)
         found = choice.candidate.spread(choice.variant) @ amplitudes[:own]
         start[source.name] = _with_shape(source, channel.machine, found, choice.variant.shape)
         amplitudes = amplitudes[own:]
-    every = [*default_sources(), *(sources[choice.candidate.name] for choice in chosen)]
+    every = [*default_sources(), *sources]
     try:
         return calibrate(channel.machine, channel.observations, every, start)
     except CalibrationError:

@@ -17,6 +17,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
+from dbbstation.sources.by_temperature import slow_degc
 from dbbstation.sources.contract import Effect
 
 if TYPE_CHECKING:
@@ -50,6 +51,10 @@ UNITS = {
     "strut-speed": "mm/s",
     "strut-acceleration": "mm/s²",
     "time": "s",
+    "strut-temperature": "degC",
+    "machine-temperature": "degC",
+    "jig-temperature": "degC",
+    "bar-temperature": "degC",
     "angle": "deg",
     "angle since the start": "turns",
     "position of the platform": "mm",
@@ -58,8 +63,21 @@ UNITS = {
 """Variables that an error may follow, and their units. Printed names begin with them: what kind of curve, and what
 moves where it is no strut, come behind."""
 
-OF_STRUTS = ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration")
+OF_STRUTS = (
+    "strut-length",
+    "strut-force",
+    "strut-speed-sign",
+    "strut-speed",
+    "strut-acceleration",
+    "strut-temperature",
+)
 """Those that each strut has its own of."""
+
+THERMOMETERS = ("machine", "jig", "bar")
+"""Those that are on no strut, by the name of their column."""
+
+FOLLOWED_K = 0.2
+"""Range that a temperature must have over all runs to be followed: what thermometers resolve is a tenth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +163,11 @@ ITS_OWN = {
 
 def moves_struts(name: str) -> bool:
     """Whether an error of a printed name is one of strut lengths."""
-    return name.startswith("strut-") or (name.startswith("time") and " of the " not in name)
+    return name.startswith("strut-") or (variable_of(name) in _OF_ALL and " of the " not in name)
+
+
+_OF_ALL = {"time", *(f"{name}-temperature" for name in THERMOMETERS)}
+"""Variables that any of the things that move may follow."""
 
 
 def variable_of(name: str) -> str:
@@ -176,6 +198,7 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
             # A spline, since differences are worst at the end of a run, and joints hide all of a smooth error but that.
             path = CubicSpline(motion.time_s, struts.length_mm)
             found["strut-speed"], found["strut-acceleration"] = path(motion.time_s, 1), path(motion.time_s, 2)
+    found |= _temperatures(motion)
     found["position of the platform"] = motion.poses[:, :2]
     found["tilt of the platform"] = motion.poses[:, 3:5]
     if motion.setup is not None:
@@ -183,6 +206,16 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
         angle = np.unwrap(np.arctan2(away[:, 1], away[:, 0]))
         found["angle"] = np.mod(np.degrees(angle), 360.0)
         found["angle since the start"] = (angle - angle[motion.kept][0]) / (2.0 * np.pi)
+    return found
+
+
+def _temperatures(motion: Motion) -> dict[str, NDArray[np.float64]]:
+    """What was logged, as `variables` names it."""
+    logged = motion.temperature_degc
+    found = {f"{name}-temperature": slow_degc(motion, name)[0] for name in THERMOMETERS if name in logged}
+    on_struts = [f"strut{strut}" for strut in range(1, STRUTS + 1)]
+    if all(name in logged for name in on_struts):
+        found["strut-temperature"] = np.column_stack([slow_degc(motion, name)[0] for name in on_struts])
     return found
 
 
@@ -243,7 +276,11 @@ def shapes(extent: Ranges) -> list[Shape]:
         extent: of the variables over all runs.
     """
     found: list[Shape] = []
-    for name in ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration", "time"):
+    warmed = [
+        n for n in extent.low if n.endswith("-temperature") and np.max(extent.high[n] - extent.low[n]) > FOLLOWED_K
+    ]
+    usual = ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration", "time")
+    for name in (*usual, *warmed):
         if name not in extent.low:
             continue
         found += [Shape(name, "", strut, EVERY, _usual(name, extent, strut)) for strut in (*range(1, STRUTS + 1), None)]
@@ -252,8 +289,9 @@ def shapes(extent: Ranges) -> list[Shape]:
             Shape("strut-length", "", strut, SIGNED, _usual("strut-length", extent, strut))
             for strut in range(1, STRUTS + 1)
         ]
-    if "time" in extent.low:
-        found += [Shape("time", "", None, moves, _usual("time", extent, None)) for moves in (READING, BALL)]
+    for name in ("time", *warmed):
+        if name in extent.low and name not in OF_STRUTS:
+            found += [Shape(name, "", None, moves, _usual(name, extent, None)) for moves in (READING, BALL)]
     found.append(Shape("position of the platform", "", None, BALL, Plane(100.0, 2)))
     found.append(Shape("position of the platform", "", None, TABLE, Plane(100.0, 2)))
     found.append(Shape("tilt of the platform", "", None, TOOL, Plane(10.0, 2)))

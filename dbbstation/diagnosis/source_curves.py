@@ -16,6 +16,7 @@ from dbbstation.diagnosis.shapes import moves_struts as of_struts
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.by_temperature import FollowsTemperature
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.model.machine_model import Actual
     from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import Motion
 
 BINS = 14
 """Pieces of a variable's range over which readings are averaged."""
@@ -36,7 +38,7 @@ WAVE_PIECE_MM = 1.0
 SEEN = 2.5
 """Fine pieces that are known this many times worse than usual are left open: they would drown the others."""
 
-UNITS = {"strut-length": "mm", "strut-force": "N", "time": "s", "angle": "°"}
+UNITS = {"strut-length": "mm", "strut-force": "N", "time": "s", "temperature": "K", "angle": "°"}
 """Of the variables that something can be drawn over."""
 
 SENSES = {1.0: "lengthening", -1.0: "shortening"}
@@ -147,6 +149,8 @@ def _wanted(diagnosis: Diagnosis, name: str) -> str:
 
 def _drawn_over(wanted: str, observations: Sequence[Observation], *, moves_struts: bool) -> str:
     """Return the variable itself where it is one that every run has, else strut length, or angle for a reading."""
+    if wanted == "temperature":
+        return wanted
     if wanted.startswith("time") and all(o.started_s is not None for o in observations):
         return "time"
     if not moves_struts or wanted == "angle":
@@ -166,10 +170,13 @@ def _samples(
     motion, model = observation.motion(), calibration.model
     bar = model.bar(motion)
     known = variables(motion, model.machine)
-    angle = np.repeat(observation.raw.theta_deg[:, None], STRUTS, axis=1)
-    over = angle if variable == "angle" else known[variable][motion.kept]
-    if over.ndim == 1:
-        over = np.repeat(over[:, None], STRUTS, axis=1)
+    if variable == "angle":
+        over = observation.raw.theta_deg[:, None]
+    elif variable == "temperature":
+        over = _warmer_k(calibration, name, motion)[motion.kept]
+    else:
+        over = known[variable][motion.kept].reshape(len(observation.raw), -1)
+    over = np.broadcast_to(over, (len(over), STRUTS))
     if not moves_struts:
         without = MachineModel(model.machine, tuple(f for f in model.sources if f.source.name != name))
         added = bar.length_mm - without.bar(motion).length_mm
@@ -183,6 +190,12 @@ def _samples(
         whole[motion.kept],
         bar.sensitivity.response.per_strut[motion.kept],
     )
+
+
+def _warmer_k(calibration: Calibration, name: str, motion: Motion) -> NDArray[np.float64]:
+    """What the thermometers rose that a source follows, shape (n, 1) or (n, 6) [K]."""
+    own = (t.source for t in calibration.layout.terms if t.source.name == name)
+    return next(source.warmer_k(motion) for source in own if isinstance(source, FollowsTemperature))
 
 
 def _branches(sense: NDArray[np.float64], *, signed: bool) -> list[tuple[str, NDArray[np.bool_]]]:

@@ -100,7 +100,7 @@ def judge(
             beside = on_joint[candidate.name]
             variant, gain = rest.best_variant(beside, [])
             variant = beside.whole(variant)
-            values = _best_values(source, channel.machine, rest, variant)
+            values = _best_values(joint.source_of(source.name, variant), channel.machine, rest, variant)
             seen = testable(rest, variant, [])
             verdict = Verdict.RULED_OUT if seen else Verdict.NOT_TESTABLE
             verdict = Verdict.AMBIGUOUS if alike else verdict
@@ -134,7 +134,8 @@ def _likenesses(
     likes: dict[str, list[str]] = {}
     for choice in chosen:
         own = choice.candidate.name
-        lawful = [c for c in channel.named if {sources[own].varies_with, sources[c.name].varies_with} == {"time"}]
+        follows = channel.source_of(own, choice.variant).varies_with
+        lawful = [c for c in channel.named if {follows, sources[c.name].varies_with} == {"time"}]
         others = [c for c in channel.named if c not in lawful]
         alike = as_good(race, chosen, choice, others, AS_GOOD)
         if lawful:
@@ -200,13 +201,16 @@ def doubted(
         sources: by name.
     """
     said = [f for f in findings if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}]
+    follows = {f.name: sources[f.name].varies_with for f in said}
+    grows = [f for f in said if follows[f.name] in {"time", "temperature"} and f.gain > AS_GOOD]
+    first = max(grows, key=lambda f: f.gain, default=None)
     variable = variable_of(rest.variable) if rest.variable else ""
-    of_it = {f.name for f in said if variable and sources[f.name].varies_with == variable}
-    if len(of_it) > 1:
+    of_it = {name for name, own in follows.items() if variable and own == variable}
+    # A law over time may be another one; thermometers are what they are, only coarse.
+    lawful = first is None or follows[first.name] == "time"
+    if lawful and len(of_it) > 1:
         return _not_beside(findings, of_it, f"What is left follows {variable} too, so it")
-    lawful = [f for f in said if sources[f.name].varies_with == "time" and f.gain > AS_GOOD]
-    first = max(lawful, key=lambda f: f.gain, default=None)
-    little = {f.name for f in lawful if first is not None and f.gain < MAKES_UP * first.gain}
+    little = {f.name for f in grows if first is not None and f.gain < MAKES_UP * first.gain}
     if first is None or not little:
         return tuple(findings)
     return _not_beside(findings, little, f"It brings little beside {first.name}, so it", (first.name,))

@@ -11,14 +11,13 @@ from dbbstation.calibration.summary import identified_model
 from dbbstation.errors import MachineError
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.uncertainty import position_uncertainty_mm
-from dbbstation.sources.contract import Motion, Need
+from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
     from dbbstation.machine.geometry import Machine
-    from dbbstation.model.machine_model import MachineModel
 
 REACH = 0.6
 """Share of the travel about its middle that is looked at; the corners beyond are hardly used."""
@@ -27,9 +26,6 @@ TILTS_DEG = ((0.0, 0.0), (15.0, 0.0), (-15.0, 0.0), (0.0, 15.0), (0.0, -15.0))
 
 STEPS = 5
 """Places along each axis."""
-
-ANYWHERE = frozenset({Need.POSE})
-"""What a source may need to be known away from any path or time."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +56,13 @@ def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError |
     if len(poses) == 0:
         return None
     motion = Motion(poses)
-    was, now = (_anywhere(c.model).actual_poses(motion)[:, :3] for c in (before, after))
+    was, now = (c.model.anywhere().actual_poses(motion)[:, :3] for c in (before, after))
     apart = was - now
     apart = apart - apart.mean(axis=0)
     length = np.linalg.norm(apart, axis=1)
     worst = int(np.argmax(length))
     identified = identified_model(after, {}, {})
-    identified = replace(identified, model=_anywhere(identified.model))
+    identified = replace(identified, model=identified.model.anywhere())
     own = np.linalg.norm(position_uncertainty_mm(identified, motion), axis=1)
     return WorkspaceError(
         rms_um=1e3 * _rms(length),
@@ -95,11 +91,6 @@ def _reachable(machine: Machine, pose: NDArray[np.float64]) -> bool:
     except MachineError:
         return False
     return True
-
-
-def _anywhere(model: MachineModel) -> MachineModel:
-    own = model.of_the_machine()
-    return replace(own, sources=tuple(f for f in own.sources if f.source.needs <= ANYWHERE))
 
 
 def _rms(values: NDArray[np.float64]) -> float:

@@ -117,6 +117,9 @@ class _Sources:
 
     def _with_values(self, location: Location, entry: SourceSchema, source: ErrorSource, shared: str) -> Fitted | None:
         try:
+            logged = source.by_temperature()
+            if logged is not None and entry.parameters.keys() == {p.name for p in logged.parameters(self._machine)}:
+                source = logged
             parameters = source.parameters(self._machine)
         except ModelError as error:
             self._fault((*location, "name"), error.what, error.remedy)

@@ -51,6 +51,11 @@ class MachineModel:
         """Return the model with the machine's own sources only: what holds for any program."""
         return replace(self, sources=tuple(f for f in self.sources if f.source.belongs_to is Owner.MACHINE))
 
+    def anywhere(self) -> MachineModel:
+        """Return the model with what holds at any pose, whatever the way there, the time and the temperature."""
+        own = self.of_the_machine()
+        return replace(own, sources=tuple(f for f in own.sources if f.source.needs <= {Need.POSE}))
+
     def effect(self, motion: Motion, there: Actual | None = None) -> Effect:
         """All sources together, but for those of motor currents, which change nothing else.
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.sources import by_temperature
+from dbbstation.sources.by_temperature import FollowsTemperature
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
@@ -36,7 +38,7 @@ class BarDrift(ErrorSource):
         "steel of 150 mm reads 1.6 µm more or less per kelvin.",
         cure="Lay bar and calibrator on the machine table an hour before; touch the bar with gloves only; put it on the "
         "calibrator between the tests.",
-        equation=f"reading = distance + g(t), g = {EQUATION}",
+        equation=f"reading = distance + g(t), g = {EQUATION}; {by_temperature.EQUATION}",
         origin=ORIGIN,
     )
 
@@ -62,3 +64,18 @@ class BarDrift(ErrorSource):
         """
         self.require(motion)
         return Effect(reading_mm=MM_PER_UM * grown_by(motion, values))
+
+    def by_temperature(self) -> ErrorSource:
+        """The bar by the thermometer in it."""
+        return _ByTemperature()
+
+
+class _ByTemperature(FollowsTemperature, cause=BarDrift):
+    """reading = distance + c (T - T_0)."""
+
+    thermometers = (("bar",),)
+    growth = Parameter("drift_um_k", "µm/K", 1.6, "drift of the reading for each kelvin that the bar is warmer")
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Drift per unit."""
+        return Effect(reading_mm=MM_PER_UM * self.warmer_k(motion))

@@ -63,6 +63,19 @@ class SetUpErrors:
     uncertainty_mm: float
 
 
+@dataclass(frozen=True, eq=False)
+class Thermometer:
+    """One thermometer over a session.
+
+    Attributes:
+        time_s: on the clock of `Motion.time_s`, rising, shape (q,) [s].
+        degc: what it showed, what it rounds off smoothed, shape (q,) [degC].
+    """
+
+    time_s: NDArray[np.float64]
+    degc: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class Setup:
     """How a run was set up: which ball, which mounting, which bar, and how well each is known.
@@ -87,6 +100,7 @@ class Setup:
             zero where angles were recorded [deg].
         moving_s: beginning and end of every run of the session, in order, on the clock of `Motion.time_s` [s]; empty
             where nobody noted them.
+        thermometers: what each of them showed over the session, by the name of its column without the unit.
     """
 
     session: str
@@ -103,6 +117,7 @@ class Setup:
     run: str = ""
     start_uncertainty_deg: float = 0.0
     moving_s: tuple[tuple[float, float], ...] = ()
+    thermometers: Mapping[str, Thermometer] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,6 +316,13 @@ class ErrorSource(ABC):
         """Standard deviations, shape (p,), that plan and session state for this motion's set; None: not stated.
 
         A stated size makes the set a random effect of the fit.
+        """
+        return None
+
+    def by_temperature(self) -> ErrorSource | None:
+        """Return the same cause in the form that follows logged temperatures; None where it knows none.
+
+        It has the same name and other parameters; a model has one of the two.
         """
         return None
 

@@ -6,15 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.sources.by_temperature import STEEL_UM_M_K
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
-
-STEEL_UM_M_K = 11.5
-"""Thermal expansion of plate, holders and risers where the jig file states none [µm/(m K)]."""
 
 MM_PER_UM_M = 1e-6
 """One µm/m in mm/mm."""
@@ -53,5 +51,6 @@ class JigThermal(LinearSource):
         if setup is None or setup.plate is None:
             return Effect(fixed_ball_mm=np.zeros((3, 1)))
         stated = setup.plate.expansion_um_m_k
+        # Plate, holders and risers are of steel where the jig file does not say otherwise.
         per_kelvin = MM_PER_UM_M * (STEEL_UM_M_K if stated is None else stated)
         return Effect(fixed_ball_mm=per_kelvin * (setup.fixed_ball_mm - setup.plate.origin_mm)[:, None])

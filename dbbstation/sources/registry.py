@@ -30,7 +30,8 @@ def known_sources() -> Mapping[str, ErrorSource]:
         content = importlib.import_module(f"dbbstation.sources.{module.name}")
         for _, member in getmembers(content, isclass):
             own = member.__module__ == content.__name__
-            if own and issubclass(member, ErrorSource) and not isabstract(member):
+            public = own and not member.__name__.startswith("_")  # those are other forms of a source
+            if public and issubclass(member, ErrorSource) and not isabstract(member):
                 found[member.name] = member()
     return MappingProxyType(dict(sorted(found.items())))
 

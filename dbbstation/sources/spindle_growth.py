@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.sources import by_temperature
+from dbbstation.sources.by_temperature import MACHINE, FollowsTemperature
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
@@ -45,7 +47,7 @@ class SpindleGrowth(ErrorSource):
         "time and speed as in the measurement.",
         cure="Measure with the spindle at rest and cool; else let it warm up at working speed first, or enter its growth "
         "as a tool length that follows the spindle's temperature.",
-        equation=f"tool tip moves along -z of the platform by g(t) + begun a, g(t) = {EQUATION}",
+        equation=f"tool tip moves along -z of the platform by g(t) + begun a, g(t) = {EQUATION}; {by_temperature.EQUATION}",
         origin=f"thermal distortion caused by a rotating spindle, ISO 230-3; {ORIGIN}",
     )
 
@@ -79,3 +81,20 @@ class SpindleGrowth(ErrorSource):
         law[:, 0] += percent / 100.0
         by = MM_PER_UM * np.column_stack([law, np.full(len(law), growth / 100.0)])
         return Effect(tool_tip_mm=_OUT_OF_THE_SPINDLE[:, None] * by[:, None, :])
+
+    def by_temperature(self) -> ErrorSource:
+        """The spindle by the machine's thermometer."""
+        return _ByTemperature()
+
+
+class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):
+    """The tool tip moves out of the spindle by c (T - T_0); no column of a recording is a thermometer of its own."""
+
+    thermometers = (MACHINE,)
+    growth = Parameter(
+        "growth_um_k", "µm/K", 3.0, "way of the tool tip out of the spindle for each kelvin of the machine"
+    )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shift of the tool tip per unit."""
+        return Effect(tool_tip_mm=(MM_PER_UM * self.warmer_k(motion) * _OUT_OF_THE_SPINDLE)[..., None])

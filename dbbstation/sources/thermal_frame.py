@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.sources import by_temperature
+from dbbstation.sources.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
@@ -38,7 +40,7 @@ class ThermalFrame(ErrorSource):
         "half hour over a morning.",
         cure="Let machine and shop come to rest before measuring; keep the sun and warm air off the frame; repeat early "
         "tests at the end, so that the drift does not mix with the height of the ball.",
-        equation=f"dQ_i = Q_i g(t), g = {EQUATION}",
+        equation=f"dQ_i = Q_i g(t), g = {EQUATION}; {by_temperature.EQUATION}",
         origin=ORIGIN,
     )
 
@@ -65,6 +67,23 @@ class ThermalFrame(ErrorSource):
         self.require(motion)
         law = grown_by(motion, values)
         return Effect(base_joint_mm=_per_growth_mm(machine)[:, :, None] * law[:, None, None, :])
+
+    def by_temperature(self) -> ErrorSource:
+        """The base plate by the thermometer on it."""
+        return _ByTemperature()
+
+
+class _ByTemperature(FollowsTemperature, cause=ThermalFrame):
+    """dQ_i = Q_i c (T - T_0)."""
+
+    thermometers = (MACHINE,)
+    growth = Parameter(
+        "growth_um_m_k", "µm/(m K)", STEEL_UM_M_K, "growth of the base for each kelvin that it is warmer"
+    )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shift of each base joint per unit."""
+        return Effect(base_joint_mm=(self.warmer_k(motion)[:, :, None] * _per_growth_mm(machine))[..., None])
 
 
 def _per_growth_mm(machine: Machine) -> NDArray[np.float64]:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
+from dbbstation.sources import by_temperature
+from dbbstation.sources.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
@@ -41,7 +44,7 @@ class ThermalStruts(ErrorSource):
         "start. A thermometer on a strut shows about 1 K for each 11 µm/m of steel.",
         cure="Let the machine warm up with a movement like that of the measurement before it starts; repeat early "
         "tests at the end, so that the drift does not mix with the height of the ball.",
-        equation=f"actual minus driven length = L_i g(t), g = {EQUATION}",
+        equation=f"actual minus driven length = L_i g(t), g = {EQUATION}; {by_temperature.EQUATION}",
         origin=ORIGIN,
     )
 
@@ -68,8 +71,27 @@ class ThermalStruts(ErrorSource):
         per_growth = self._per_growth_mm(motion, machine)
         return Effect(strut_mm=per_growth[:, :, None] * grown_by(motion, values)[:, None, :])
 
+    def by_temperature(self) -> ErrorSource:
+        """Struts that follow the thermometers on them."""
+        return _ByTemperature()
+
     def _per_growth_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
-        """Growth of every strut per µm/m, shape (n, 6) [mm]."""
         self.require(motion)
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        return MM_PER_UM_M * inverse(machine.hexapod, frames).length_mm
+        return _per_growth_mm(motion, machine)
+
+
+class _ByTemperature(FollowsTemperature, cause=ThermalStruts):
+    """dL_i = L_i c (T_i - T_i0): each strut by its own thermometer, or all by the machine's."""
+
+    thermometers = (tuple(f"strut{k + 1}" for k in range(STRUTS)), MACHINE)
+    growth = Parameter("growth_um_m_k", "µm/(m K)", STEEL_UM_M_K, "growth of a strut for each kelvin that it is warmer")
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Growth of each strut per unit."""
+        return Effect(strut_mm=(self.warmer_k(motion) * _per_growth_mm(motion, machine))[:, :, None])
+
+
+def _per_growth_mm(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    """Growth of every strut per µm/m, shape (n, 6) [mm]."""
+    frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+    return MM_PER_UM_M * inverse(machine.hexapod, frames).length_mm

@@ -133,6 +133,7 @@ def random_run(rng, count=300) -> Motion:
         time_s=time_s,
         setup=setup,
         reading_mm=reading,
+        temperature_degc=dict.fromkeys(("bar", "machine"), 20.0 + time_s / 2000.0),
         motor_current_a=np.zeros((count, 6)),
     )
 

@@ -14,8 +14,11 @@ from dbbstation.sources.contract import Fitted, Owner
 from dbbstation.sources.registry import known_sources
 from tests.sources.runs import random_run
 
+SOURCES = list(known_sources().values())
+SOURCES += [form for source in SOURCES if (form := source.by_temperature()) is not None]
 
-@pytest.mark.parametrize("source", known_sources().values(), ids=lambda s: s.name)
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda s: f"{s.name} by {s.varies_with}")
 def test_a_source_survives_the_model_file(tmp_path, rng, source):
     machine = read_machine(shipped_folder("fixtures") / "machines" / "every-key.yaml")
     parameters = source.parameters(machine)
@@ -28,7 +31,7 @@ def test_a_source_survives_the_model_file(tmp_path, rng, source):
     write_model(tmp_path / "model.yaml", model)
     read = read_model(tmp_path / "model.yaml", known_sources())
     (fitted,) = read.model.sources
-    assert (fitted.source, fitted.shared) == (source, shared)
+    assert (type(fitted.source), fitted.shared) == (type(source), shared)
     assert np.array_equal(fitted.values, values)
     assert read.covariance_rows == rows
     assert np.array_equal(read.covariance, model.covariance)

@@ -78,12 +78,18 @@ class SpindleGrowth(Mechanism):
 
     warming: Warming = SPINDLE_WARMING
     growth_um_k: float = 3.0
+    logged: bool = False
 
     def tool_ball_mm(self, motion: Motion, platform: Platform) -> FloatArray:
         """Down along the platform's own Z `(n, 3)`."""
         del platform
         growth_mm = self.growth_um_k / 1000.0 * self.warming.excess_k(motion)
         return growth_mm[:, None] * np.array([0.0, 0.0, -1.0])
+
+    def columns(self, motion: Motion, platform: Platform) -> dict[str, FloatArray]:
+        """The machine's temperature near the spindle [degC], if somebody logs it."""
+        del platform
+        return {"machine_temp_c": motion.scene.ambient_temp_c + self.warming.excess_k(motion)} if self.logged else {}
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,25 @@ class Warming:
         return times_s, excess_k + self.start_k * np.exp(-(times_s - times_s[0]) / slowest_s)
 
 
+@dataclass(frozen=True)
+class Shop(Warming):
+    """A part that follows the air of the shop: it swings with a period, and a door that opened lets it fall.
+
+    `rise_k` is the swing's amplitude, `time_constant_s` that of the fall.
+    """
+
+    period_s: float = 5400.0
+    door_s: float = 2500.0
+    door_k: float = -1.5
+
+    def history(self, scene: Scene, until_s: float) -> tuple[FloatArray, FloatArray]:
+        """Session times and temperatures, `(m,)` each, on a fine grid."""
+        times_s = np.arange(-self.head_start_s, max(until_s, scene.end_s) + 2 * GRID_S, GRID_S)
+        swing = self.rise_k * np.sin(2.0 * np.pi * times_s / self.period_s)
+        since_s = np.maximum(times_s - self.door_s, 0.0)
+        return times_s, self.start_k + swing + self.door_k * -np.expm1(-since_s / self.time_constant_s)
+
+
 def _followed_steps(values: FloatArray, time_constant_s: float) -> FloatArray:
     """Exact first-order response `(m,)` to an input `(m,)` constant within each second, from rest."""
     kept = np.exp(-GRID_S / time_constant_s)

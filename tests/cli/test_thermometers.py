@@ -1,0 +1,54 @@
+"""A frame that follows the shop, from recordings with a temperature column: fitted, kept, evaluated, refused elsewhere."""
+
+from __future__ import annotations
+
+import pytest
+
+from dbbstation.cli import FAILED
+from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.mechanisms.thermal import ThermalFrame
+from tests.plant.mechanisms.warming import Shop
+from tests.plant.session import record
+
+SHOP = Shop(rise_k=1.2, time_constant_s=900.0)
+SOURCES = "strut-reference-length,base-joints,thermal-frame"
+
+
+@pytest.fixture(scope="module")
+def sessions(tmp_path_factory):
+    """The same machine with a thermometer and without."""
+    folder = tmp_path_factory.mktemp("shop")
+    for name in ("logged", "bare"):
+        frame = ThermalFrame(SHOP, logged=name == "logged")
+        record(folder / name, seed=19, mechanisms=[RandomKinematics(), frame], rate_hz=5.0)
+    return folder
+
+
+def test_calibrate_follows_the_thermometer_and_keeps_its_form(run, sessions, tmp_path):
+    model, poses = tmp_path / "model.yaml", tmp_path / "poses.csv"
+    called = run("calibrate", sessions / "logged", "--sources", SOURCES, "--out", model, "--json")
+    assert called.code == 0
+    assert "note: thermal-frame follows the logged temperatures, not a law over time" in called.err
+    (frame,) = (s for s in called.data["sources"] if s["name"] == "thermal-frame")
+    growth = frame["parameters"]["growth_um_m_k"]
+    assert growth["unit"] == "µm/(m K)"
+    assert growth["value"] == pytest.approx(11.5, abs=4.0 * growth["uncertainty"])
+    again = run("evaluate", sessions / "logged", "--model", model, "--json")
+    assert again.code == 0
+    assert again.data["residual_rms_um"] == pytest.approx(called.data["residual_rms_um"], rel=1e-6)
+    assert (
+        "(without thermal-frame: no pose alone says what they do)"
+        in run("evaluate", sessions / "logged", "--model", model).out
+    )
+    poses.write_text("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n0,0,-1008,0,0,0\n")
+    refused = run("predict", "--model", model, "--poses", poses, "--out", tmp_path / "actual.csv")
+    assert refused.code == FAILED
+    assert "thermal-frame needs temperature" in refused.err
+
+
+def test_calibrate_takes_the_law_over_time_without_one(run, sessions):
+    called = run("calibrate", sessions / "bare", "--sources", SOURCES, "--json")
+    assert called.code == 0
+    assert "logged temperatures" not in called.err
+    (frame,) = (s for s in called.data["sources"] if s["name"] == "thermal-frame")
+    assert set(frame["parameters"]) == {"growth_um_m", "time_constant_s", "pause_loss_um_m"}

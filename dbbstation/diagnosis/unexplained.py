@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from scipy.special import chdtrc
+
 from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Verdict
 from dbbstation.diagnosis.unexplained_curve import curve_of
 from dbbstation.diagnosis.unnamed import unnamed
@@ -34,6 +36,10 @@ pull 0.93 to 0.99, where joints stand in for it; of joints that really are off 0
 CLEARLY_MORE = 1.1
 """Times the evidence of an unnamed curve from which on several names are no patchwork in its place: up to 1.09 where the cause was
 on no list."""
+
+NEARLY, LEAVES, BY_CHANCE = 0.7, 0.1, 2e-3
+"""An unnamed shape brings this share of the names' evidence at least, and explains this share of what they explain beside them,
+where chance does so this seldom: of names that were right it was never more than one in fifty, of wrong ones 1e-3 and less."""
 
 SHAPE_THRESHOLD = 8.0
 """Log evidence that an unnamed shape must bring, what picking it from many costs taken off. A misfit of the low harmonics
@@ -94,9 +100,13 @@ def unexplained(
     best = of.best()
     overrules = bool(named) and _overrules(race, named, of, best)
     if named and not overrules:
-        # The names stand; what is left beside them is looked at about the joint fit.
-        of = unnamed(after, left.noise)
-        best = of.best()
+        beside = unnamed(after, left.noise)
+        rival = _rival(race, named, of, beside)
+        if rival is None:
+            # The names stand; what is left beside them is looked at about the joint fit.
+            of, best = beside, beside.best()
+        else:
+            overrules, best = True, rival
     told = first if overrules else left
     misfit, rms_um = told.probability < significant, 1e3 * told.rms
     if best.gain < SHAPE_THRESHOLD:
@@ -141,12 +151,37 @@ def _overrules(race: Race, named: Sequence[Variant], of: Unnamed, best: Best) ->
     return False
 
 
+def _rival(race: Race, named: Sequence[Variant], of: Unnamed, beside: Unnamed) -> Best | None:
+    """Shape that does nearly as well as what has a name, and that the names leave something to: they are the nearest ones only.
+
+    Beside a name that is right a shape that resembles it explains what chance lets it. What a rough law leaves beside a loud
+    cause is little of the whole. Shapes that were picked from many forms explain something of any noise.
+
+    Args:
+        race: of the named sources.
+        named: what was chosen.
+        of: shapes about the base fit.
+        beside: the same about the joint fit.
+    """
+    whole, evidence = race.explained(named), race.evidence(named)
+    usual = {(s.name, s.strut): variant for s, variant in beside.shapes if s.tried == 1.0}
+    found = []
+    for best in of.each:
+        variant = usual.get((best.shape.name, best.shape.strut)) if best.shape.tried == 1.0 else None
+        if variant is None or best.gain < max(SHAPE_THRESHOLD, NEARLY * evidence):
+            continue
+        left = beside.race.explained([variant])
+        if left > LEAVES * whole and chdtrc(len(variant.columns), left) < BY_CHANCE:
+            found.append(best)
+    return max(found, key=lambda best: best.gain, default=None)
+
+
 def _imitates(race: Race, named: Sequence[Variant], best: Best) -> bool:
     """Whether a source of many amplitudes only imitates an error that has no name.
 
     It can follow nearly anything that is smooth in the pose. It has to bring more evidence than an unnamed curve of no
     more amplitudes, clearly. Where such a curve brings about as much, it has to leave nothing that others have to make up for,
-    too: what they then bring is little beside it.
+    too: what they then bring is little beside it, and all together bring little more than the curve.
     """
     first = named[0]
     if len(first.columns) < FLEXIBLE:
@@ -154,5 +189,6 @@ def _imitates(race: Race, named: Sequence[Variant], best: Best) -> bool:
     alone = race.evidence([first])
     if len(best.variant.columns) <= len(first.columns) and best.gain > AS_MUCH * alone:
         return True
-    beside = race.evidence(named) - alone
-    return len(named) > 1 and beside < MADE_UP_FOR * alone and best.gain > ABOUT_AS_MUCH * alone
+    together = race.evidence(named)
+    helped = len(named) > 1 and together - alone < MADE_UP_FOR * alone and together < CLEARLY_MORE * best.gain
+    return helped and best.gain > ABOUT_AS_MUCH * alone

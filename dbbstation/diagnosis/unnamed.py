@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,7 +63,12 @@ class Unnamed:
     runs: tuple[Samples, ...]
 
     def best(self) -> Best:
-        """Return the shape of the greatest evidence.
+        """Return the shape of the greatest evidence."""
+        return max(self.each, key=lambda best: best.gain)
+
+    @cached_property
+    def each(self) -> tuple[Best, ...]:
+        """All shapes, each at its best size.
 
         One that was picked from many forms shares its chance with all of them, and all sizes are as likely.
         """
@@ -71,7 +77,7 @@ class Unnamed:
             gains = self.race.gains(usual, SIZES)
             gain = together(gains) - float(np.log(shape.tried))
             found.append(Best(shape, usual.scaled(SIZES[int(gains.argmax())]), gain))
-        return max(found, key=lambda best: best.gain)
+        return tuple(found)
 
 
 def unnamed(calibration: Calibration, noise_mm: float) -> Unnamed:

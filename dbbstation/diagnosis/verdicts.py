@@ -42,6 +42,10 @@ MAKES_UP = 0.2
 """Share of another's evidence below which a source that grows with time may only make up for its law: a warm-up in two stages
 calls for a second source with a seventh of what the first brings."""
 
+ROUGHLY = 0.025
+"""Share of the evidence of a source of a rough law below which any other may only make up for it: beside single causes, ten times
+as large as what is just seen, up to 0.022."""
+
 CROWD = 3
 """Causes at once that are more than happens."""
 
@@ -193,7 +197,8 @@ def doubted(
 
     A warm-up in two stages, for instance: another source that follows the same variable is then called in to make up for
     that. Where this variable still organises what is left, each of them stands, but not beside the others. Where all is
-    explained, but of what grows with time one source brings little beside another, that one is in doubt.
+    explained, but of what grows with time one source brings little beside another, that one is in doubt; and so is any that
+    brings very little beside a loud one whose law is rough.
 
     Args:
         findings: as judged.
@@ -211,9 +216,14 @@ def doubted(
     if lawful and len(of_it) > 1:
         return _not_beside(findings, of_it, f"What is left follows {variable} too, so it")
     little = {f.name for f in grows if first is not None and f.gain < MAKES_UP * first.gain}
-    if first is None or not little:
+    if first is not None and little:
+        findings = _not_beside(findings, little, f"It brings little beside {first.name}, so it", (first.name,))
+    loud = max((f for f in said if sources[f.name].rough), key=lambda f: f.gain, default=None)
+    if loud is None:
         return tuple(findings)
-    return _not_beside(findings, little, f"It brings little beside {first.name}, so it", (first.name,))
+    beside = [f for f in said if f.name not in {loud.name, *loud.ambiguous_with} and f.gain > AS_GOOD]
+    faint = {f.name for f in beside if f.gain < ROUGHLY * loud.gain}
+    return _not_beside(findings, faint, f"It brings very little beside {loud.name}, so it", (loud.name,))
 
 
 def _not_beside(

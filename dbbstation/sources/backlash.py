@@ -37,6 +37,7 @@ class Backlash(ErrorSource):
     belongs_to = Owner.MACHINE
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-speed-sign"
+    rough = True
     texts = Texts(
         what="A strut's drive has play, or winds up against friction, each time the strut turns from growing to "
         "shrinking.",

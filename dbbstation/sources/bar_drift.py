@@ -29,6 +29,7 @@ class BarDrift(ErrorSource):
     belongs_to = Owner.INSTRUMENT
     needs = frozenset({Need.TIME})
     varies_with = "time"
+    rough = True
     texts = Texts(
         what="The bar itself changes its length while it warms up or cools down after having been handled. The drift "
         "given is counted from the first sample of the session.",

@@ -278,6 +278,9 @@ class ErrorSource(ABC):
     needs: ClassVar[frozenset[Need]] = frozenset({Need.POSE})
     varies_with: ClassVar[str] = ""
     """Variable that organises its misfit, as printed beside a place; empty where there is no single one."""
+    rough: ClassVar[bool] = False
+    """True for a law that machines follow only roughly, as friction and warm-ups are: what little others bring beside it may
+    only make up for that."""
     weighs: ClassVar[bool] = False
     """True for what weights do, which a model asks for at the poses and joints that the machine really has."""
     loads_struts: ClassVar[bool] = False

@@ -48,6 +48,7 @@ class JointFriction(LinearSource):
     belongs_to = Owner.MACHINE
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "joint-angle-speed-sign"
+    rough = True
     texts = Texts(
         what="The joints at the base turn heavily. Friction drags at the platform against its movement, and the struts "
         "stretch under that.",

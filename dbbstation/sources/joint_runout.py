@@ -51,6 +51,7 @@ class JointRunout(LinearSource):
     name = "joint-runout"
     belongs_to = Owner.MACHINE
     varies_with = "joint-angle"
+    rough = True
     texts = Texts(
         what="A joint is not a point: the two axes of a universal joint do not meet, or the ball of a ball joint is oval.",
         shows="Circles shifted and deformed by a few micrometres, the same in both directions, growing with the square "

@@ -44,6 +44,7 @@ class Play(ErrorSource):
     belongs_to = Owner.MACHINE
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-force"
+    rough = True
     texts = Texts(
         what="Nut, bearing or joint of a strut has play that the platform's weight keeps closed. Where the force in the "
         "strut changes from pull to push, the strut gives way by the play.",

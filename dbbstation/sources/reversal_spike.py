@@ -46,6 +46,7 @@ class ReversalSpike(ErrorSource):
     belongs_to = Owner.MACHINE
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-speed-sign"
+    rough = True
     texts = Texts(
         what="A strut sticks for a moment when it turns from growing to shrinking or back, until the position loop has "
         "raised the motor's torque by twice the friction.",

@@ -38,6 +38,7 @@ class SpindleGrowth(ErrorSource):
     belongs_to = Owner.MACHINE
     needs = frozenset({Need.TIME})
     varies_with = "time"
+    rough = True
     texts = Texts(
         what="The spindle and its nose warm up and push the tool out of the platform. The growth given is counted from "
         "the first sample of the session; begun says how much of it was there already, against the cold spindle.",

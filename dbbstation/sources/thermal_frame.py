@@ -31,6 +31,7 @@ class ThermalFrame(ErrorSource):
     belongs_to = Owner.MACHINE
     needs = frozenset({Need.TIME})
     varies_with = "time"
+    rough = True
     texts = Texts(
         what="The base plate that carries the struts warms up while the machine works, or with the shop, and grows. The "
         "growth given is counted from the first sample of the session.",

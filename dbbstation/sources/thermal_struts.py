@@ -35,6 +35,7 @@ class ThermalStruts(ErrorSource):
     belongs_to = Owner.MACHINE
     needs = frozenset({Need.POSE, Need.TIME})
     varies_with = "time"
+    rough = True
     texts = Texts(
         what="The struts' screws warm up while the machine works and grow, quickly at first and then ever more slowly. "
         "The growth given is counted from the first sample of the session.",

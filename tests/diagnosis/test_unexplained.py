@@ -22,7 +22,7 @@ from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import known_sources, sources_named
 from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.kinematics import RandomKinematics
-from tests.plant.mechanisms.outsiders import DentedScrew, OddGearWobble
+from tests.plant.mechanisms.outsiders import DentedScrew, OddGearWobble, SoftFloor
 from tests.plant.session import record
 
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
@@ -216,3 +216,14 @@ def test_the_summary_has_the_curve(hollow):
     curve = diagnosis_summary(hollow[1], {})["unexplained"]["curve"]
     assert {"variable", "unit", "strut", "points"} <= set(curve)
     assert set(curve["points"][0]) == {"at", "value_um", "uncertainty_um"}
+
+
+@pytest.mark.parametrize(("seed", "lean_urad_mm"), [(7, 0.012), (3, 0.008)])
+def test_a_floor_that_hardly_gives_way_is_not_called_by_the_nearest_name(tmp_path, seed, lean_urad_mm):
+    """An elastic base explains most of it, and leaves the rest to a table that tips over."""
+    record(tmp_path / "s", seed=seed, mechanisms=[KINEMATICS, SoftFloor(lean_urad_mm)], rate_hz=10.0)
+    recorded = load_sessions([tmp_path / "s"])
+    names = ["gravity", "cog-shift", "base-compliance", "strut-weight", "bar-drift", "jig-thermal", "platform-joints"]
+    found = diagnose(recorded.machine, recorded.observations, sources_named(names))
+    assert not [f.name for f in found.sources if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}]
+    assert found.unexplained.variable == "position of the platform of the table"

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from dbbstation.diagnosis.drive.contract import Texts as DriveTexts
-    from dbbstation.sources.contract import Texts
+    from dbbstation.texts import Texts
 
 NOT_PUBLIC = {"cli", "tui", "studies", "__main__"}
 """Top-level modules that nobody imports: commands, screens, experiments."""
@@ -152,7 +151,7 @@ def _drive_sources() -> str:
     return "\n".join(lines)
 
 
-def _texts(name: str, texts: Texts | DriveTexts, facts: str) -> list[str]:
+def _texts(name: str, texts: Texts, facts: str) -> list[str]:
     return [
         f"## {name}",
         "",

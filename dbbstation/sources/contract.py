@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from dbbstation.errors import ModelError
+from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -199,27 +200,6 @@ class Parameter:
         """Strut that it is of, 1 to 6, as `strut_3_um` and `joint_3_x_mm` say; None where it is of none."""
         named = re.match(r"(?:strut|joint)_([1-6])_", self.name)
         return int(named.group(1)) if named else None
-
-
-@dataclass(frozen=True)
-class Texts:
-    """What a source says of itself to people.
-
-    Attributes:
-        what: what it is.
-        shows: how it shows in circular tests.
-        confirm: how to confirm it on the machine.
-        cure: how to cure it.
-        equation: the equation, in words or symbols.
-        origin: where the equation comes from.
-    """
-
-    what: str
-    shows: str
-    confirm: str
-    cure: str
-    equation: str
-    origin: str
 
 
 @dataclass(frozen=True)

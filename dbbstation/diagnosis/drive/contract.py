@@ -11,6 +11,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
+from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
@@ -35,27 +37,6 @@ class Parameter:
     unit: str
     plausible: float
     meaning: str
-
-
-@dataclass(frozen=True)
-class Texts:
-    """What a cause says of itself to people.
-
-    Attributes:
-        what: what it is.
-        shows: how it shows in a recording of force and position.
-        confirm: how to confirm it on the drive.
-        cure: how to cure it.
-        equation: the equation, in words or symbols.
-        origin: where the equation comes from.
-    """
-
-    what: str
-    shows: str
-    confirm: str
-    cure: str
-    equation: str
-    origin: str
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +60,17 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
     observations: list[Observation] = []
     warnings: list[str] = []
     problems: list[Problem] = []
+    logs: dict[str, list[tuple[float, Recording]]] = {}
     for session in sessions:
         wanted = [run for run in session.in_state(RunState.ACCEPTED) if run.test not in exclude]
         unjudged = session.in_state(RunState.COMPLETE, RunState.RECORDING)
         warnings += [f"{session.name}: run {run.label} is {run.state}, not accepted: left out" for run in unjudged]
+        logs[session.name] = _left_out(session, exclude)
         for run, read in zip(wanted, session.load_all(wanted), strict=True):
             warnings += [str(warning) for warning in read.warnings]
+            began = session.started_s(run)
+            if began is not None:
+                logs[session.name].append((began, read.recording))
             try:
                 raw = cut(replace(read.recording, name=str(run.path)), session.circle(run))
                 observations.append(_observation(session, run, raw))
@@ -79,7 +84,7 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
     if not observations:
         places = ", ".join(str(session.folder) for session in sessions)
         raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
-    observations = _with_thermometers(_with_shared_balls(observations, sessions))
+    observations = _with_thermometers(_with_shared_balls(observations, sessions), logs)
     hashes = {session.name: session.sha256 for session in sessions}
     return Recorded(sessions[0].machine, tuple(observations), hashes, tuple(warnings))
 
@@ -122,23 +127,46 @@ def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[S
     return shared
 
 
-def _with_thermometers(observations: Sequence[Observation]) -> list[Observation]:
-    """Tell every run what the thermometers of its session showed in all of them, where their times are known."""
-    runs: dict[str, list[tuple[float, RawCircle]]] = {}
-    for one in observations:
-        if one.started_s is not None:
-            runs.setdefault(one.setup.session, []).append((one.started_s, one.raw))
-    of = {session: _thermometers(sorted(own, key=itemgetter(0))) for session, own in runs.items()}
+def _with_thermometers(
+    observations: Sequence[Observation], logs: Mapping[str, Sequence[tuple[float, Recording]]]
+) -> list[Observation]:
+    """Tell every run what the thermometers of its session showed in all runs: those that all runs in use have.
+
+    Args:
+        observations: runs in use.
+        logs: of each session, when runs began [s] and what they hold, those that were left out too: leaving one out must
+            not change where growth is counted from.
+    """
+    of = {}
+    for session, runs in logs.items():
+        names = [set(o.raw.temperature_degc) for o in observations if o.setup.session == session]
+        of[session] = {
+            name: Thermometer(
+                *logged_curve(
+                    [
+                        (began + log.t_s, log.temperature_degc[name])
+                        for began, log in runs
+                        if name in log.temperature_degc
+                    ]
+                )
+            )
+            for name in sorted(set.intersection(*names) if names else set[str]())
+        }
     return [replace(o, setup=replace(o.setup, thermometers=of.get(o.setup.session, {}))) for o in observations]
 
 
-def _thermometers(runs: Sequence[tuple[float, RawCircle]]) -> dict[str, Thermometer]:
-    names = {name for _, raw in runs for name in raw.temperature_degc}
-    logged = {
-        name: [(began + raw.t_s, raw.temperature_degc[name]) for began, raw in runs if name in raw.temperature_degc]
-        for name in sorted(names)
-    }
-    return {name: Thermometer(*logged_curve(curves)) for name, curves in logged.items()}
+def _left_out(session: SessionFolder, exclude: Sequence[str]) -> list[tuple[float, Recording]]:
+    """Accepted runs of tests that are left out, as far as they can be read, for their thermometers."""
+    found = []
+    for run in session.in_state(RunState.ACCEPTED):
+        began = session.started_s(run)
+        if run.test not in exclude or began is None:
+            continue
+        try:
+            found.append((began, session.load(run).recording))
+        except InputError:
+            continue  # its faults are why it was left out
+    return found
 
 
 def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:

@@ -140,7 +140,10 @@ def _sources() -> str:
     lines = ["# Error sources", "", _SOURCES_HEAD, ""]
     for name, source in known_sources().items():
         needs = ", ".join(sorted(source.needs))
-        lines += [*_texts(name, source.texts, f"Belongs to the {source.belongs_to}; needs {needs}."), ""]
+        logged = source.by_temperature()
+        forms = f"Belongs to the {source.belongs_to}; needs {needs}"
+        forms += f", or in its second form {', '.join(sorted(logged.needs))}." if logged else "."
+        lines += [*_texts(name, source.texts, forms), ""]
     return "\n".join(lines)
 
 

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 )
 @source_file_option
 @click.option(
+    "--law-over-time", is_flag=True, help="Fit what grows with time by its law even where its temperature was logged."
+)
+@click.option(
     "--method",
     type=click.Choice(["jig", "conv-a", "conv-b"]),
     default="jig",
@@ -45,6 +48,7 @@ def calibrate(
     *,
     sources: str | None,
     source_files: tuple[Path, ...],
+    law_over_time: bool,
     method: str,
     prescribe: str | None,
     exclude: tuple[str, ...],
@@ -103,7 +107,7 @@ def calibrate(
     recorded = load_sessions(sessions, exclude)
     for warning in recorded.warnings:
         say(f"note: {warning}")
-    fitted = _following_thermometers(fitted, recorded.observations)
+    fitted = fitted if law_over_time else _following_thermometers(fitted, recorded.observations)
     known = as_known(Method(method), recorded.machine, recorded.observations)
     held = _prescribed(prescribe, method)
     calibration, outliers = calibrate_robust(lambda runs: fit(recorded.machine, runs, fitted, prescribe=held), known)
@@ -225,5 +229,5 @@ def _following_thermometers(
     forms = following_thermometers(fitted, [observation.motion() for observation in observations])
     for source, form in zip(fitted, forms, strict=True):
         if form is not source:
-            say(f"note: {form.name} follows the logged temperatures, not a law over time")
+            say(f"note: {form.name} follows the logged temperatures, not a law over time (--law-over-time)")
     return forms

@@ -55,6 +55,8 @@ def evaluate(
     height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
     plane = plane_figures(identified.model, height_mm)
     summary |= {"flatness_um": plane.flatness_um, "parallelism_um": plane.parallelism_um, "plane_z_mm": height_mm}
+    own, placed = identified.model.of_the_machine().sources, identified.model.anywhere().sources
+    summary["plane_without"] = [f.source.name for f in own if f not in placed and not f.source.of_currents]
     if as_json:
         print_json(summary)
         return
@@ -65,10 +67,8 @@ def evaluate(
     click.echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
     click.echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
     click.echo(f"uncompensated at Z {height_mm:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
-    held = {fitted.source.name for fitted in identified.model.anywhere().sources}
-    elsewhere = [f.source.name for f in identified.model.of_the_machine().sources if f.source.name not in held]
-    if elsewhere:
-        click.echo(f"(without {', '.join(elsewhere)}: no pose alone says what they do)")
+    if summary["plane_without"]:
+        click.echo(f"(without {', '.join(summary['plane_without'])}: no pose alone says what they do)")
     click.echo(f"flatness               {summary['flatness_um']:8.1f} µm")
     click.echo(f"parallelism along X    {summary['parallelism_um']:8.1f} µm")
 

@@ -58,7 +58,7 @@ class Channel:
         named: sources that have a name, as candidates.
         set_up: balls and bars that are off by far more than stated, as candidates: a variant for each of them.
         residual_mm: per run, what the base fit leaves, measurement's effects included [mm].
-        sources: by name and values of shape parameters.
+        sources: by name and law.
     """
 
     observations: tuple[Observation, ...]
@@ -69,7 +69,7 @@ class Channel:
     named: tuple[Candidate, ...]
     set_up: tuple[Candidate, ...]
     residual_mm: tuple[NDArray[np.float64], ...]
-    sources: dict[tuple[str, tuple[float, ...]], ErrorSource]
+    sources: dict[tuple[str, str], ErrorSource]
 
     @cached_property
     def joined(self) -> Block:
@@ -87,7 +87,7 @@ class Channel:
 
     def source_of(self, name: str, variant: Variant) -> ErrorSource:
         """Source that a form of a candidate is of: a cause may have one form over time, and one by thermometers."""
-        return self.sources[name, variant.shape]
+        return self.sources[name, variant.law]
 
     @property
     def machine(self) -> Machine:
@@ -225,7 +225,7 @@ class _Set:
     common: NDArray[np.int64]
 
 
-def _forms(sets: Sequence[_Set], shape: tuple[float, ...]) -> list[Variant]:
+def _forms(sets: Sequence[_Set], law: str, shape: tuple[float, ...]) -> list[Variant]:
     """Forms in which a source is looked for: all amplitudes, those of each strut alone, one for all struts.
 
     What wears or was made badly is often one strut, or all alike; all others free beside it would hide what is faint.
@@ -233,7 +233,7 @@ def _forms(sets: Sequence[_Set], shape: tuple[float, ...]) -> list[Variant]:
     columns, prior, struts = (
         np.concatenate([getattr(s, name) for s in sets]) for name in ("columns", "prior", "struts")
     )
-    whole = Variant(columns, prior, shape)
+    whole = Variant(columns, prior, shape, law=law)
     forms = [whole]
     single = np.unique(struts)
     if len(single) > 1:
@@ -249,16 +249,16 @@ class _Book:
 
     def __init__(self, first: int) -> None:
         self.count = first
-        self.sources: dict[tuple[str, tuple[float, ...]], ErrorSource] = {}
-        self._sets: dict[tuple[str, tuple[float, ...]], dict[str, _Set]] = {}
+        self.sources: dict[tuple[str, str], ErrorSource] = {}
+        self._sets: dict[tuple[str, str, tuple[float, ...]], dict[str, _Set]] = {}
         self._set_up: dict[str, dict[str, Variant]] = {}
 
     def source(
         self, source: ErrorSource, shared: str, shape: tuple[float, ...], amplitudes: Sequence[Parameter]
     ) -> NDArray[np.int64]:
         """Columns of one variant of a source for one set that shares its values; that of all struts alike comes last."""
-        self.sources[source.name, shape] = source
-        sets = self._sets.setdefault((source.name, shape), {})
+        self.sources[source.name, source.varies_with] = source
+        sets = self._sets.setdefault((source.name, source.varies_with, shape), {})
         if shared not in sets:
             prior, struts = np.array([p.plausible for p in amplitudes]), np.array([p.strut or 0 for p in amplitudes])
             each = sorted(struts.tolist()) == list(range(1, STRUTS + 1))
@@ -279,8 +279,8 @@ class _Book:
     def candidates(self) -> tuple[Candidate, ...]:
         """Return the candidates with their variants."""
         variants: dict[str, list[Variant]] = {}
-        for (name, form), sets in self._sets.items():
-            variants.setdefault(name, []).extend(_forms(list(sets.values()), form))
+        for (name, law, shape), sets in self._sets.items():
+            variants.setdefault(name, []).extend(_forms(list(sets.values()), law, shape))
         return tuple(Candidate(name, tuple(forms), SIZES) for name, forms in variants.items())
 
     def _new(self, size: int) -> NDArray[np.int64]:

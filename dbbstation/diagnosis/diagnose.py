@@ -25,6 +25,7 @@ from dbbstation.errors import ModelError
 from dbbstation.inference.harmonics import LOW
 from dbbstation.inference.held_out import HeldOut, held_out
 from dbbstation.inference.stability import stability
+from dbbstation.sources.by_temperature import not_given
 from dbbstation.sources.contract import Need, Owner
 
 if TYPE_CHECKING:
@@ -129,13 +130,11 @@ def _missing(source: ErrorSource, machine: Machine, motions: Sequence[Motion]) -
     """Return why a source cannot be a candidate; empty where it can."""
     try:
         source.parameters(machine)
-        for motion in motions:
-            source.require(motion)
     except ModelError as error:
         return error.what
-    if source.of_currents:
+    if source.of_currents and not not_given(source, motions):
         return f"{source.name} shows in motor currents only: fit it with `calibrate --sources`"
-    return ""
+    return not_given(source, motions)
 
 
 def _by_chance(channel: Channel, settled: Round) -> float:
@@ -218,7 +217,7 @@ def _shifts(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
         return ()
     row_of = {name: k for k, name in enumerate(after.layout.names)}
     unseen = held_variance(after, held_beside(before, after))
-    sigma = np.sqrt(np.diag(after.solution.covariance) + unseen)
+    sigma = np.sqrt(np.maximum(np.diag(after.solution.covariance), 0.0) + unseen)
     shifts = []
     for term in before.layout.terms:
         if term.source.belongs_to is not Owner.MACHINE:

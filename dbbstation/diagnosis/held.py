@@ -32,7 +32,7 @@ def held_variance(calibration: Calibration, held: NDArray[np.float64]) -> NDArra
         columns, _ = calibration.layout.columns_of(name)
         own = np.isin(fitted, columns)
         seen = float(np.sum(1.0 - hidden[own]))
-        if seen > 0.0:
+        if seen > HALF:
             square[columns] = max(1.0, float(np.sum(amplitudes[own] ** 2)) / seen)
     along = held**2 @ square[fitted]
     variance = np.zeros(len(known.random))
@@ -56,5 +56,6 @@ def held_beside(before: Calibration, after: Calibration) -> NDArray[np.float64]:
     return rows[size > HALF]
 
 
-HALF = np.sqrt(0.5)
-"""Length that a direction must keep beside those of the base to be one of its own."""
+HALF = float(np.sqrt(0.5))
+"""Length that a direction must keep beside those of the base to be one of its own, and amplitudes of a source that must be seen
+for them to say how large the others are."""

@@ -212,7 +212,9 @@ def _settle(
         # A ball that is off as far as balls here scatter is no finding, and nothing else is one in its place.
         chosen = [choice for choice in chosen if not choice.variant.of]
         found = {choice.candidate.name for choice in chosen}
-        if found == {choice.candidate.name for choice in best.chosen}:
+        if {(c.candidate.name, c.variant.law) for c in chosen} == {
+            (c.candidate.name, c.variant.law) for c in best.chosen
+        }:
             break
         progress("joint fit with " + (", ".join(sorted(found)) or "nothing more"))
         try:

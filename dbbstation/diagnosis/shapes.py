@@ -17,7 +17,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
-from dbbstation.sources.by_temperature import slow_degc
+from dbbstation.sources.by_temperature import FOLLOWED_K, known_thermometers, logged_degc
 from dbbstation.sources.contract import Effect
 
 if TYPE_CHECKING:
@@ -75,9 +75,6 @@ OF_STRUTS = (
 
 THERMOMETERS = ("machine", "jig", "bar")
 """Those that are on no strut, by the name of their column."""
-
-FOLLOWED_K = 0.2
-"""Range that a temperature must have over all runs to be followed: what thermometers resolve is a tenth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,11 +208,11 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
 
 def _temperatures(motion: Motion) -> dict[str, NDArray[np.float64]]:
     """What was logged, as `variables` names it."""
-    logged = motion.temperature_degc
-    found = {f"{name}-temperature": slow_degc(motion, name)[0] for name in THERMOMETERS if name in logged}
+    logged = known_thermometers(motion)
+    found = {f"{name}-temperature": logged_degc(motion, name)[0] for name in THERMOMETERS if name in logged}
     on_struts = [f"strut{strut}" for strut in range(1, STRUTS + 1)]
     if all(name in logged for name in on_struts):
-        found["strut-temperature"] = np.column_stack([slow_degc(motion, name)[0] for name in on_struts])
+        found["strut-temperature"] = np.column_stack([logged_degc(motion, name)[0] for name in on_struts])
     return found
 
 
@@ -263,10 +260,10 @@ def _pulled(struts: Struts) -> NDArray[np.float64]:
 
 def ranges(runs: Sequence[Samples]) -> Ranges:
     """Extent of every variable that all runs have."""
-    names = set.intersection(*(set(run.values) for run in runs))
-    low = {name: np.min([run.values[name].min(axis=0) for run in runs], axis=0) for name in runs[0].values}
-    high = {name: np.max([run.values[name].max(axis=0) for run in runs], axis=0) for name in runs[0].values}
-    return Ranges({n: v for n, v in low.items() if n in names}, {n: v for n, v in high.items() if n in names})
+    names = [name for name in runs[0].values if all(name in run.values for run in runs)]
+    low = {name: np.min([run.values[name].min(axis=0) for run in runs], axis=0) for name in names}
+    high = {name: np.max([run.values[name].max(axis=0) for run in runs], axis=0) for name in names}
+    return Ranges(low, high)
 
 
 def shapes(extent: Ranges) -> list[Shape]:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.shapes import THERMOMETERS, variables
 from dbbstation.diagnosis.shapes import moves_struts as of_struts
-from dbbstation.diagnosis.shapes import variables
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.by_temperature import FollowsTemperature
@@ -38,7 +38,14 @@ WAVE_PIECE_MM = 1.0
 SEEN = 2.5
 """Fine pieces that are known this many times worse than usual are left open: they would drown the others."""
 
-UNITS = {"strut-length": "mm", "strut-force": "N", "time": "s", "temperature": "K", "angle": "°"}
+UNITS = {
+    "strut-length": "mm",
+    "strut-force": "N",
+    "time": "s",
+    "temperature": "K",
+    **{f"{name}-temperature": "°C" for name in ("strut", *THERMOMETERS)},
+    "angle": "°",
+}
 """Of the variables that something can be drawn over."""
 
 SENSES = {1.0: "lengthening", -1.0: "shortening"}
@@ -144,13 +151,18 @@ def _wanted(diagnosis: Diagnosis, name: str) -> str:
     """Variable that organises a source, or what is left."""
     if not name:
         return diagnosis.unexplained.variable or ""
-    return next(t.source.varies_with for t in diagnosis.after.layout.terms if t.source.name == name)
+    source = next(t.source for t in diagnosis.after.layout.terms if t.source.name == name)
+    own = source.varies_with == "temperature" and not isinstance(source, FollowsTemperature)
+    return "time" if own else source.varies_with  # only those of ours say which temperature
 
 
 def _drawn_over(wanted: str, observations: Sequence[Observation], *, moves_struts: bool) -> str:
     """Return the variable itself where it is one that every run has, else strut length, or angle for a reading."""
     if wanted == "temperature":
         return wanted
+    variable = wanted.partition(" ")[0]
+    if variable.endswith("-temperature"):
+        return variable
     if wanted.startswith("time") and all(o.started_s is not None for o in observations):
         return "time"
     if not moves_struts or wanted == "angle":

@@ -210,6 +210,7 @@ def doubted(
     grows = [f for f in said if follows[f.name] in {"time", "temperature"} and f.gain > AS_GOOD]
     first = max(grows, key=lambda f: f.gain, default=None)
     variable = variable_of(rest.variable) if rest.variable else ""
+    variable = "temperature" if variable.endswith("-temperature") else variable
     of_it = {name for name, own in follows.items() if variable and own == variable}
     # A law over time may be another one; thermometers are what they are, only coarse.
     lawful = first is None or follows[first.name] == "time"
@@ -229,11 +230,11 @@ def doubted(
 def _not_beside(
     findings: Sequence[SourceFinding], names: set[str], why: str, sure: tuple[str, ...] = ()
 ) -> tuple[SourceFinding, ...]:
-    """Findings of which those named are in doubt beside each other and beside those that are sure."""
+    """Findings of which those named are in doubt: beside those that are sure, or beside each other where none is."""
     told = []
     for finding in findings:
-        alike = tuple(sorted({*names, *sure, *finding.ambiguous_with} - {finding.name}))
-        text = f"{why} may only make up for another law of {', '.join(alike)}."
+        alike = tuple(sorted({*(sure or names), *finding.ambiguous_with} - {finding.name}))
+        text = f"{why} may only make up for another law of {', '.join(sure or alike)}."
         doubtful = replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text)
         told.append(doubtful if finding.name in names else finding)
     return tuple(told)

@@ -99,7 +99,8 @@ def _of_files(files: Iterable[Path], faults: list[Problem]) -> list[tuple[type[E
             continue
         lines = {node.name: node.lineno for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
         own = [member for _, member in getmembers(module, isclass) if member.__module__ == module.__name__]
-        kinds = [kind for kind in own if issubclass(kind, ErrorSource)]
+        # Names that begin with an underscore are other forms of a source.
+        kinds = [kind for kind in own if issubclass(kind, ErrorSource) and not kind.__name__.startswith("_")]
         if not kinds:
             faults.append(Problem(str(path), 0, 0, "no class in it derives from ErrorSource", CONTRACT))
         for kind in kinds:

@@ -52,6 +52,7 @@ class Variant:
             looked for. Many amplitudes that are all small would otherwise count as unlikely.
         of: what it is the form of, where the variants of a candidate are several things of a kind and not several
             shapes of one.
+        law: which law it follows, where a candidate has several.
     """
 
     columns: NDArray[np.int64]
@@ -59,6 +60,7 @@ class Variant:
     shape: tuple[float, ...] = ()
     scale: float = 1.0
     of: str = ""
+    law: str = ""
 
     @property
     def plausible(self) -> NDArray[np.float64]:
@@ -87,7 +89,9 @@ class Candidate:
 
     def whole(self, variant: Variant) -> Variant:
         """Return the form with all its amplitudes, where a variant has some of them, at their plausible sizes."""
-        alike = [one for one in self.variants if one.shape == variant.shape and one.of == variant.of]
+        alike = [
+            one for one in self.variants if (one.law, one.shape, one.of) == (variant.law, variant.shape, variant.of)
+        ]
         return max(alike, key=lambda one: len(one.columns)).scaled(1.0)
 
     def spread(self, variant: Variant) -> NDArray[np.float64]:

@@ -2,8 +2,8 @@
 
     g(t) = c (T(t) - T_0)
 
-T_0 is what it showed at the session's first sample, so that growth is counted as in `warm_up`. No law of time is needed:
-sun, an open door and pauses are in T.
+T_0 is what it showed in the first run of the session, so that growth is counted as in `warm_up`, from a zero of each session's
+own. No law of time is needed: sun, an open door and pauses are in T.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ STEEL_UM_M_K = 11.5
 
 EQUATION = "or, where T was logged, g = c (T - T at the first sample)"
 
+FOLLOWED_K = 0.2
+"""Range that a temperature must have over a session to be followed: what thermometers resolve is a tenth [K]."""
+
 MACHINE = ("machine",)
 """A thermometer on the base plate or the machine as a whole."""
 
@@ -35,7 +38,7 @@ MACHINE = ("machine",)
 class FollowsTemperature(LinearSource):
     """A cause that grows with time, in the form that follows thermometers. It has the name and the texts of the cause."""
 
-    needs = frozenset({Need.POSE, Need.TEMPERATURE})
+    needs = frozenset({Need.POSE, Need.TIME, Need.TEMPERATURE})
     varies_with = "temperature"
     growth: ClassVar[Parameter]
     """What it grows by for one kelvin."""
@@ -65,18 +68,30 @@ class FollowsTemperature(LinearSource):
         self._columns(motion)
 
     def warmer_k(self, motion: Motion) -> NDArray[np.float64]:
-        """How much warmer than at the session's first sample, shape (n, 1) or, of struts, (n, 6) [K]."""
+        """How much warmer than when the session began, shape (n, 1) or, of struts, (n, 6) [K]."""
         self.require(motion)
-        columns = [slow_degc(motion, name) for name in self._columns(motion)]
-        return np.column_stack([degc - first for degc, first in columns])
+        logged = [logged_degc(motion, name) for name in self._columns(motion)]
+        return np.column_stack([degc - first for degc, first in logged])
+
+    def moves(self, motion: Motion) -> bool:
+        """Whether its thermometers moved by so much over the session that something can follow them."""
+        shown = [motion.setup.thermometers[name].degc for name in self._columns(motion)] if motion.setup else []
+        return any(np.ptp(degc) > FOLLOWED_K for degc in shown)
 
     def _columns(self, motion: Motion) -> tuple[str, ...]:
+        """Thermometers to follow, the same in all runs of a session.
+
+        Raises:
+            ModelError: names those that are missing.
+        """
+        logged = known_thermometers(motion)
         for columns in self.thermometers:
-            if all(name in motion.temperature_degc for name in columns):
+            if all(name in logged for name in columns):
                 return columns
-        wanted = " or ".join(f"{columns[0]}_temp_c" for columns in self.thermometers)
+        missing = [[f"{name}_temp_c" for name in columns if name not in logged] for columns in self.thermometers]
         raise ModelError(
-            f"the error source {self.name} follows a thermometer, and {wanted} was not logged here",
+            f"the error source {self.name} follows a thermometer, and not every run of the session has "
+            + ", or ".join(", ".join(names) for names in missing),
             remedy="give recordings with that column, or a model without this source",
         )
 
@@ -88,23 +103,38 @@ def following_thermometers(sources: Sequence[ErrorSource], motions: Sequence[Mot
 
 def _logged(source: ErrorSource, motions: Sequence[Motion]) -> ErrorSource | None:
     form = source.by_temperature()
-    if form is None:
-        return None
-    try:
-        for motion in motions:
-            form.require(motion)
-    except ModelError:
+    if form is None or not_given(form, motions):
         return None
     return form
 
 
-def slow_degc(motion: Motion, name: str) -> tuple[NDArray[np.float64], float]:
-    """What a thermometer showed, shape (n,), and what it showed at the session's first sample [degC].
+def not_given(source: ErrorSource, motions: Sequence[Motion]) -> str:
+    """Return what a source lacks in motions, thermometers that move among it; empty where it can be looked for."""
+    try:
+        for motion in motions:
+            source.require(motion)
+    except ModelError as error:
+        return error.what
+    if isinstance(source, FollowsTemperature) and not any(source.moves(motion) for motion in motions):
+        return f"the thermometers of {source.name} moved by less than {FOLLOWED_K:g} K"
+    return ""
 
-    As the session's curve where there is one: parts of a machine change slowly, and thermometers are coarse.
+
+def known_thermometers(motion: Motion) -> set[str]:
+    """Thermometers whose temperatures are known in a motion, by their columns without the unit."""
+    if motion.setup is not None and motion.setup.thermometers:
+        return set(motion.setup.thermometers)
+    return set(motion.temperature_degc)
+
+
+def logged_degc(motion: Motion, name: str) -> tuple[NDArray[np.float64], float]:
+    """What a thermometer showed, shape (n,), and what it showed when the session began [degC].
+
+    As the session's curve: parts of a machine change slowly, and thermometers are coarse. A motion of no session has its own
+    values, from its own beginning on.
     """
-    own = motion.temperature_degc[name]
-    over = None if motion.setup is None or motion.time_s is None else motion.setup.thermometers.get(name)
-    if over is None or motion.time_s is None:
+    if motion.setup is None or not motion.setup.thermometers or motion.time_s is None:
+        own = motion.temperature_degc[name]
         return own, float(own[0])
+    over = motion.setup.thermometers[name]
     return np.interp(motion.time_s, over.time_s, over.degc), float(over.degc[0])

@@ -105,7 +105,20 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
         faults = _of_shapes(what, answer, len(motion), last)
         if faults:
             return faults
-    return _of_derivative(source, motion, machine, parameters, values)
+    return _of_derivative(source, motion, machine, parameters, values) or _of_second_form(source, parameters, machine)
+
+
+def _of_second_form(source: ErrorSource, parameters: Sequence[Parameter], machine: Machine) -> list[str]:
+    """The form by temperature, where there is one: model files and diagnoses tell the two apart."""
+    form = source.by_temperature()
+    if form is None:
+        return []
+    if (form.name, form.belongs_to) != (source.name, source.belongs_to) or form.varies_with == source.varies_with:
+        return ["its form by temperature must have the same name and owner, and say that it varies with temperature"]
+    shared = {p.name for p in parameters} & {p.name for p in form.parameters(machine)}
+    if shared:
+        return [f"its form by temperature must have parameters of other names: {', '.join(sorted(shared))}"]
+    return [f"in its form by temperature, {fault}" for fault in tried(form, machine)]
 
 
 def _of_parameters(parameters: Sequence[Parameter]) -> list[str]:

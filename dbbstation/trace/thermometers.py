@@ -21,19 +21,22 @@ def logged_curve(
     A thermometer that shows tenths says no more than that it is within half a tenth: of all curves within that of the
     means of each half run the one of least bending is taken. One of fine steps is followed as it is.
 
+    What changes within half a run is lost.
+
     Args:
-        runs: times [s] and temperatures [degC] of each run, in order of time, shape (n,) each.
+        runs: times [s] and temperatures [degC] of each run, shape (n,) each.
 
     Returns:
-        Times [s] and temperatures [degC], shape (2 r,) each.
+        Rising times [s] and temperatures [degC], shape (q,) each, two for each run.
     """
     halves = [half for run in runs for half in zip(*(np.array_split(one, 2) for one in run), strict=True)]
-    halves = [(time_s, degc) for time_s, degc in halves if len(time_s)]
-    time_s = np.array([one.mean() for one, _ in halves])
-    shown = np.array([one.mean() for _, one in halves])
+    means = {float(one.mean()): float(degc.mean()) for one, degc in halves if len(one)}
+    # Runs whose clock was set back in between overlap.
+    time_s = np.array(sorted(means))
+    shown = np.array([means[moment] for moment in time_s])
     half_step = 0.5 * _resolution(np.concatenate([degc for _, degc in runs]))
     gaps = np.diff(time_s)
-    if len(time_s) < _BENDS or half_step < _ROUNDING or np.any(gaps <= 0.0):
+    if len(time_s) < _BENDS or half_step < SHOWN_K:
         return time_s, shown
     slope = np.diff(np.eye(len(time_s)), axis=0) / gaps[:, None]
     bending = np.diff(slope, axis=0) / np.sqrt(0.5 * (gaps[1:] + gaps[:-1]))[:, None]
@@ -45,11 +48,11 @@ def logged_curve(
 _BENDS = 3
 """Points of the shortest curve that can be bent."""
 
-_ROUNDING = 1e-9
-"""Half a step below which nothing was rounded [K]."""
+SHOWN_K = 1e-3
+"""Finest step that a thermometer is taken to show, and that recordings have [K]."""
 
 
 def _resolution(degc: NDArray[np.float64]) -> float:
-    """Smallest step between values that were shown [K]; zero where there was one only."""
-    steps = np.diff(np.unique(degc))
-    return float(steps.min(initial=np.inf)) if len(steps) else 0.0
+    """Greatest step of which all differences of what was shown are multiples [K]; zero where there was one value only."""
+    steps = np.diff(np.unique(np.round(degc / SHOWN_K).astype(np.int64)))
+    return SHOWN_K * float(np.gcd.reduce(steps)) if len(steps) else 0.0

@@ -46,6 +46,36 @@ def test_calibrate_follows_the_thermometer_and_keeps_its_form(run, sessions, tmp
     assert "thermal-frame needs temperature" in refused.err
 
 
+def test_where_growth_is_counted_from_does_not_hang_on_what_is_left_out(run, sessions, tmp_path):
+    model = tmp_path / "model.yaml"
+    fitted = run("calibrate", sessions / "logged", "--sources", SOURCES, "--exclude", "a,b", "--out", model, "--json")
+    evaluated = run("evaluate", sessions / "logged", "--model", model, "--exclude", "c", "--json")
+    assert evaluated.data["residual_rms_um"] < 1.5 * fitted.data["residual_rms_um"]
+    assert evaluated.data["plane_without"] == ["thermal-frame"]
+
+
+def test_the_law_can_be_asked_for(run, sessions):
+    called = run("calibrate", sessions / "logged", "--sources", SOURCES, "--law-over-time", "--json")
+    assert called.code == 0
+    (frame,) = (s for s in called.data["sources"] if s["name"] == "thermal-frame")
+    assert "time_constant_s" in frame["parameters"]
+
+
+def test_sessions_with_and_without_a_thermometer_go_together(run, sessions):
+    together = run("diagnose", sessions / "logged", sessions / "bare", "--sources", "thermal-frame,gravity", "--json")
+    assert together.code == 0, together.err
+    named = {s["name"]: s for s in together.data["sources"]}
+    assert "growth_um_m_k" not in named["thermal-frame"]["parameters"]
+
+
+def test_the_figure_is_drawn_over_the_thermometer(run, sessions, tmp_path):
+    figure = tmp_path / "diagnosis.svg"
+    found = run("diagnose", sessions / "logged", "--sources", "thermal-frame,gravity", "--figure", figure, "--json")
+    assert found.code == 0, found.err
+    assert found.data["sources"][0]["name"] == "thermal-frame"
+    assert "over temperature" in figure.read_text()
+
+
 def test_calibrate_takes_the_law_over_time_without_one(run, sessions):
     called = run("calibrate", sessions / "bare", "--sources", SOURCES, "--json")
     assert called.code == 0

@@ -191,3 +191,39 @@ def test_the_trial_finds_nothing_wrong_with_sources_that_are_right(source, refer
     assert undeclared(type(source)) == []
     assert tried(source, machine) == []
     assert tried(source, reference) == []
+
+
+FORM = """
+    def by_temperature(self):
+        return _Logged()
+
+
+class _Logged(LinearSource):
+    name, belongs_to, texts = ScaleBow.name, ScaleBow.belongs_to, ScaleBow.texts
+    needs = frozenset({Need.POSE, Need.TIME, Need.TEMPERATURE})
+    varies_with = "temperature"
+
+    def parameters(self, machine):
+        return (Parameter("LABEL", "µm/K", 2.0, "bow for each kelvin of the machine"),)
+
+    def derivative(self, motion, machine, values):
+        warmer = motion.temperature_degc["machine"] - 20.0
+        return Effect(strut_mm=1e-3 * np.tile(warmer[:, None, None], (1, 6, 1)))
+"""
+
+
+@pytest.mark.parametrize(
+    ("label", "fault"), [("bow_um_k", None), ("strut_1_um", "must have parameters of other names: strut_1_um")]
+)
+def test_a_second_form_belongs_to_its_source(tmp_path, label, fault):
+    path = own(tmp_path, EXAMPLE.read_text(encoding="utf-8") + FORM.replace("LABEL", label))
+    path.write_text(path.read_text().replace("from dbbstation.sources.contract import ", IMPORTS, 1), encoding="utf-8")
+    if fault:
+        assert fault in told(path)
+        return
+    every = every_source([path])
+    assert sources_of([path], every) == ("scale-bow",)
+    assert every["scale-bow"].by_temperature().varies_with == "temperature"
+
+
+IMPORTS = "from dbbstation.sources.contract import Need  # noqa\nfrom dbbstation.sources.contract import "

@@ -25,11 +25,17 @@ def test_fine_thermometers_are_followed_as_they_are():
     assert np.allclose(degc, swing(time_s), atol=1e-4)  # means of twenty seconds of a curve
 
 
+def bending(time_s, degc):
+    """Mean square of the second derivative."""
+    return np.mean(np.gradient(np.gradient(degc, time_s), time_s) ** 2)
+
+
 @pytest.mark.parametrize("step", [0.1, 0.5])
 def test_coarse_ones_are_within_half_a_step_of_what_they_show(step):
-    _, degc = logged_curve(runs(step))
-    shown = [half.mean() for _, one in runs(step) for half in np.array_split(one, 2)]
+    time_s, degc = logged_curve(runs(step))
+    shown = np.array([half.mean() for _, one in runs(step) for half in np.array_split(one, 2)])
     assert np.abs(degc - shown).max() <= 0.5 * step * (1 + 1e-9)
+    assert bending(time_s, degc) < 0.5 * bending(time_s, shown)
 
 
 def test_slow_ones_come_closer_to_the_truth_than_what_they_show():
@@ -54,3 +60,16 @@ def test_few_runs_are_enough(count):
 def test_a_thermometer_that_never_moves_is_level():
     time_s, degc = logged_curve([(t, np.full_like(t, 20.0)) for t, _ in runs()])
     assert np.array_equal(degc, np.full_like(time_s, 20.0))
+
+
+def test_what_is_logged_once_a_run_is_not_taken_for_coarse():
+    shown = [20.00, 21.31, 23.17, 22.05]
+    _, degc = logged_curve([(t, np.full_like(t, value)) for (t, _), value in zip(runs(), shown, strict=False)])
+    assert np.allclose(degc, np.repeat(shown, 2), atol=0.005 + 1e-9)
+
+
+def test_runs_of_a_clock_that_was_set_back_still_rise():
+    begun_s = np.array([0.0, 100.0, 80.0, 80.0, 300.0])
+    time_s, degc = logged_curve(runs(0.1, begun_s))
+    assert np.all(np.diff(time_s) > 0)
+    assert np.abs(degc - swing(time_s)).max() < 0.06

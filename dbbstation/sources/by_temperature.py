@@ -40,6 +40,7 @@ class FollowsTemperature(LinearSource):
 
     needs = frozenset({Need.POSE, Need.TIME, Need.TEMPERATURE})
     varies_with = "temperature"
+    rough = True  # as its thermometer is
     growth: ClassVar[Parameter]
     """What it grows by for one kelvin."""
     thermometers: ClassVar[tuple[tuple[str, ...], ...]]

@@ -65,12 +65,12 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
         wanted = [run for run in session.in_state(RunState.ACCEPTED) if run.test not in exclude]
         unjudged = session.in_state(RunState.COMPLETE, RunState.RECORDING)
         warnings += [f"{session.name}: run {run.label} is {run.state}, not accepted: left out" for run in unjudged]
-        logs[session.name] = _left_out(session, exclude)
+        logged: list[tuple[float, Recording]] = []
         for run, read in zip(wanted, session.load_all(wanted), strict=True):
             warnings += [str(warning) for warning in read.warnings]
             began = session.started_s(run)
-            if began is not None:
-                logs[session.name].append((began, read.recording))
+            if began is not None and read.recording.temperature_degc:
+                logged.append((began, read.recording))
             try:
                 raw = cut(replace(read.recording, name=str(run.path)), session.circle(run))
                 observations.append(_observation(session, run, raw))
@@ -79,6 +79,7 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
             except StationError as error:
                 problems.append(Problem(str(run.path), 0, 0, error.what, error.remedy))
         warnings += _under_spindle(session, wanted)
+        logs[session.name] = [*logged, *_left_out(session, exclude)] if logged else []
     if problems:
         raise InputError(problems)
     if not observations:
@@ -134,25 +135,20 @@ def _with_thermometers(
 
     Args:
         observations: runs in use.
-        logs: of each session, when runs began [s] and what they hold, those that were left out too: leaving one out must
-            not change where growth is counted from.
+        logs: of each session, when runs with thermometers began [s] and what they hold, those that were left out too: leaving
+            one out must not change where growth is counted from.
     """
     of = {}
     for session, runs in logs.items():
-        names = [set(o.raw.temperature_degc) for o in observations if o.setup.session == session]
-        of[session] = {
-            name: Thermometer(
-                *logged_curve(
-                    [
-                        (began + log.t_s, log.temperature_degc[name])
-                        for began, log in runs
-                        if name in log.temperature_degc
-                    ]
-                )
-            )
-            for name in sorted(set.intersection(*names) if names else set[str]())
-        }
-    return [replace(o, setup=replace(o.setup, thermometers=of.get(o.setup.session, {}))) for o in observations]
+        known = (set(o.raw.temperature_degc) for o in observations if o.setup.session == session)
+        names = sorted(set.intersection(*known)) if runs else []
+        of[session] = {name: _thermometer(name, runs) for name in names}
+    return [replace(o, setup=replace(o.setup, thermometers=of[o.setup.session])) for o in observations]
+
+
+def _thermometer(name: str, runs: Sequence[tuple[float, Recording]]) -> Thermometer:
+    logs = [(began + run.t_s, run.temperature_degc) for began, run in runs]
+    return Thermometer(*logged_curve([(time_s, degc[name]) for time_s, degc in logs if name in degc]))
 
 
 def _left_out(session: SessionFolder, exclude: Sequence[str]) -> list[tuple[float, Recording]]:

@@ -13,7 +13,7 @@ from dbbstation.calibration.noise_level import fine_noise_mm
 from dbbstation.calibration.stray_balls import beside
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
 from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
-from dbbstation.diagnosis.held import held_beside, held_variance
+from dbbstation.diagnosis.held import held_beside, uncertainties
 from dbbstation.diagnosis.locate import locate, strut_contributions
 from dbbstation.diagnosis.naming import MOST_SOURCES, THRESHOLD, Round, best_look
 from dbbstation.diagnosis.next_test import propose
@@ -132,9 +132,10 @@ def _missing(source: ErrorSource, machine: Machine, motions: Sequence[Motion]) -
         source.parameters(machine)
     except ModelError as error:
         return error.what
-    if source.of_currents and not not_given(source, motions):
-        return f"{source.name} shows in motor currents only: fit it with `calibrate --sources`"
-    return not_given(source, motions)
+    only = (
+        f"{source.name} shows in motor currents only: fit it with `calibrate --sources`" if source.of_currents else ""
+    )
+    return not_given(source, motions) or only
 
 
 def _by_chance(channel: Channel, settled: Round) -> float:
@@ -216,8 +217,7 @@ def _shifts(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
     if after is before:
         return ()
     row_of = {name: k for k, name in enumerate(after.layout.names)}
-    unseen = held_variance(after, held_beside(before, after))
-    sigma = np.sqrt(np.maximum(np.diag(after.solution.covariance), 0.0) + unseen)
+    sigma = uncertainties(after, held_beside(before, after))
     shifts = []
     for term in before.layout.terms:
         if term.source.belongs_to is not Owner.MACHINE:

@@ -12,6 +12,12 @@ if TYPE_CHECKING:
     from dbbstation.calibration.fit import Calibration
 
 
+def uncertainties(calibration: Calibration, held: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard uncertainty of every column, shape (k,), directions that were held as in `held_variance`."""
+    seen = np.maximum(np.diag(calibration.solution.covariance), 0.0)
+    return np.asarray(np.sqrt(seen + held_variance(calibration, held)), dtype=np.float64)
+
+
 def held_variance(calibration: Calibration, held: NDArray[np.float64]) -> NDArray[np.float64]:
     """Variance of every column along directions that were held, shape (k,).
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.outlier import SOURCE_OF
 from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
-from dbbstation.diagnosis.held import held_variance
+from dbbstation.diagnosis.held import uncertainties
 from dbbstation.diagnosis.shapes import variable_of
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.race import AS_GOOD, Race, as_good, contained, free_directions, worth_of
@@ -154,8 +154,7 @@ def _likenesses(
 
 
 def _fitted_values(after: Calibration, name: str) -> dict[str, Value]:
-    unseen = held_variance(after, after.solution.held)
-    sigma = np.sqrt(np.maximum(np.diag(after.solution.covariance), 0.0) + unseen)
+    sigma = uncertainties(after, after.solution.held)
     values: dict[str, Value] = {}
     for term in after.layout.terms:
         if term.source.name == name:

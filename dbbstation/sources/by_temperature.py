@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
 
 STEEL_UM_M_K = 11.5
-"""Thermal expansion of unalloyed steel, [µm/(m K)]."""
+"""Thermal expansion of unalloyed steel [µm/(m K)]."""
 
 EQUATION = "or, where T was logged, g = c (T - T at the first sample)"
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.session import RunEntry, RunState, SessionFolder, read_session
 from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.machine.difference import differences, in_words
 from dbbstation.model.observation import Observation
 from dbbstation.nc.commanded import commanded_poses
 from dbbstation.sources.contract import Thermometer
@@ -30,7 +29,7 @@ class Recorded:
     """Accepted runs of one or more sessions of one machine.
 
     Attributes:
-        machine: nominal machine, the same in all sessions.
+        machine: nominal machine, the same in all sessions but for its name, which is that of the first.
         observations: accepted runs in the order they were recorded.
         sessions: SHA-256 of each session file by session name.
         warnings: what was found that does not spoil anything, and runs left out.
@@ -54,11 +53,10 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
             machines; no accepted run; an excluded test that no session has.
     """
     sessions = _unique_names([read_session(path) for path in paths])
-    _check_one_machine(sessions)
+    warnings = _check_one_machine(sessions)
     _check_no_copies(sessions)
     _check_excluded(sessions, exclude)
     observations: list[Observation] = []
-    warnings: list[str] = []
     problems: list[Problem] = []
     logs: dict[str, list[tuple[float, Recording]]] = {}
     for session in sessions:
@@ -67,7 +65,7 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
         warnings += [f"{session.name}: run {run.label} is {run.state}, not accepted: left out" for run in unjudged]
         logged: list[tuple[float, Recording]] = []
         for run, read in zip(wanted, session.load_all(wanted), strict=True):
-            warnings += [str(warning) for warning in read.warnings]
+            warnings += [str(warning) for warning in (*read.warnings, *session.loss(run, read.recording))]
             began = session.started_s(run)
             if began is not None and read.recording.temperature_degc:
                 logged.append((began, read.recording))
@@ -186,24 +184,34 @@ def _check_no_copies(sessions: Sequence[SessionFolder]) -> None:
             raise InputError([Problem(str(session.folder), 0, 0, what, "give every session once")])
 
 
-def _check_one_machine(sessions: Sequence[SessionFolder]) -> None:
+def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
+    """Refuse sessions whose machine files disagree; only the name may differ, and that is told.
+
+    Whatever the file holds decides something: joints and reference lengths the prediction, masses and compliance what
+    gravity does, tolerances the prior, travel what is proposed and exported.
+    """
     first = sessions[0]
+    told, faults = [], []
     for other in sessions[1:]:
-        a, b = first.machine, other.machine
-        same = (
-            np.array_equal(a.hexapod.base_joints_mm, b.hexapod.base_joints_mm)
-            and np.array_equal(a.hexapod.platform_joints_mm, b.hexapod.platform_joints_mm)
-            and a.hexapod.rotation == b.hexapod.rotation
-            and np.array_equal(a.reference_length_error_mm, b.reference_length_error_mm)
-        )
         serials = first.serial_number, other.serial_number
         if all(serials) and serials[0] != serials[1]:
             what = f"it is of machine {serials[1]}, {first.folder} of machine {serials[0]}"
-            raise InputError([Problem(str(other.folder), 0, 0, what, "fit the sessions of one machine together")])
-        if not same:
-            what = f"its nominal machine ({b.name}) is not that of {first.folder} ({a.name})"
-            remedy = "fit sessions together only where the control had the same joints and reference lengths"
-            raise InputError([Problem(str(other.folder), 0, 0, what, remedy)])
+            faults.append(Problem(str(other.folder), 0, 0, what, "fit the sessions of one machine together"))
+        elif unlike := differences(first.machine, other.machine):
+            what = (
+                f"its machine file is not that of {first.folder}: {in_words(unlike)}, in {first.name} and {other.name}"
+            )
+            remedy = (
+                "fit sessions together only where the control had the same joints and reference lengths; where it had, "
+                "correct the wrong machine.yaml, so that both say the same"
+            )
+            faults.append(Problem(str(other.machine_path), 0, 0, what, remedy))
+        elif first.machine.name != other.machine.name:
+            names = f"{first.machine.name} in {first.name}, {other.machine.name} in {other.name}"
+            told.append(f"the machine files have two names ({names}) and agree in all values: taken for one machine")
+    if faults:
+        raise InputError(faults)
+    return told
 
 
 def _check_excluded(sessions: Sequence[SessionFolder], exclude: Sequence[str]) -> None:

@@ -50,6 +50,11 @@ CONVERGED_SIGMA = 1e-3
 """The same as a share of their standard deviations, for what the runs hardly see."""
 FIRST_NOISE_MM = 1e-3
 
+COARSE_MM = 1.0
+"""What a nominal machine leaves [mm rms] beyond which the fit approaches first. Curvature leaves the square of an error over
+the length of a strut, 1 µm for 1 mm: less than a usual bar's noise below, more than that above. An approach where none is
+needed costs two steps and changes nothing."""
+
 NOISE_STEPS = 12
 """Steps in which the noise is read anew. What is left to be called noise depends on how it is weighted against what is known
 of balls; where physics is missing the two creep, or run, after each other without an end."""
@@ -154,9 +159,12 @@ def calibrate(
     x = _start_values(layout, {**current_start(layout, channel), **(start or {})})
     noise = Noise(FIRST_NOISE_MM, 1.0)
     runs = looked_at(observations, layout.needs)
-    nominal, _ = linearise(layout, runs, x)
+    nominal, left = linearise(layout, runs, x)
     nominal += current_blocks(layout, channel, x)
     blocks, before, share = nominal, np.zeros_like(x), 1.0
+    if _rms_mm(left) > COARSE_MM:
+        x, blocks = _approached(layout, runs, nominal, left)
+        blocks += current_blocks(layout, channel, x)
     lost, held = np.zeros((0, 0)), None
     for steps in range(MOST_STEPS):
         seen = lost_directions(nominal, layout.known, noise.effective)
@@ -200,6 +208,42 @@ def calibrate(
         prescribed=() if prescribe is None else names_of(layout, held),
         currents=motor_findings(layout, channel, x, solution, blocks, nominal, noise),
     )
+
+
+def _approached(
+    layout: Layout,
+    runs: Sequence[Observation | Nodes],
+    nominal: Sequence[Block],
+    left: Sequence[NDArray[np.float64]],
+) -> tuple[NDArray[np.float64], list[Block]]:
+    """Approach the values of a machine that is millimetres off by Gauss-Newton steps with the noise of a usual bar.
+
+    What the first steps leave is curvature. Taken for noise, it would hide directions that the runs do see; these would
+    be held at nominal, and the curvature would stay. So the noise is read only where steps no longer halve what is left.
+
+    Args:
+        layout: columns of the fit.
+        runs: as the fit looks at them.
+        nominal: blocks at the starting values.
+        left: per run, what the starting values leave, shape (n,) [mm].
+
+    Returns:
+        Values of all columns, shape (k,), and blocks of the circles about them.
+    """
+    noise = Noise(FIRST_NOISE_MM, 1.0).effective
+    held = lost_directions(nominal, layout.known, noise)
+    blocks = list(nominal)
+    for _ in range(MOST_STEPS):
+        before_mm = _rms_mm(left)
+        x = layout.nominal + solve(blocks, layout.known, noise, held).x
+        blocks, left = linearise(layout, runs, x)
+        if _rms_mm(left) > before_mm / 2.0:
+            break
+    return x, blocks
+
+
+def _rms_mm(left: Sequence[NDArray[np.float64]]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
 
 
 def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> NDArray[np.float64]:

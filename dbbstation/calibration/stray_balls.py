@@ -11,6 +11,7 @@ from scipy.special import chdtri, ndtr
 from dbbstation.calibration.outlier import LEAST_UM, STANDS_OUT, Kind, Outlier
 from dbbstation.calibration.run_remainder import left_of, shift_of
 from dbbstation.calibration.scatter import LEAST_STATED_MM, UNKNOWN_MM, Seat, seats_of
+from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -111,6 +112,26 @@ def free_ball(
     kind = Kind.BALL if together else Kind.MOUNTING
     again = fit(freed)
     return _ball(again, kind, (mounting, *sorted(names - {mounting})), why, sure=bool(alike)), freed, again
+
+
+def set_free(fit: Fit, before: Calibration, source: str, of: str) -> Step | None:
+    """Let what is off be anything from here on; None where the runs cannot be fitted without knowing it.
+
+    Args:
+        fit: calibrates runs.
+        before: the last fit.
+        source: `mounting`, `ball-coordinate` or `bar-offset`.
+        of: name of the mounting, ball or session that is off.
+    """
+    runs = before.observations
+    try:
+        if source == "bar-offset":
+            return free_bar(fit, runs, of)
+        together = source == "ball-coordinate"
+        of_the_ball = {o.setup.mounting for o in runs if of == (o.setup.ball if together else o.setup.mounting)}
+        return free_ball(fit, runs, min(of_the_ball), seats_of(before), together=together)
+    except CalibrationError:
+        return None
 
 
 def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:

@@ -10,8 +10,10 @@ import numpy as np
 from dbbstation.calibration.currents_summary import currents_summary
 from dbbstation.calibration.evaluation import Evaluation, RunFigures, rms_um
 from dbbstation.calibration.gaps import gaps
+from dbbstation.calibration.missing_physics import is_missing_physics, misfit_of
 from dbbstation.calibration.noise_level import fine_noise_mm
-from dbbstation.calibration.scatter import check_scatter, seats_of
+from dbbstation.calibration.plan_check import PlanCheck, check_plan
+from dbbstation.calibration.scatter import Finding, check_scatter, seats_of
 from dbbstation.calibration.visibility import visibility
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.calibration.outlier import Outlier
     from dbbstation.calibration.scatter import ScatterCheck
     from dbbstation.calibration.visibility import Visibility
+    from dbbstation.inference.harmonics import Misfit
     from dbbstation.trace.analysis import CircleFigures
 
 
@@ -45,10 +48,12 @@ def calibration_summary(
         **evaluation_summary(evaluation),
         "residual_within_mounting_rms_um": rms_um(calibration.residual_mm),
         "noise_um": 1e3 * fine_noise_mm(calibration),
+        "misfit": _misfit(misfit_of(calibration)),
         "noise_correlation_samples": calibration.noise.correlation_samples,
         "parameters_identified": calibration.parameters_identified,
         "directions_lost": list(calibration.directions_lost),
         "gaps": list(gaps(calibration)),
+        "plan_check": _plan_check(check_plan(calibration)),
         "directions_regularised": list(calibration.directions_regularised),
         "parameters_prescribed": [f"{source}.{name}" for source, name in calibration.prescribed],
         "outliers": [outlier_summary(outlier) for outlier in outliers],
@@ -109,13 +114,26 @@ def outlier_summary(outlier: Outlier) -> dict[str, Any]:
 
 
 def _scatter(check: ScatterCheck) -> dict[str, Any]:
-    told = check.fits is not None
+    told = check.finding is not Finding.UNTOLD
     return {
         "stated_um": check.stated_um,
         "found_um": check.found_um if told else None,
         "interval_um": [check.low_um, check.high_um] if told else None,
         "mountings": check.mountings,
         "fits": check.fits,
+        "finding": str(check.finding),
+    }
+
+
+def _plan_check(check: PlanCheck) -> dict[str, Any]:
+    return {**asdict(check), "left": check.left, "enough": check.enough}
+
+
+def _misfit(found: Misfit) -> dict[str, Any]:
+    return {
+        "probability": found.probability,
+        "rms_um": 1e3 * found.rms,
+        "missing_physics": is_missing_physics(found),
     }
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.exclude import exclude_option
+from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 )
 @exclude_option
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
-@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write a figure here, as SVG.")
+@figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def calibrate(
@@ -118,7 +119,7 @@ def calibrate(
     if figure is not None:
         from dbbstation.report.calibration_figure import calibration_figure
 
-        write_bytes(figure, calibration_figure(calibration), force=force)
+        write_bytes(figure, calibration_figure(calibration, format_of(figure)), force=force)
         say(f"figure written to {figure}")
     for outlier in summary["outliers"]:
         say(f"does not belong, kept from pulling the fit: {outlier['text']}")
@@ -130,8 +131,8 @@ def calibrate(
             say(f"model written to {out}")
 
 
-MORE_THAN_NOISE = 1.2
-"""Residual over noise above which something smooth must be left."""
+LEAST_PRINTED = 1e-99
+"""Probabilities below are not told apart."""
 
 IN_A_TABLE_OF_THEIR_OWN = frozenset({"drive-friction"})
 """Sources with a row for each motor in place of one for each parameter."""
@@ -174,19 +175,41 @@ def _print(summary: Mapping[str, Any]) -> None:
         click.echo(f"  {text}")
     for weak in summary["observability"]["weak_directions"][:1]:
         click.echo(f"least visible, to {weak['uncertainty']:.1f} {weak['unit']}: {weak['text']}")
+    if not summary["plan_check"]["enough"]:
+        _print_plan_check(summary["plan_check"])
+    _print_misfit(summary)
     for check in summary["scatter"]:
-        _print_scatter(check)
+        _print_scatter(check, missing_physics=summary["misfit"]["missing_physics"])
     click.echo(f"nominal machine leaves   {summary['nominal_rms_um']:8.2f} µm rms")
     click.echo(f"model leaves             {summary['residual_rms_um']:8.2f} µm rms")
     click.echo(f"... within each mounting {summary['residual_within_mounting_rms_um']:8.2f} µm rms")
     click.echo(f"noise of one reading     {summary['noise_um']:8.2f} µm")
     print_currents(summary)
-    if summary["residual_within_mounting_rms_um"] > MORE_THAN_NOISE * summary["noise_um"]:
-        click.echo("more is left than noise: `dbbstation diagnose` says which physics may be missing")
+
+
+def _print_plan_check(check: Mapping[str, Any]) -> None:
+    click.echo(
+        f"so few tests ({check['tests']}) cannot show a wrong tilt, height or place in the plan: {check['left']} degrees of "
+        f"freedom are left to check it, one circle has {check['of_one_test']}; a small residual proves nothing here, so "
+        "check the tilts by hand or measure further circles"
+    )
+
+
+def _print_misfit(summary: Mapping[str, Any]) -> None:
+    """Print what is left beyond noise and mountings; nothing where chance explains it."""
+    misfit = summary["misfit"]
+    if not misfit["missing_physics"]:
+        return
+    chance = misfit["probability"]
+    click.echo(
+        f"more is left than noise and mountings explain, {misfit['rms_um']:.2f} µm rms (probability by chance "
+        f"{'below 1e-99' if chance < LEAST_PRINTED else f'{chance:.1g}'}): physics is missing from the model, and "
+        "`dbbstation diagnose` says which"
+    )
     if summary["residual_within_mounting_rms_um"] > NOT_THIS_MACHINE * summary["noise_um"]:
         click.echo(
-            "... much more: check also that the machine file is this machine's, its joints in the order of the struts "
-            "and the rotation convention that of the control"
+            f"... more than {NOT_THIS_MACHINE:.0f} times the noise: check also that the machine file is this machine's, its "
+            "joints in the order of the struts and the rotation convention that of the control"
         )
 
 
@@ -205,18 +228,27 @@ def _print_parameters(summary: Mapping[str, Any]) -> None:
     print_table(["source", "parameter", "value", "", "std", "unit"], rows)
 
 
-def _print_scatter(check: Mapping[str, Any]) -> None:
+SAID_OF_SCATTER = {
+    "as-stated": "as stated",
+    "less": "less than stated, which is no fault",
+    "more": "NOT as stated: another plate or CMM sheet, loose holders, or a wrong convention of tilts in the machine file?",
+}
+BESIDE_MISSING_PHYSICS = (
+    "more than stated: physics that the model lacks is the likelier reason, so run `dbbstation diagnose` before you doubt "
+    "plate, CMM sheet or holders"
+)
+
+
+def _print_scatter(check: Mapping[str, Any], *, missing_physics: bool) -> None:
     stated = f"balls stated to stand within {check['stated_um']:.2f} µm per axis"
     if check["fits"] is None:
         click.echo(f"{stated}: these tests cannot tell")
         return
     low, high = check["interval_um"]
-    fits = (
-        "as stated"
-        if check["fits"]
-        else "NOT as stated: another plate or CMM sheet, loose holders, or a wrong convention of tilts in the machine file?"
-    )
-    click.echo(f"{stated} scatter by {check['found_um']:.2f} ({low:.2f} to {high:.2f}) µm, {fits}")
+    said = SAID_OF_SCATTER[check["finding"]]
+    if missing_physics and check["finding"] == "more":
+        said = BESIDE_MISSING_PHYSICS
+    click.echo(f"{stated} scatter by {check['found_um']:.2f} ({low:.2f} to {high:.2f}) µm, {said}")
 
 
 def _following_thermometers(

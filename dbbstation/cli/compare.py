@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.exclude import exclude_option
+from dbbstation.cli.figure_option import figure_option, format_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 @click.argument("a", type=click.Path(path_type=Path), metavar="A")
 @click.argument("b", type=click.Path(path_type=Path), metavar="B")
 @exclude_option
-@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write a figure here, as SVG.")
+@figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def compare(a: Path, b: Path, *, exclude: tuple[str, ...], figure: Path | None, force: bool, as_json: bool) -> None:
@@ -52,7 +53,7 @@ def compare(a: Path, b: Path, *, exclude: tuple[str, ...], figure: Path | None, 
     notes = notes_of(one.machine, other.machine, found.matching.pairs)
     summary = {"a": str(a), "b": str(b), **comparison_summary(found, notes)}
     if figure is not None:
-        write_bytes(figure, compare_figure(found), force=force)
+        write_bytes(figure, compare_figure(found, format_of(figure)), force=force)
         say(f"figure written to {figure}")
     if as_json:
         print_json(summary)

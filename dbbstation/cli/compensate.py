@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.correction import largest_correction_option
 from dbbstation.cli.source_files import source_file_option
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
@@ -32,6 +33,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     metavar="S",
     help="When the program starts, after the session began [s]; for models that need time.",
 )
+@largest_correction_option
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def compensate(
@@ -45,13 +47,16 @@ def compensate(
     start: str | None,
     chord_um: float,
     time_s: float | None,
+    largest_mm: float,
     force: bool,
     as_json: bool,
 ) -> None:
     r"""Compensate an NC program: what it writes takes the real machine where PROGRAM means to go.
 
     Moves at feed are split where the correction bends. The program must be in machine coordinates and name all six
-    axes in its first move, or --start says where the machine stands. Travel is checked before anything is written.
+    axes in its first move, or --start says where the machine stands. It must be whole (M2, M30 or percent signs), not
+    compensated yet, and of no other machine. Travel, feeds and the size of corrections are checked before anything is
+    written.
 
     \b
     Examples:
@@ -71,7 +76,7 @@ def compensate(
     done = compensated_program(
         path,
         written_in,
-        loaded_inverse(model_file, time_s, source_files),
+        loaded_inverse(model_file, time_s, source_files, largest_mm),
         chord_mm=chord_um / 1e3,
         origin={"program file": hashed(program_file)},
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.exclude import exclude_option
+from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -32,13 +33,18 @@ STAGES = {
 @click.option("--sources", metavar="A,B,...", help="Sources to look for, in place of all that are known.")
 @source_file_option
 @exclude_option
+@click.option(
+    "--by-sets",
+    is_flag=True,
+    help="Compare sets of causes and print the probability of each: sure of several causes at once. On trial.",
+)
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
 @click.option(
     "--keep-unexplained",
     is_flag=True,
     help="Keep in that model what has no name, as a curve over strut length or force: compensated, cause unknown.",
 )
-@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write a figure here, as SVG.")
+@figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def diagnose(
@@ -47,6 +53,7 @@ def diagnose(
     sources: str | None,
     source_files: tuple[Path, ...],
     exclude: tuple[str, ...],
+    by_sets: bool,
     out: Path | None,
     keep_unexplained: bool,
     figure: Path | None,
@@ -65,6 +72,7 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml --figure diagnosis.svg
       dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
       dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
+      dbbstation diagnose 2026-11-20-hexapod-7 --by-sets
       dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
     """
     from dbbstation.calibration.evaluation import evaluate
@@ -85,7 +93,7 @@ def diagnose(
     candidates = [name.strip() for name in sources.split(",")] if sources else None
     known = every_source(source_files)
     with stage_bar("diagnosis", STAGES, plain=as_json) as progress:
-        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress)
+        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress, by_sets=by_sets)
     found, summary = diagnosed.diagnosis, diagnosed.summary()
     if out is not None:
         unnamed = _kept(found) if keep_unexplained else None
@@ -99,7 +107,7 @@ def diagnose(
     if figure is not None:
         from dbbstation.report.diagnosis_figure import diagnosis_figure
 
-        write_bytes(figure, diagnosis_figure(found), force=force)
+        write_bytes(figure, diagnosis_figure(found, format_of(figure)), force=force)
         say(f"figure written to {figure}")
     if as_json:
         print_json(summary)
@@ -144,11 +152,25 @@ def _print(summary: Mapping[str, Any]) -> None:
     click.echo(summary["unexplained"]["text"])
     if summary["unexplained"]["curve"]:
         _print_curve(summary["unexplained"]["curve"])
+    if summary["further_tests"] is not None:
+        _print_next_tests(summary)
+
+
+STILL_OPEN = frozenset({"ambiguous", "not-testable"})
+
+
+def _print_next_tests(summary: Mapping[str, Any]) -> None:
+    """Print the tests that would settle what is open; that there are none where nothing would; nothing where all is settled."""
     if summary["next_test"]:
-        test = summary["next_test"]
+        tests = [summary["next_test"], *summary["further_tests"]]
+        together = "it" if len(tests) == 1 else f"these {len(tests)} together"
         click.echo(
-            f"measure next: {test['text']}; it would tell {test['source']} to {test['sigma_after']:.2g} instead of "
-            f"{test['sigma_before']:.2g} {test['unit']}"
+            f"measure next: {'; and '.join(test['text'] for test in tests)}; {together} would tell {tests[0]['source']} to "
+            f"{tests[-1]['sigma_after']:.2g} instead of {tests[0]['sigma_before']:.2g} {tests[0]['unit']}"
+        )
+    elif any(source["verdict"] in STILL_OPEN and source["gain"] is not None for source in summary["sources"]):
+        click.echo(
+            "measure next: no single further test would change a verdict or halve an uncertainty, nor would three"
         )
 
 
@@ -208,14 +230,22 @@ def _print_gain(summary: Mapping[str, Any]) -> None:
 def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
     from dbbstation.cli.output import print_table
 
+    by_sets = any("probability" in source for source in sources)
     rows = []
     for source in sources:
         hidden = "" if source["concealed"] is None else f"{100 * source['concealed']:.0f} %"
         gain = "" if source["gain"] is None else f"{source['gain']:.0f}"
-        again = "" if source["stability"] is None else f"{100 * source['stability']:.0f} %"
-        alike = ", ".join(source["ambiguous_with"])
-        rows.append([source["name"], source["verdict"], gain, hidden, again, alike])
-    print_table(["source", "verdict", "log evidence", "concealed", "again", "not told from"], rows)
+        last = (
+            _probable(source)
+            if by_sets
+            else ""
+            if source["stability"] is None
+            else f"{100 * source['stability']:.0f} %"
+        )
+        alike = ", ".join(source["ambiguous_with"] or source.get("class", ())[1:])
+        rows.append([source["name"], source["verdict"], gain, hidden, last, alike])
+    titles = ["log Bayes factor", "concealed", "probability"] if by_sets else ["log evidence", "concealed", "again"]
+    print_table(["source", "verdict", *titles, "not told from"], rows)
     for source in sources:
         if source["verdict"] in {"identified", "ambiguous"}:
             click.echo()
@@ -223,3 +253,10 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
                 value, uncertainty = f"{number['value']:.4g}", f"{number['uncertainty']:.2g}"
                 click.echo(f"{source['name']}: {name} {value} ± {uncertainty} {number['unit']}")
             click.echo(f"  {source['text']}")
+
+
+def _probable(source: Mapping[str, Any]) -> str:
+    """Probability as printed: no figure is closer to one or nought than the catalogue of causes is complete."""
+    if "probability" not in source:
+        return ""
+    return "> 0.999" if source["probability"] > 0.999 else f"{source['probability']:.3f}"  # noqa: PLR2004 - as printed

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.figure_option import figure_option, format_of
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 @click.option("--sources", metavar="A,B,...", help="Causes to look for, in place of all.")
 @click.option("--cutoff-hz", type=float, metavar="HZ", help="Band in which force and model are compared; else chosen.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write what was compared here, as CSV.")
-@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Draw force and friction, as SVG.")
+@figure_option("Draw force and friction here")
 @click.option("--force", is_flag=True, help="Overwrite these files.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def drive(
@@ -65,7 +67,7 @@ def drive(
     if figure is not None:
         from dbbstation.studies.drive_figure import drive_figure
 
-        write_bytes(figure, drive_figure(found), force=force)
+        write_bytes(figure, drive_figure(found, format_of(figure)), force=force)
         summary["figure"] = str(figure)
     for note in summary["notes"]:
         say(f"note: {note}")

@@ -24,7 +24,7 @@ from dbbstation.cli.source_files import source_file_option
 def evaluate(
     sessions: tuple[Path, ...], *, model: Path, source_files: tuple[Path, ...], exclude: tuple[str, ...], as_json: bool
 ) -> None:
-    r"""Compare recordings with the nominal machine (before) and with a model (after).
+    r"""Compare recordings with the nominal machine (before) and with a model (after), which must be of the same machine.
 
     After is what the model leaves of the recordings, not a new measurement. The second table sets the circularity that
     was measured beside the one that the model predicts, both up to 30 undulations per revolution. Flatness over X, Y = ±190 mm and
@@ -43,10 +43,12 @@ def evaluate(
     from dbbstation.cli.output import print_json, say
     from dbbstation.files.models import read_model
     from dbbstation.files.own_sources import every_source
+    from dbbstation.machine.difference import check_model_is_of
     from dbbstation.recorded import load_sessions
 
     identified = read_model(model, every_source(source_files))
     recorded = load_sessions(sessions, exclude)
+    check_model_is_of(recorded.machine, identified.model.machine)
     for warning in recorded.warnings:
         say(f"note: {warning}")
     summary = evaluation_summary(compare(identified.model, recorded.observations))

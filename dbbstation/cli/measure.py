@@ -80,18 +80,18 @@ def measure(
 
     clock = ScaledClock(time_scale)
     machine, plan = read_machine(machine_file), read_inline_plan(plan_file)
+    protocol = at_rate(load_instrument(instrument), rate_hz)
     job = Job(
         machine=machine,
         plan=plan,
         folder=out,
-        details=session_details(**told),
+        details=session_details(**told, stroke_mm=protocol.length.stroke_mm),
         programs={} if programs is None else load_programs(programs, plan.to_domain(), machine),
         patience=Patience() if auto is None else Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)),
         clock=clock,
     )
     job.check(str(plan_file))
     hands = None if auto is None else VirtualHands(auto)
-    protocol = at_rate(load_instrument(instrument), rate_hz)
     with Instrument(protocol, port, baud=baud, clock=clock, **driver_patience(time_scale)) as source:
         workplace = assemble(job, source)
         if workplace.writer.runs and job.details != SessionDetails():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.correction import largest_correction_option
 from dbbstation.cli.source_files import source_file_option
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
@@ -36,6 +37,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     metavar="S",
     help="When programs start, after the session began [s]; for models that need time.",
 )
+@largest_correction_option
 @click.option("--force", is_flag=True, help="Overwrite programs.")
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def program(
@@ -51,6 +53,7 @@ def program(
     clearance_mm: float,
     bar_stays_on: bool,
     time_s: float | None,
+    largest_mm: float,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -77,7 +80,7 @@ def program(
 
     written_in = dialect_named(dialect)
     plan, machine = read_plan(plan_file), read_machine(machine_file)
-    inverse = None if model_file is None else loaded_inverse(model_file, time_s, source_files)
+    inverse = None if model_file is None else loaded_inverse(model_file, time_s, source_files, largest_mm)
     programs = circle_programs(
         plan,
         machine,

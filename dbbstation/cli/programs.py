@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 import numpy as np
 
-from dbbstation.cli.output import print_json, print_table
+from dbbstation.cli.output import print_json, print_table, say
 from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.models import read_model
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from dbbstation.nc.export import Program
 
 
-def loaded_inverse(model_file: Path, time_s: float | None, source_files: Sequence[Path]) -> Inverse:
+def loaded_inverse(model_file: Path, time_s: float | None, source_files: Sequence[Path], largest_mm: float) -> Inverse:
     """Read the model to compensate with; the header will name it and its sessions by hash.
 
     Raises:
@@ -36,7 +36,7 @@ def loaded_inverse(model_file: Path, time_s: float | None, source_files: Sequenc
     say_unknown_causes(identified.model)
     origin |= {f"cause unknown {k}": name for k, name in enumerate(unknown_causes(identified.model), start=1)}
     origin |= {f"session {name}": f"sha256 {digest}" for name, digest in identified.sessions.items()}
-    return Inverse(identified.model, origin, time_s)
+    return Inverse(identified.model, origin, time_s, identified, largest_mm)
 
 
 def hashed(path: Path) -> str:
@@ -82,9 +82,10 @@ def print_programs(
     """Print what was written, as a table or as JSON."""
     if not as_json:
         rows = [
-            [str(path), each.points, "" if each.greatest_um is None else each.greatest_um] for path, each in written
+            [str(path), each.points, *map(_or_empty, (each.greatest_um, each.uncertainty_um))] for path, each in written
         ]
-        print_table(["program", "points", "greatest correction / µm"], rows)
+        print_table(["program", "points", "greatest correction / µm", "model's u along the path / µm"], rows)
+        _say_uncertainty([each for _, each in written])
         return
     print_json(
         {
@@ -97,11 +98,28 @@ def print_programs(
                     "points": each.points,
                     "greatest_correction_um": each.greatest_um,
                     "chord_error_um": each.chord_um,
+                    "chord_asked_um": each.chord_asked_um,
+                    "model_uncertainty_um": each.uncertainty_um,
                 }
                 for path, each in written
             ],
         }
     )
+
+
+def _or_empty(value: float | None) -> float | str:
+    return "" if value is None else value
+
+
+def _say_uncertainty(programs: Sequence[Program]) -> None:
+    """Set what the model knows of the path against the chord error that was asked for."""
+    for each in programs:
+        if each.uncertainty_um is not None and each.chord_asked_um is not None:
+            knows = f"the model knows the path within {each.uncertainty_um:.2g} µm (standard uncertainty)"
+            asked = f"the chord error asked for is {each.chord_asked_um:g} µm"
+            if each.uncertainty_um > each.chord_asked_um:
+                asked += ": moves are split finer than the model knows them"
+            say(f"{knows}, {asked}")
 
 
 def _content(path: Path) -> bytes:

@@ -19,7 +19,11 @@ _OPTIONS = (
     click.option("--serial-number", default="", help="Of the machine."),
     click.option("--ambient-temp-c", type=float, help="Temperature of the shop [degC]."),
     click.option("--bar-serial-number", default="", help="Of the bar."),
-    click.option("--bar-length-mm", type=float, help="Calibrated distance between the ball centres [mm]."),
+    click.option(
+        "--bar-length-mm",
+        type=float,
+        help="Calibrated distance between the ball centres [mm]; held against the plan's radii, never added to readings.",
+    ),
     click.option("--bar-uncertainty-um", type=float, help="Of that length, one standard deviation [µm]."),
     click.option("--bar-temp-c", type=float, help="Of the bar when it was calibrated [degC]."),
 )
@@ -41,19 +45,26 @@ def session_details(
     bar_length_mm: float | None,
     bar_uncertainty_um: float | None,
     bar_temp_c: float | None,
+    stroke_mm: float | None,
 ) -> SessionDetails:
-    """Return what was told of machine, shop and bar.
+    """Return what was told of machine, shop and bar, with the stroke that the instrument file states [mm].
 
     Raises:
         click.UsageError: length without uncertainty, or something of the bar without either.
     """
     from dbbstation.files.session_writer import SessionDetails
 
-    bar = _bar(bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c)
+    bar = _bar(bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c, stroke_mm)
     return SessionDetails(serial_number, operator, ambient_temp_c, bar)
 
 
-def _bar(serial_number: str, length_mm: float | None, uncertainty_um: float | None, temp_c: float | None) -> Bar | None:
+def _bar(
+    serial_number: str,
+    length_mm: float | None,
+    uncertainty_um: float | None,
+    temp_c: float | None,
+    stroke_mm: float | None,
+) -> Bar | None:
     from dbbstation.files.session import Bar
 
     if length_mm is None and uncertainty_um is None:
@@ -62,4 +73,4 @@ def _bar(serial_number: str, length_mm: float | None, uncertainty_um: float | No
         return None
     if length_mm is None or uncertainty_um is None:
         raise click.UsageError("--bar-length-mm and --bar-uncertainty-um belong together")
-    return Bar(serial_number, length_mm, uncertainty_um / 1e3, None, temp_c, None)
+    return Bar(serial_number, length_mm, uncertainty_um / 1e3, None, temp_c, None, stroke_mm)

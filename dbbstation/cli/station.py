@@ -85,10 +85,10 @@ def station(
         folder, _, rest = _DEMO[what].partition("/")
         return shipped_folder(folder) / rest
 
-    details = session_details(**told)
     plan_file = plan_file or demo("plan")
     machine, plan = read_machine(machine_file or demo("machine")), read_inline_plan(plan_file)
     protocol = load_instrument(instrument or _DEMO_INSTRUMENT)
+    details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
     with ExitStack() as stack:
         job = Job(machine, plan, folder, details)

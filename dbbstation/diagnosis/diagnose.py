@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration
+from dbbstation.calibration.missing_physics import SIGNIFICANT
 from dbbstation.calibration.noise_level import fine_noise_mm
 from dbbstation.calibration.stray_balls import beside
 from dbbstation.diagnosis.channel import Channel, channel_of, thinned
@@ -37,10 +38,6 @@ if TYPE_CHECKING:
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource, Motion
-
-SIGNIFICANT = 1e-8
-"""Probability below which a misfit counts as one that nothing explains, with a name or without. The level of the noise is
-read from high harmonics: a sixth too low, as happens where neighbours resemble each other a little, makes 1e-6 of nothing."""
 
 RIVALS, DRAWS = 6, 20
 """Best sources that compete in each draw of a part of the tests, and draws."""
@@ -101,10 +98,10 @@ def diagnose(
         held_out=predicted,
         outliers=tuple(beside(outlier, after) for outlier in outliers),
         workspace=elsewhere,
-        locations=_locations(before, after, [*found.values()], first, rest.finding.variable) if mismatch else (),
+        locations=locations_of(before, after, [*found.values()], first, rest.finding.variable) if mismatch else (),
         sources=findings,
         unexplained=with_exact_wave(rest.finding, after),
-        shifts=_shifts(before, after),
+        shifts=shifts_between(before, after),
         next_tests=_next_tests(channel, settled, findings, known=_known_elsewhere(elsewhere)),
     )
 
@@ -148,10 +145,10 @@ def _by_chance(channel: Channel, settled: Round) -> float:
     return min((min(1.0, tried * float(chi2.sf(square, freedom))) for square, freedom in found), default=1.0)
 
 
-def _tests(channel: Channel) -> list[int]:
+def tests_of(observations: Sequence[Observation]) -> list[int]:
     """Number of the test of each run, counted in the order of recording."""
-    order = {name: k for k, name in enumerate(dict.fromkeys(o.test for o in channel.observations))}
-    return [order[o.test] for o in channel.observations]
+    order = {name: k for k, name in enumerate(dict.fromkeys(o.test for o in observations))}
+    return [order[o.test] for o in observations]
 
 
 def _stability(channel: Channel, findings: Sequence[SourceFinding], settled: Round) -> dict[str, float]:
@@ -163,7 +160,7 @@ def _stability(channel: Channel, findings: Sequence[SourceFinding], settled: Rou
     rivals = [candidate for candidate in channel.named if candidate.name in best]
     return stability(
         channel.blocks,
-        _tests(channel),
+        tests_of(channel.observations),
         channel.base,
         channel.held,
         rivals,
@@ -180,10 +177,8 @@ def _held_out(channel: Channel, chosen: Sequence[Choice], noise_mm: float, fine_
 
     Where neighbouring samples resemble each other the low harmonics, few of all, have more noise than the fine ones.
     """
-    samples = float(np.mean([len(o.raw) for o in channel.observations]))
-    low = min((2 * LOW + 1) / samples, 1.0)
-    single = float(np.sqrt(low * noise_mm**2 + (1.0 - low) * min(fine_mm, noise_mm) ** 2))
-    tests = _tests(channel)
+    single = single_noise_mm(channel.observations, noise_mm, fine_mm)
+    tests = tests_of(channel.observations)
     folds = min(FOLDS, max(tests) + 1)
     groups = [test % folds for test in tests]
     base = np.arange(len(channel.base.prior))
@@ -203,16 +198,32 @@ def _held_out(channel: Channel, chosen: Sequence[Choice], noise_mm: float, fine_
     return without, having
 
 
-def _locations(
+def single_noise_mm(observations: Sequence[Observation], noise_mm: float, fine_mm: float) -> float:
+    """Noise of a single sample, where the low harmonics, few of all, feel more of it than the fine ones [mm]."""
+    samples = float(np.mean([len(o.raw) for o in observations]))
+    low = min((2 * LOW + 1) / samples, 1.0)
+    return float(np.sqrt(low * noise_mm**2 + (1.0 - low) * min(fine_mm, noise_mm) ** 2))
+
+
+def locations_of(
     before: Calibration, after: Calibration, found: Sequence[ErrorSource], first: Misfit, unnamed: str | None
 ) -> tuple[Location, ...]:
+    """Where what the base model leaves is largest, and which strut the found sources say most of it comes from.
+
+    Args:
+        before: the base fit.
+        after: the joint fit.
+        found: sources that were named.
+        first: misfit of the base fit.
+        unnamed: variable of what has no name; None where nothing organises it.
+    """
     fitted = [f for f in after.model.sources if f.source in found]
     variable = next((source.varies_with for source in found if source.varies_with), unnamed or "")
     struts = strut_contributions(before, fitted) if fitted else [None] * len(before.observations)
     return locate(before.observations, before.residual_mm, first.noise, struts, variable)
 
 
-def _shifts(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
+def shifts_between(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
     """How far machine parameters had been pulled, largest first; nothing where nothing was found."""
     if after is before:
         return ()

@@ -48,6 +48,9 @@ class SourceFinding:
             that were, whose uncertainty says how much could hide.
         text: one sentence for people.
         stability: share of draws of seven tenths of the tests in which it is chosen again; None where it was not tried.
+        probability: that it is there, given the recordings and the catalogue of causes; of its class where it has one. None
+            where sets of causes were not compared.
+        equivalent: causes that are observationally equivalent to it, itself among them; empty where there are none.
     """
 
     name: str
@@ -60,6 +63,8 @@ class SourceFinding:
     parameters: dict[str, Value]
     text: str
     stability: float | None = None
+    probability: float | None = None
+    equivalent: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -172,7 +177,8 @@ class NextTest:
         text: what to measure, in words.
         circle: ball, bar and path: x_mm, y_mm, z_mm, a_deg, b_deg, elevation_deg, feed_mm_min, wait_s.
         source: what it is to reveal or to tell apart.
-        sigma_before: standard deviation of its first amplitude now.
+        sigma_before: standard deviation of its amplitude, or of the combination of its amplitudes that gains most, with
+            the tests before it.
         sigma_after: with the test.
         unit: of both.
     """
@@ -202,7 +208,8 @@ class Diagnosis:
         sources: best first.
         unexplained: what is left.
         shifts: largest first.
-        next_tests: best first, each beside those before it; empty where nothing is to be asked.
+        next_tests: best first, each beside those before it; empty where nothing is to be asked; None where it was not
+            looked for.
     """
 
     mismatch: bool
@@ -217,4 +224,4 @@ class Diagnosis:
     sources: tuple[SourceFinding, ...]
     unexplained: Unexplained
     shifts: tuple[Shift, ...]
-    next_tests: tuple[NextTest, ...]
+    next_tests: tuple[NextTest, ...] | None

@@ -10,14 +10,13 @@ import numpy as np
 from scipy.special import chdtri
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration, calibrate, default_sources
+from dbbstation.calibration.missing_physics import misfit_of
 from dbbstation.calibration.outliers import MOST, calibrate_robust
-from dbbstation.calibration.scatter import seats_of
 from dbbstation.calibration.strange_runs import in_place_after_all
-from dbbstation.calibration.stray_balls import free_ball, free_bar
+from dbbstation.calibration.stray_balls import set_free
 from dbbstation.diagnosis.channel import Channel, channel_of
 from dbbstation.diagnosis.unexplained import overruled
 from dbbstation.errors import CalibrationError, KinematicsError
-from dbbstation.inference.harmonics import Misfit, misfit
 from dbbstation.inference.race import AS_GOOD, Candidate, Choice, Race, as_good, select, worth_of
 
 if TYPE_CHECKING:
@@ -25,7 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.outlier import Fit, Outlier, Step
+    from dbbstation.calibration.outlier import Fit, Outlier
+    from dbbstation.inference.harmonics import Misfit
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
@@ -150,34 +150,12 @@ def _look(
             return Look(before, outliers, channel, first, settled)
         chosen = [choice.variant for choice in settled.chosen]
         free = len(outliers) < MOST and not overruled(before, settled.race, settled.left.noise, chosen)
-        step = _set_free(fit, before, settled.off) if free else None
+        step = set_free(fit, before, settled.off.candidate.name, settled.off.variant.of) if free else None
         if step is None:
             channel = replace(channel, set_up=())
             return Look(before, outliers, channel, first, _settle(channel, before, first, progress))
         outliers = (*outliers, replace(step[0], alike=settled.alike))
         before = step[2]
-
-
-def _set_free(fit: Fit, before: Calibration, off: Choice) -> Step | None:
-    """Ball or bar that may be anything from here on; None where the runs cannot be fitted without knowing it."""
-    runs, name = before.observations, off.variant.of
-    try:
-        if off.candidate.name == "bar-offset":
-            return free_bar(fit, runs, name)
-        together = off.candidate.name == "ball-coordinate"
-        of_the_ball = {o.setup.mounting for o in runs if name == (o.setup.ball if together else o.setup.mounting)}
-        return free_ball(fit, runs, min(of_the_ball), seats_of(before), together=together)
-    except CalibrationError:
-        return None
-
-
-def misfit_of(calibration: Calibration) -> Misfit:
-    """Misfit of what a fit leaves; where the balls stand in each mounting does not count."""
-    fitted = int(np.count_nonzero(~calibration.layout.known.random)) - len(calibration.solution.held)
-    # Angles from +X, so that both directions of a mounting have one first harmonic.
-    phases = [np.radians(o.raw.theta_deg) for o in calibration.observations]
-    groups = [o.setup.mounting for o in calibration.observations]
-    return misfit(calibration.residual_mm, phases, groups, fitted)
 
 
 def _settle(

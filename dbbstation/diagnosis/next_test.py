@@ -1,4 +1,4 @@
-"""Which test to measure next: the one that says most of what is still open."""
+"""Which tests to measure next: the fewest that change a verdict that is still open, or halve an uncertainty."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.findings import NextTest
+from dbbstation.diagnosis.verdicts import TESTABLE_SHARE, TESTABLE_SIGMA
 from dbbstation.errors import MachineError
 from dbbstation.inference.square_root import Columns, solve
 from dbbstation.machine.travel import check_travel
@@ -41,8 +42,8 @@ MOST_PROPOSED = 3
 CLOSER_LOOK = 12
 """Proposals that are looked at in both directions each time that one is chosen."""
 
-WORTHWHILE = 0.99
-"""Share of the uncertainty that a further test must come below to be proposed."""
+HALVED = 0.5
+"""Share of an uncertainty that tests must come down to where they change no verdict. Repeating every test once gives 0.7."""
 
 SPACING_S = 200.0
 """From the start of a run to that of the next one [s]."""
@@ -75,10 +76,15 @@ class Proposal:
 def propose(
     channel: Channel, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float, most: int = MOST_PROPOSED
 ) -> tuple[NextTest, ...]:
-    """Return the tests that lower the uncertainty of a source's amplitudes most, each beside those before it.
+    """Return the fewest tests that together change what can be said of a source, or halve its uncertainty.
 
-    Empty where no circle is within reach, or where only the measurement itself shows what a source needs. The
-    uncertainty of several amplitudes is their root mean square, each in units of its plausible size.
+    Tests are added one by one, each the one that lowers the root mean square uncertainty of the amplitudes most beside
+    those before it. A verdict changes where the source becomes testable beside all that it must be told apart from: half
+    of the combinations of its amplitudes, at their plausible sizes, stand out by five standard deviations. An uncertainty
+    is that of one combination; a proposal states that of the combination that gains most.
+
+    Empty where so many tests would do neither, where no circle is within reach, or where only the measurement itself
+    shows what a source needs.
 
     Args:
         channel: what was measured.
@@ -108,19 +114,25 @@ def propose(
     # One direction tells well enough which tests are worth a closer look beside those already chosen.
     one_way = {k: seen(proposal, slice(1)) for k, proposal in enumerate(proposals)}
     both_ways: dict[int, NDArray[np.float64]] = {}
-    found: list[NextTest] = []
-    while one_way and len(found) < most:
-        before = _size(covariance[own, own], variant)
+    chosen: list[Proposal] = []
+    sigmas = [_sigmas(covariance[own, own], variant)]
+    for _ in range(min(most, len(one_way))):
         closer = sorted(one_way, key=lambda k: left(one_way[k]))[:CLOSER_LOOK]
         for k in closer:
             both_ways.setdefault(k, seen(proposals[k], slice(None)))
-        after, k = min((left(both_ways[k]), k) for k in closer)
-        if after > WORTHWHILE * before:
-            break
+        _, k = min((left(both_ways[k]), k) for k in closer)
         del one_way[k]
         covariance = _told(covariance, both_ways[k], noise_mm, slice(None))
-        found.append(_in_words(channel, source, variant, proposals[k], before, after))
-    return tuple(found)
+        chosen.append(proposals[k])
+        sigmas.append(_sigmas(covariance[own, own], variant))
+        if _worth_it(sigmas[0], sigmas[-1]):
+            most_gained = int(np.argmin(sigmas[-1] / sigmas[0]))
+            of = [float(each[most_gained]) for each in sigmas]
+            return tuple(
+                _in_words(channel, source, variant, proposal, before, after)
+                for proposal, before, after in zip(chosen, of[:-1], of[1:], strict=True)
+            )
+    return ()
 
 
 def _told(
@@ -135,6 +147,18 @@ def _told(
 def _size(covariance: NDArray[np.float64], variant: Variant) -> float:
     """Root mean square uncertainty of amplitudes in units of their plausible sizes."""
     return float(np.sqrt(np.mean(np.maximum(np.diag(covariance), 0.0) / variant.plausible**2)))
+
+
+def _sigmas(covariance: NDArray[np.float64], variant: Variant) -> NDArray[np.float64]:
+    """Standard deviations of uncorrelated combinations of amplitudes in units of their plausible sizes, least first, (p,)."""
+    variances = np.linalg.eigvalsh(covariance / np.outer(variant.plausible, variant.plausible))
+    return np.sqrt(np.maximum(variances, np.finfo(np.float64).tiny))
+
+
+def _worth_it(now: NDArray[np.float64], then: NDArray[np.float64]) -> bool:
+    """Whether a source becomes testable, or a combination of its amplitudes half as uncertain."""
+    testable = [bool(np.mean(sigmas <= 1.0 / TESTABLE_SIGMA) >= TESTABLE_SHARE) for sigmas in (now, then)]
+    return testable == [False, True] or bool(np.any(then <= HALVED * now))
 
 
 def _in_words(

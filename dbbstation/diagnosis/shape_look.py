@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 
 from dbbstation.diagnosis.forms import Bump, Form, Lobes, PlaneStep, Step, Wave, WaveOfTurn
 from dbbstation.diagnosis.shapes import BALL, EVERY, PLAUSIBLE_MM, READING, TABLE, TOOL, Ranges, Samples, Shape
-from dbbstation.inference.race import free_directions
+from dbbstation.inference.square_root import free_directions
 from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:

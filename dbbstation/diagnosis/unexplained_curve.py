@@ -20,7 +20,7 @@ from dbbstation.diagnosis.findings import Curve, CurvePoint
 from dbbstation.diagnosis.forms import HATS, Hats, Plane, PlaneStep
 from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, READING, TABLE, TOOL, UNITS
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.race import free_directions
+from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

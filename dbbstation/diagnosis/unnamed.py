@@ -80,12 +80,13 @@ class Unnamed:
         return tuple(found)
 
 
-def unnamed(calibration: Calibration, noise_mm: float) -> Unnamed:
-    """Lay out all shapes over the runs of a fit.
+def unnamed(calibration: Calibration, noise_mm: float, only: Sequence[Shape] | None = None) -> Unnamed:
+    """Lay out shapes over the runs of a fit.
 
     Args:
         calibration: the fit; its runs as thinned.
         noise_mm: of one sample [mm].
+        only: these shapes; all that there are, and those that the readings follow best, if None.
     """
     layout, noise = calibration.layout, max(noise_mm, SMALLEST_NOISE_MM)
     count = len(layout.known.prior)
@@ -102,7 +103,9 @@ def unnamed(calibration: Calibration, noise_mm: float) -> Unnamed:
     held = calibration.solution.held
     extent = ranges(runs)
     wide = [_widened(own, jacobian, count) for own, jacobian in zip(numbers, jacobians, strict=True)]
-    every = [*shapes(extent), *looked_for(Look(runs, left, wide, layout.known, held, noise), extent)]
+    every = list(only or ())
+    if only is None:
+        every = [*shapes(extent), *looked_for(Look(runs, left, wide, layout.known, held, noise), extent)]
     blocks = [
         _block(run, every, own, jacobian, residual, (calibration.x - layout.nominal)[own], count)
         for run, own, jacobian, residual in zip(runs, numbers, jacobians, left, strict=True)

@@ -12,7 +12,8 @@ from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Ver
 from dbbstation.diagnosis.held import uncertainties
 from dbbstation.diagnosis.shapes import variable_of
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.race import AS_GOOD, Race, as_good, contained, free_directions, worth_of
+from dbbstation.inference.race import AS_GOOD, Race, as_good, contained, worth_of
+from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -15,6 +15,7 @@ from dbbstation.files.run_csv import PART, read_run
 from dbbstation.files.schema import FORMATS
 from dbbstation.files.session import SESSION_FILE, RunState, SessionFolder, parse_session
 from dbbstation.files.yaml_text import load_yaml
+from dbbstation.trace.loss import lost_samples
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -120,7 +121,9 @@ def _run(checked: Checked) -> None:
         return
     checked.warnings += run.warnings
     seconds = run.recording.t_s[-1] - run.recording.t_s[0]
-    checked.summary = f"run: {_count(len(run.recording), 'sample')} in {seconds:.1f} s"
+    lost = lost_samples(run.recording.t_s)
+    told = f", {lost} lost" if lost else ""
+    checked.summary = f"run: {_count(len(run.recording), 'sample')} in {seconds:.1f} s{told}"
 
 
 def _drive(checked: Checked) -> None:
@@ -140,7 +143,10 @@ def _session(checked: Checked) -> None:
         return
     for run in session.runs:
         try:
-            checked.warnings += session.load(run).warnings
+            read = session.load(run)
+            checked.warnings += read.warnings
+            if run.state is not RunState.REJECTED:
+                checked.warnings += session.loss(run, read.recording)
         except InputError as error:
             # A run that died before its first sample is no fault of the session.
             found = checked.warnings if run.state is RunState.RECORDING else checked.problems

@@ -127,6 +127,10 @@ class MachineParts(Schema):
     joint_tolerance_mm: Annotated[float, Quantity("mm", 1e-4, 10)] | None = None
     """Standard deviation of each base-joint coordinate after assembly [mm]; without it no weak direction of a
     calibration is regularised."""
+    greatest_feed_mm_min: Annotated[float, Quantity("mm/min", 100, 500_000)] | None = None
+    """Greatest feed of the tool tip [mm/min]; programs with a larger F are refused. Without it 100000."""
+    greatest_turn_deg_min: Annotated[float, Quantity("deg/min", 10, 500_000)] | None = None
+    """Greatest speed of the tilt angles [deg/min], for the F of moves that only turn. Without it 36000."""
     masses: MassesSchema | None = None
     """What gravity acts on; needed by the sources that model it."""
     compliance: ComplianceSchema | None = None
@@ -155,6 +159,8 @@ class MachineParts(Schema):
             compliance=None if compliance is None else Compliance(**compliance.model_dump()),
             strut_masses=None if strut_masses is None else StrutMasses(**strut_masses.model_dump()),
             joint_axes=None if axes is None else JointAxes(np.array(axes.base), np.array(axes.platform)),
+            greatest_feed_mm_min=self.greatest_feed_mm_min,
+            greatest_turn_deg_min=self.greatest_turn_deg_min,
         )
 
 
@@ -174,6 +180,8 @@ def machine_parts(machine: Machine) -> MachineParts:
             "travel": asdict(machine.travel),
             "screw_lead_mm": machine.screw_lead_mm,
             "joint_tolerance_mm": machine.joint_tolerance_mm,
+            "greatest_feed_mm_min": machine.greatest_feed_mm_min,
+            "greatest_turn_deg_min": machine.greatest_turn_deg_min,
             "masses": machine.masses and asdict(machine.masses),
             "compliance": machine.compliance and asdict(machine.compliance),
             "strut_masses": machine.strut_masses and asdict(machine.strut_masses),

@@ -11,6 +11,7 @@ from dbbstation.errors import InputError, ModelError, Problem
 from dbbstation.files.atomic import refuse_existing, write_text
 from dbbstation.files.machine_file import machine_data, machine_parts
 from dbbstation.files.model_file import CovarianceSchema, ModelFile, SourceSchema
+from dbbstation.files.quantities import Quantity
 from dbbstation.files.schema import dotted, read_document, validate
 from dbbstation.files.yaml_out import yaml_text
 from dbbstation.model.identified import IdentifiedModel
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.yaml_text import Location, YamlDocument
     from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
 
 _ROUNDING = 1e-9
 """How far rounding may leave a covariance from symmetric, as a correlation."""
@@ -137,12 +139,21 @@ class _Sources:
             elif given.unit != expected[name].unit:
                 what = f"{source.name} {name} is in {expected[name].unit}, not in {given.unit}"
                 self._fault((*location, name, "unit"), what, "convert the number, do not only change the unit")
+            elif source.belongs_to is Owner.MACHINE:
+                self._check_value((*location, name, "value"), source, expected[name], given.value)
         may_lack = {name for name, parameter in expected.items() if parameter.newer}
         if set(entry.parameters) | may_lack != set(expected):
             return None
         stated = {name: given.value for name, given in entry.parameters.items()}
         values = np.array([stated.get(name, 0.0) for name in expected], dtype=np.float64)
         return Fitted(source, values, shared)
+
+    def _check_value(self, location: Location, source: ErrorSource, parameter: Parameter, value: float) -> None:
+        """Add a fault for a value that no machine has: it would be compensated."""
+        size = Quantity(parameter.unit, 0.0, parameter.largest, signed=True)
+        if not size.fits(value):
+            what = f"{source.name} {parameter.name}: {value:g} {parameter.unit} is not plausible, expected {size.range}"
+            self._fault(location, what, "check the number and its unit")
 
     def _fault(self, location: Location, what: str, remedy: str, *, at_key: bool = False) -> None:
         self._faults.append(self._document.problem(location, what, remedy, at_key=at_key))

@@ -23,7 +23,7 @@ from dbbstation.files.quantities import Quantity, twice
 from dbbstation.files.schema import Schema, dotted, read_document, validate
 from dbbstation.files.yaml_text import YamlDocument
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.plan.plan import Ball, Plan, PlannedTest, Plate
+from dbbstation.plan.plan import LARGEST_LOSS_PERCENT, Ball, Plan, PlannedTest, Plate
 
 NO_PLATE = JigSchema(bores={}, origin_in_machine_mm=(0.0, 0.0, 0.0))
 """A plan that puts all its balls up under the spindle needs no plate: places are in the machine frame."""
@@ -130,6 +130,8 @@ class PlanFile(Schema):
     """Tests in the order they are run."""
     repeat_at_end: tuple[str, ...] = ()
     """Tests measured once more after all others, so that drift and height do not mix."""
+    largest_loss_percent: Annotated[float, Quantity("%", 0.001, 100, or_zero=True)] | None = None
+    """Share of a run's samples that may be lost; a run that lost more is repeated [%]. Absent: 0.5."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,9 @@ class InlinePlan:
         """Return the plan that calculations use: balls in the machine frame, every circle complete."""
         balls = {name: self._ball(name, ball) for name, ball in self.plan.balls.items()}
         tests = {test.name: _planned(test, balls[test.ball], self.plan.path) for test in self.plan.tests}
-        return Plan(self.plan.name, tests, self.plan.repeat_at_end)
+        limit = self.plan.largest_loss_percent
+        largest = LARGEST_LOSS_PERCENT if limit is None else limit
+        return Plan(self.plan.name, tests, self.plan.repeat_at_end, largest)
 
     def _ball(self, name: str, ball: BallSchema) -> Ball:
         x, y, z = ball.centre_mm

@@ -56,7 +56,7 @@ class Quantity:
         raise PydanticCustomError(
             "implausible",
             "{value} is not plausible, expected {range}{guess}",
-            {"value": f"{value:g} {self.unit}".strip(), "range": self._range(), "guess": self.guess(value)},
+            {"value": f"{value:g} {self.unit}".strip(), "range": self.range, "guess": self.guess(value)},
         )
 
     def guess(self, value: float) -> str:
@@ -68,7 +68,9 @@ class Quantity:
             return " (it looks like kelvin)"
         return ""
 
-    def _range(self) -> str:
+    @property
+    def range(self) -> str:
+        """The plausible sizes as text."""
         sizes = f"{self.least:g} to {self.most:g}"
         if self.signed:
             sizes = f"±({sizes})" if self.least else f"-{self.most:g} to {self.most:g}"

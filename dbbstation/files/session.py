@@ -18,11 +18,12 @@ from dbbstation.files.quantities import Quantity
 from dbbstation.files.run_csv import PART, RunFile, read_run, sealed_or_part
 from dbbstation.files.run_lines import split_file
 from dbbstation.files.schema import read_document, validate
-from dbbstation.files.session_checks import check_runs
+from dbbstation.files.session_checks import check_bar, check_runs
 from dbbstation.files.session_file import BarSchema, ProgramSchema, RunSchema, SessionFile
 from dbbstation.files.session_set_up import SetUpReadings, check_set_up_errors, mounted_name, set_up_readings
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
+from dbbstation.trace.loss import AFTER_LOSS, lost_samples, too_many_lost
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -105,7 +106,7 @@ class RunEntry:
 
 @dataclass(frozen=True)
 class Bar:
-    """The bar: provenance and uncertainty, nothing of it is added to readings.
+    """The bar: nothing of it is added to readings; its length is held against the plan's radii.
 
     Attributes:
         serial_number: of the bar.
@@ -114,6 +115,7 @@ class Bar:
         calibrated: when; None where not noted.
         temp_c: of the bar then [degC]; None where not noted.
         expansion_um_m_k: thermal expansion [µm/(m K)]; None where not noted.
+        stroke_mm: travel of its gauge from that length, either way [mm]; None where not noted.
     """
 
     serial_number: str
@@ -122,6 +124,7 @@ class Bar:
     calibrated: datetime | None
     temp_c: float | None
     expansion_um_m_k: float | None
+    stroke_mm: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,6 +233,12 @@ class SessionFolder:
             raise InputError(faults)
         return read
 
+    def loss(self, run: RunEntry, recording: Recording) -> list[Problem]:
+        """Return what is to be said of samples that a run lost, where they are more than the plan allows."""
+        lost, kept = lost_samples(recording.t_s), len(recording)
+        what = too_many_lost(lost, kept, self.plan.largest_loss_percent)
+        return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
+
     def _implausible(self, run: RunEntry, recording: Recording) -> list[Problem]:
         """Units that the file itself cannot tell: only the planned circle says how long and how far."""
         circle, file = self.circle(run), str(run.path)
@@ -287,6 +296,8 @@ def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
     planned = None if plan is None else plan.to_domain()
     check_runs(document, planned, folder, faults)
     check_set_up_errors(document, planned, faults)
+    if session is not None and planned is not None and session.bar is not None:
+        check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, planned, faults)
     if session is None or machine is None or planned is None:
         return None
     entries = [run_entry(run, folder) for run in session.runs]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.files.bar_reach import unlike_bar
 from dbbstation.files.quantities import twice
 from dbbstation.files.run_csv import changed, sealed_or_part
 from dbbstation.files.source_text import read_bytes
@@ -38,6 +39,15 @@ def check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: 
         _check_file(document, location, run, folder, faults)
         if isinstance(run.get("program"), dict):
             _check_file(document, (*location, "program"), run["program"], folder, faults)
+
+
+def check_bar(
+    document: YamlDocument, length_mm: float, stroke_mm: float | None, plan: Plan, faults: list[Problem]
+) -> None:
+    """Check that the bar can run the circles of the plan."""
+    fault = unlike_bar(length_mm, stroke_mm, plan)
+    if fault is not None:
+        faults.append(document.problem(("bar", "calibrated_length_mm"), *fault))
 
 
 def _check_file(

@@ -40,7 +40,7 @@ Sha256Hex = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class BarSchema(Schema):
-    """The bar and how its length was calibrated: provenance and uncertainty, nothing of it is added to readings."""
+    """The bar and how its length was calibrated: held against the plan, nothing of it is added to readings."""
 
     serial_number: str = ""
     """Of the bar."""
@@ -48,6 +48,8 @@ class BarSchema(Schema):
     """Distance between the ball centres that the calibration found [mm]."""
     calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
     """Uncertainty of that length, one standard deviation [mm]."""
+    stroke_mm: Annotated[float, Quantity("mm", 0.1, 100)] | None = None
+    """How far its gauge travels from that length, either way; circles of other radii cannot have been run with it [mm]."""
     calibrated: Moment | None = None
     """When."""
     temp_c: TemperatureDegc | None = None

@@ -105,6 +105,7 @@ def misfit(
     phases_rad: Sequence[NDArray[np.float64]],
     groups: Sequence[object],
     freedom_used: float,
+    noise: Spectrum | None = None,
 ) -> Misfit:
     """Compare the low harmonics of residuals with what noise puts there by an F test.
 
@@ -116,22 +117,21 @@ def misfit(
         phases_rad: of the samples [rad].
         groups: what each run shares its first harmonic with.
         freedom_used: degrees of freedom that the fit took out of the low harmonics beside those shifts.
+        noise: measured elsewhere; read from the high harmonics of these residuals if None.
     """
     low, high = bands(min(len(residual) for residual in residuals))
-    all_coefficients = np.array(
-        [coefficients(residual, phase, high) for residual, phase in zip(residuals, phases_rad, strict=True)]
-    )
+    all_coefficients = _all_coefficients(residuals, phases_rad, high)
     first = [1, high + 1]
     for group in set(groups):
         of_group = [k for k, g in enumerate(groups) if g == group]
         all_coefficients[np.ix_(of_group, first)] -= all_coefficients[np.ix_(of_group, first)].mean(axis=0)
-    squares = (all_coefficients**2).sum(axis=0)
-    by_harmonic = squares[1 : high + 1] + squares[high + 1 :]
-    noise = noise_spectrum(by_harmonic[low:], low, 2.0 * len(residuals))
+    mean, by_harmonic = _squares(all_coefficients, high)
+    if noise is None:
+        noise = noise_spectrum(by_harmonic[low:], low, 2.0 * len(residuals))
     counts = np.r_[1.0, np.full(low, 2.0)] * len(residuals)
     counts[1] -= 2.0 * len(set(groups))
     freedom = max(float(counts.sum()) - freedom_used, 1.0)
-    measured = np.r_[squares[0], by_harmonic[:low]]
+    measured = np.r_[mean, by_harmonic[:low]]
     if not np.all(noise.power > 0.0):
         return Misfit(1.0, 0.0, 0.0, 1.0)
     ratio = float(np.sum(measured / noise.power)) / freedom
@@ -140,6 +140,62 @@ def misfit(
     excess = max(float(measured.sum()) - expected, 0.0) / len(residuals) / samples
     probability = float(f_distribution.sf(ratio, freedom, noise.freedom))
     return Misfit(probability, float(np.sqrt(noise.power[0])), float(np.sqrt(excess)), ratio)
+
+
+def noise_left_by(
+    residuals: Sequence[NDArray[np.float64]],
+    phases_rad: Sequence[NDArray[np.float64]],
+    of_white: Sequence[Sequence[NDArray[np.float64]]],
+) -> Spectrum:
+    """Noise from what a model of very many columns leaves, in the harmonics above the low ones.
+
+    Such a model takes out a good deal of the noise itself, of some harmonics more than of others. How much is seen from
+    what it leaves of white noise of unit size.
+
+    Args:
+        residuals: what it leaves of the measurement, one whole period per run.
+        phases_rad: of the samples [rad].
+        of_white: what it leaves of white noise, the same for every draw.
+    """
+    low, high = bands(min(len(residual) for residual in residuals))
+    _, squares = _squares(_all_coefficients(residuals, phases_rad, high), high)
+    kept = sum(_squares(_all_coefficients(draw, phases_rad, high), high)[1] for draw in of_white)
+    freedom = 2.0 * len(residuals)
+    share = np.asarray(kept) / (len(of_white) * freedom)
+    # Few draws scatter from harmonic to harmonic; what a model takes out changes slowly with them.
+    width = min(SMOOTHED, len(share))
+    share = np.convolve(np.pad(share, width // 2, mode="edge"), np.full(width, 1.0 / width), mode="valid")[
+        : len(squares)
+    ]
+    above = slice(low, high)
+    usable = share[above] > LEAST_LEFT
+    if not usable.any():
+        return Spectrum(np.zeros(low + 1), 1.0)
+    left = np.where(usable, squares[above] / np.maximum(share[above], LEAST_LEFT), np.nan)
+    left = np.where(usable, left, np.nanmean(left))
+    # As many degrees of freedom as are left on average, with the power that all of them would have.
+    usual = float(np.mean(share[above]))
+    return noise_spectrum(left * usual, low, freedom * usual)
+
+
+SMOOTHED = 9
+"""Harmonics over which the share that a model leaves is averaged."""
+
+LEAST_LEFT = 0.02
+"""Share of a harmonic that must be left of it to say anything of the noise there."""
+
+
+def _all_coefficients(
+    residuals: Sequence[NDArray[np.float64]], phases_rad: Sequence[NDArray[np.float64]], high: int
+) -> NDArray[np.float64]:
+    """Coefficients of all runs, shape (runs, 2 high + 1)."""
+    return np.array([coefficients(r, phase, high) for r, phase in zip(residuals, phases_rad, strict=True)])
+
+
+def _squares(all_coefficients: NDArray[np.float64], high: int) -> tuple[float, NDArray[np.float64]]:
+    """Sums of squares over runs: of harmonic 0, and of harmonics 1 to `high`, shape (high,)."""
+    squares = (all_coefficients**2).sum(axis=0)
+    return float(squares[0]), squares[1 : high + 1] + squares[high + 1 :]
 
 
 def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Spectrum:

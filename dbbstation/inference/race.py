@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import qr
 
-from dbbstation.inference.square_root import complement, spread
+from dbbstation.inference.square_root import free_directions, spread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -410,10 +410,3 @@ def _whole(blocks: Sequence[Block], columns: int, noise: float) -> NDArray[np.fl
     """One triangle of all blocks, target last, weighted by their noise."""
     (triangle,) = qr(spread(blocks, columns, noise), mode="r", overwrite_a=True)
     return np.asarray(triangle, dtype=np.float64)[: columns + 1]
-
-
-def free_directions(base: Columns, fitted: NDArray[np.int64], held: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Fitted columns in units of their scales, along the directions that are not held, shape (f, free)."""
-    if len(held) == 0:
-        return np.diag(base.scale[fitted])
-    return base.scale[fitted][:, None] * complement(held).T

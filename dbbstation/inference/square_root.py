@@ -262,3 +262,10 @@ def complement(rows: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.eye(rows.shape[1])
     _, _, vt = np.linalg.svd(rows, full_matrices=True)
     return vt[len(rows) :]
+
+
+def free_directions(base: Columns, fitted: NDArray[np.int64], held: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Fitted columns in units of their scales, along the directions that are not held, shape (f, free)."""
+    if len(held) == 0:
+        return np.diag(base.scale[fitted])
+    return base.scale[fitted][:, None] * complement(held).T

@@ -101,12 +101,14 @@ class Length(Schema):
         mm_per_count: for unit `count`.
         sense: -1 where the number falls when the balls move apart.
         range_mm: lengths outside are reported as overrange.
+        stroke_mm: travel of the gauge from the bar's calibrated length, either way; circles of other radii are refused.
     """
 
     unit: Unit = "mm"
     mm_per_count: float | None = Field(default=None, gt=0.0)
     sense: Literal[1, -1] = 1
     range_mm: tuple[float, float]
+    stroke_mm: float | None = Field(default=None, gt=0.0)
 
     @model_validator(mode="after")
     def _count_has_size(self) -> Length:

@@ -14,6 +14,13 @@ if TYPE_CHECKING:
 
 STRUTS = 6
 
+GREATEST_FEED_MM_MIN = 100_000.0
+"""Feed that a machine is taken to reach where its file says nothing: 100 m/min, the rapid of the fastest parallel machine
+tools. It keeps senseless numbers out of programs; what the machine really reaches belongs into its file [mm/min]."""
+
+GREATEST_TURN_DEG_MIN = 36_000.0
+"""The same for moves that only turn: a hundred turns per minute [deg/min]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Hexapod:
@@ -130,6 +137,8 @@ class Machine:
         compliance: of the struts as designed; None where not known.
         strut_masses: of the struts as designed; None where not known.
         joint_axes: of universal joints; None where not known, or where the joints are balls.
+        greatest_feed_mm_min: of the tool tip [mm/min]; None where not known.
+        greatest_turn_deg_min: of the tilt angles where the tool tip stands still [deg/min]; None where not known.
     """
 
     name: str
@@ -142,3 +151,15 @@ class Machine:
     compliance: Compliance | None = None
     strut_masses: StrutMasses | None = None
     joint_axes: JointAxes | None = None
+    greatest_feed_mm_min: float | None = None
+    greatest_turn_deg_min: float | None = None
+
+    @property
+    def feed_limit_mm_min(self) -> float:
+        """Greatest F of a move of the tool tip that is written [mm/min]."""
+        return GREATEST_FEED_MM_MIN if self.greatest_feed_mm_min is None else self.greatest_feed_mm_min
+
+    @property
+    def turn_limit_deg_min(self) -> float:
+        """Greatest F of a move that only turns [deg/min]."""
+        return GREATEST_TURN_DEG_MIN if self.greatest_turn_deg_min is None else self.greatest_turn_deg_min

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -87,6 +88,12 @@ class MachineModel:
         """The machine file with the compliance that a source found in place of its own: struts have one compliance."""
         found = [f.source.found_compliance(self.machine, f.values) for f in self.sources]
         return next((replace(self.machine, compliance=one) for one in found if one is not None), self.machine)
+
+    @property
+    def shortest_period_mm(self) -> float:
+        """Shortest way over which an effect of the machine's own sources goes up and down once; infinite without [mm]."""
+        own = (f for f in self.sources if f.source.belongs_to is Owner.MACHINE and f.values.any())
+        return min((f.source.shortest_period_mm(self.machine, f.values) for f in own), default=math.inf)
 
     def driven_mm(self, frames: Frames) -> NDArray[np.float64]:
         """Strut lengths that the controller drives to for commanded poses, shape (n, 6) [mm]."""

@@ -14,6 +14,17 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
 
 
+LONGEST_COMMENT = 200
+"""LinuxCNC refuses lines of more than 252 characters; other controls have shorter comments, and cut them."""
+
+
+def plain(text: str) -> str:
+    """Text on one line of printable ASCII, no longer than a comment may be."""
+    ascii_text = text.replace("µ", "u").encode("ascii", "replace").decode()
+    printable = "".join(letter if letter.isprintable() else " " for letter in ascii_text)
+    return printable[:LONGEST_COMMENT].strip()
+
+
 class Dialect(ABC):
     """One control's language. Each stands in a file of its own in `dialects/` and carries no state."""
 
@@ -27,7 +38,8 @@ class Dialect(ABC):
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
         """Return the program, with the header's lines as comments before anything else.
 
-        The same toolpath and header give the same text: no date, nothing of the computer it was written on.
+        The same toolpath and header give the same text: no date, nothing of the computer it was written on. Where the
+        toolpath has `numbers`, its first and last line that are no comment carry them.
         """
 
     @abstractmethod

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import ModelError, StationError
+from dbbstation.errors import StationError
+from dbbstation.machine.difference import check_model_is_of
+from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import CHORD_MM, compensate_toolpath
-from dbbstation.nc.reach import check_reach
+from dbbstation.nc.limits import LARGEST_CORRECTION_MM
+from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
+from dbbstation.nc.reach import STEP_DEG as REACH_DEG
+from dbbstation.nc.reach import STEP_MM as REACH_MM
+from dbbstation.nc.reach import check_feeds, check_reach
+from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dbbstation.machine.geometry import Machine
+    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.dialect import Dialect
@@ -32,11 +40,15 @@ class Inverse:
         model: calibrated model.
         origin: where it comes from, for the header: what by which name or hash.
         started_s: start of each program on the time scale of the model's sessions [s]; None where not known.
+        identified: the same model with the covariance of its values; None where that is not known.
+        largest_mm: greatest correction that is applied [mm].
     """
 
     model: MachineModel
     origin: Mapping[str, str] = field(default_factory=dict)
     started_s: float | None = None
+    identified: IdentifiedModel | None = None
+    largest_mm: float = LARGEST_CORRECTION_MM
 
 
 @dataclass(frozen=True)
@@ -49,6 +61,8 @@ class Program:
         points: moves at feed.
         greatest_um: largest correction of a programmed point [µm]; None in a nominal program.
         chord_um: largest chord error that splitting left [µm]; None where nothing was split.
+        chord_asked_um: chord error that was asked for [µm]; None where nothing was split.
+        uncertainty_um: greatest standard uncertainty of the model's tool tip along the path [µm]; None where not known.
     """
 
     name: str
@@ -56,10 +70,8 @@ class Program:
     points: int
     greatest_um: float | None = None
     chord_um: float | None = None
-
-
-COMPENSATED = "compensated, greatest correction"
-"""How a header says that a program is compensated: nobody should do that twice."""
+    chord_asked_um: float | None = None
+    uncertainty_um: float | None = None
 
 
 def circle_programs(
@@ -91,7 +103,7 @@ def circle_programs(
         StationError: a test that the plan does not have.
     """
     if inverse is not None:
-        _check_same_machine(machine, inverse.model.machine)
+        check_model_is_of(machine, inverse.model.machine)
     unknown = [name for name in tests if name not in plan.tests]
     if unknown:
         known = ", ".join(plan.tests)
@@ -122,12 +134,12 @@ def compensated_program(
         TravelError: the compensated path leaves the travel.
         KinematicsError: a pose that the machine cannot take.
         ModelError: the model has a source that needs what a program lacks.
-        StationError: the program says that it is compensated already.
+        MachineError: a feed that the machine does not reach.
+        StationError: the program is compensated already or for another machine, or its corrections are too large.
     """
-    if any(text.startswith(COMPENSATED) for text in path.text.values()):
-        what = "this program is compensated already"
-        raise StationError(what, where=path.name, remedy="compensate the nominal program that it was made from")
     machine = inverse.model.machine
+    check_nominal(path)
+    check_machine(path, machine)
     header = [f"machine: {machine.name}", *_said(origin or {})]
     return _program(path, machine, dialect, path.name, inverse, chord_mm, header)
 
@@ -143,14 +155,43 @@ def _program(
 ) -> Program:
     name = stem if stem.endswith(dialect.extension) else stem + dialect.extension
     check_reach(machine, path)
+    check_feeds(machine, path)
     if inverse is None:
         return Program(name, dialect.write(path, header), _points(path))
-    done = compensate_toolpath(path, inverse.model, chord_mm=chord_mm, started_s=inverse.started_s)
+    model, started_s = inverse.model, inverse.started_s
+    done = compensate_toolpath(path, model, chord_mm=chord_mm, started_s=started_s, largest_mm=inverse.largest_mm)
     check_reach(machine, done.toolpath)
     header = [*header, *_said(inverse.origin), f"{COMPENSATED} {done.greatest_um:.3f} um"]
-    if done.chord_um is not None:
-        header.append(f"moves split to keep a chord error of {1e3 * (chord_mm or 0.0):g} um")
-    return Program(name, dialect.write(done.toolpath, header), _points(done.toolpath), done.greatest_um, done.chord_um)
+    asked_um = None if chord_mm is None else 1e3 * chord_mm
+    if asked_um is not None:
+        header.append(f"moves split to keep a chord error of {asked_um:g} um")
+    uncertainty_um = _uncertainty_um(path, inverse)
+    if uncertainty_um is not None:
+        header.append(f"standard uncertainty of the model along the path {uncertainty_um:.3f} um at most")
+    mark = checksum(done.toolpath)
+    text = dialect.write(replace(done.toolpath, numbers=(mark, mark)), header)
+    return Program(name, text, _points(done.toolpath), done.greatest_um, done.chord_um, asked_um, uncertainty_um)
+
+
+UNCERTAIN_AT = 2000
+"""Poses at which the model's uncertainty is taken, spread over the path: it changes over decimetres."""
+
+
+def _uncertainty_um(path: Toolpath, inverse: Inverse) -> float | None:
+    """Greatest standard uncertainty of the tool tip along the path, all three coordinates together [µm]."""
+    if inverse.identified is None or not inverse.identified.covariance_rows:
+        return None
+    row, share = path.subdivided(REACH_MM, REACH_DEG)
+    known = ~np.isnan(path.poses[row, 0]) & path.is_move[row]
+    row, share = row[known], share[known]
+    some = np.unique(np.linspace(0, len(row) - 1, UNCERTAIN_AT).astype(np.int64))
+    row, share = row[some], share[some]
+    time_s = None
+    if inverse.started_s is not None:
+        time_s = inverse.started_s + path.end_s[row] - (1.0 - share) * path.duration_s[row]
+    motion = Motion(poses=path.between(row, share), is_path=True, time_s=time_s)
+    per_axis_mm = position_uncertainty_mm(inverse.identified, motion)
+    return 1e3 * float(np.linalg.norm(per_axis_mm, axis=1).max())
 
 
 def _circle_header(name: str, circle: Circle, step_deg: float, names: Mapping[str, str]) -> list[str]:
@@ -171,18 +212,3 @@ def _said(names: Mapping[str, str]) -> list[str]:
 
 def _points(path: Toolpath) -> int:
     return int(np.count_nonzero(path.is_move))
-
-
-def _check_same_machine(machine: Machine, other: Machine) -> None:
-    """Refuse a model whose nominal machine is not the one that the programs are for."""
-    same = (
-        np.array_equal(machine.hexapod.base_joints_mm, other.hexapod.base_joints_mm)
-        and np.array_equal(machine.hexapod.platform_joints_mm, other.hexapod.platform_joints_mm)
-        and machine.hexapod.rotation == other.hexapod.rotation
-        and np.array_equal(machine.reference_length_error_mm, other.reference_length_error_mm)
-    )
-    if not same:
-        raise ModelError(
-            f"the model was calibrated on another nominal machine ({other.name}) than {machine.name}",
-            remedy="give the machine file that its sessions were recorded with",
-        )

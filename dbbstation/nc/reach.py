@@ -1,4 +1,4 @@
-"""Whether the machine can run a whole toolpath, between its programmed points as well."""
+"""Whether the machine can run a whole toolpath: its travel, between programmed points as well, and its feeds."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import TravelError
+from dbbstation.errors import MachineError, TravelError
 from dbbstation.machine.travel import check_travel
+from dbbstation.nc.toolpath import Step, in_pieces
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,30 +21,80 @@ STEP_DEG = 0.5
 """Spacing of the poses that are checked: struts are shortest somewhere in the middle of a move, where they change by
 less than a micrometre over half a step."""
 
+AT_ONCE = 200_000
+"""Poses that are checked together: some hundred megabytes."""
+
 
 def check_reach(machine: Machine, toolpath: Toolpath) -> None:
     """Refuse a toolpath that leaves the travel of axes, angles or struts anywhere on its way.
 
+    Nothing is looked at behind the first programmed point outside: moves between points inside are short, so that the
+    number of poses between them is bounded.
+
     Raises:
         TravelError: names program, line, pose and limit.
     """
-    row, share = toolpath.subdivided(STEP_MM, STEP_DEG)
-    poses = toolpath.between(row, share)
-    known = ~np.isnan(poses[:, 0]) & toolpath.is_move[row]
-    row, poses = row[known], poses[known]
-    if toolpath.start is not None:
-        row, poses = np.concatenate([[0], row]), np.vstack([toolpath.start, poses])
-    if _is_inside(machine, poses):
+    points = _Poses(toolpath, np.arange(len(toolpath)), np.ones(len(toolpath)))
+    outside = points.first_outside(machine)
+    upto = len(toolpath) if outside is None else int(points.row[outside]) + 1
+    pieces = toolpath.pieces(STEP_MM, STEP_DEG)[:upto]
+    block = np.cumsum(pieces) // AT_ONCE
+    for rows in np.split(np.arange(upto), np.flatnonzero(np.diff(block)) + 1):
+        row, share = in_pieces(pieces[rows])
+        poses = _Poses(toolpath, rows[row], share)
+        outside = poses.first_outside(machine)
+        if outside is not None:
+            where = _where(toolpath, int(poses.row[outside]))
+            check_travel(machine, poses.poses[outside : outside + 1], where=where)
+
+
+def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
+    """Refuse feeds that the machine does not reach.
+
+    Raises:
+        MachineError: names program, line, feed and limit.
+    """
+    turning = toolpath.only_turns
+    limit = np.where(turning, machine.turn_limit_deg_min, machine.feed_limit_mm_min)
+    over = (toolpath.kind == Step.FEED) & (toolpath.feed > limit)
+    if not over.any():
         return
-    inside, outside = 0, len(poses)
-    while outside - inside > 1:
-        middle = (inside + outside) // 2
-        if _is_inside(machine, poses[:middle]):
-            inside = middle
-        else:
-            outside = middle
-    line = int(toolpath.line[row[inside]])
-    check_travel(machine, poses[inside:outside], where=f"{toolpath.name}:{line}" if line else toolpath.name)
+    row = int(np.argmax(over))
+    unit, key = ("deg/min", "greatest_turn_deg_min") if turning[row] else ("mm/min", "greatest_feed_mm_min")
+    raise MachineError(
+        f"the feed is {toolpath.feed[row]:g} {unit}, the machine's greatest {limit[row]:g} {unit}",
+        where=_where(toolpath, row),
+        remedy=f"give a smaller F; what the machine reaches stands in its file as `{key}`",
+    )
+
+
+class _Poses:
+    """Poses within rows of a toolpath, where they are known; its start before its first row."""
+
+    def __init__(self, toolpath: Toolpath, row: NDArray[np.int64], share: NDArray[np.float64]) -> None:
+        poses = toolpath.between(row, share)
+        known = ~np.isnan(poses[:, 0]) & toolpath.is_move[row]
+        self.row, self.poses = row[known], poses[known]
+        if toolpath.start is not None and len(row) and row[0] == 0:
+            self.row, self.poses = np.concatenate([[0], self.row]), np.vstack([toolpath.start, self.poses])
+
+    def first_outside(self, machine: Machine) -> int | None:
+        """Number of the first pose outside the travel; None where all are inside."""
+        if _is_inside(machine, self.poses):
+            return None
+        inside, outside = 0, len(self.poses)
+        while outside - inside > 1:
+            middle = (inside + outside) // 2
+            if _is_inside(machine, self.poses[:middle]):
+                inside = middle
+            else:
+                outside = middle
+        return inside
+
+
+def _where(toolpath: Toolpath, row: int) -> str:
+    line = int(toolpath.line[row])
+    return f"{toolpath.name}:{line}" if line else toolpath.name
 
 
 def _is_inside(machine: Machine, poses: NDArray[np.float64]) -> bool:

@@ -21,6 +21,10 @@ DECIMALS_MM = 6
 DECIMALS_DEG = 7
 """Decimals of a degree: at most 9e-10 rad, 0.0009 µm at a point one metre from the tool tip, nothing at the tip."""
 
+LEAST_MM = LEAST_DEG = 1e-8
+"""An axis that moves by less stands still: LinuxCNC's limit, per axis [CART_FUZZ in libnml/posemath/posemath.h, applied by
+applyMinDisplacement in emc/task/emccanon.cc; mm and degrees]. Sums of increments end this near their mark."""
+
 RAPID_MM_MIN = 5000.0
 """Speed assumed for rapids: programs do not say it, and nothing is measured while they last."""
 
@@ -50,25 +54,29 @@ class Toolpath:
         kind: `Step` of each row, shape (n,).
         poses: [X, Y, Z, A, B, C] after each row, shape (n, 6) [mm, deg]; NaN before the first move where nobody
             knows where the machine stands.
-        feed_mm_min: feed of `FEED` rows, shape (n,) [mm/min]: along the path of the tool tip; of a move that only
-            turns [deg/min]; NaN in other rows.
+        feed_mm_min: feed of `FEED` rows along the path of the tool tip, shape (n,) [mm/min]; NaN in other rows.
+        feed_deg_min: feed of `FEED` rows in which nothing but angles move, shape (n,) [deg/min]; NaN in other rows.
         dwell_s: duration of `DWELL` rows, shape (n,) [s]; zero in other rows.
         line: line of the program that each row came from, counted from 1, shape (n,); 0 where there is none.
         text: words of `PAUSE`, `COMMENT` and `FUNCTION` rows, by row.
         start: pose before the first row, shape (6,); None where unknown.
         corner_mm: how far the control may round corners [mm]: 0 for exact path, infinite for as much as the feed
             needs, None where the program does not say.
+        numbers: line numbers of the first and the last line that have one; a compensated program carries its checksum
+            there.
     """
 
     name: str
     kind: NDArray[np.int8]
     poses: NDArray[np.float64]
     feed_mm_min: NDArray[np.float64]
+    feed_deg_min: NDArray[np.float64]
     dwell_s: NDArray[np.float64]
     line: NDArray[np.int64]
     text: Mapping[int, str] = field(default_factory=dict)
     start: NDArray[np.float64] | None = None
     corner_mm: float | None = None
+    numbers: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -87,13 +95,23 @@ class Toolpath:
 
     @cached_property
     def tip_mm(self) -> NDArray[np.float64]:
-        """Way of the tool tip in each row, shape (n,) [mm]."""
-        return _norm(self.poses[:, :3] - self.before[:, :3])
+        """Way of the tool tip in each row, shape (n,) [mm]; zero where it is rounding."""
+        return _norm(self.poses[:, :3] - self.before[:, :3], LEAST_MM)
 
     @cached_property
     def turn_deg(self) -> NDArray[np.float64]:
-        """Turn of each row, root of the sum of squares of the three angles, shape (n,) [deg]."""
-        return _norm(self.poses[:, 3:] - self.before[:, 3:])
+        """Turn of each row, root of the sum of squares of the three angles, shape (n,) [deg]; zero where it is rounding."""
+        return _norm(self.poses[:, 3:] - self.before[:, 3:], LEAST_DEG)
+
+    @property
+    def only_turns(self) -> NDArray[np.bool_]:
+        """Rows in which nothing but angles move, shape (n,)."""
+        return (self.tip_mm == 0.0) & (self.turn_deg > 0.0)
+
+    @property
+    def feed(self) -> NDArray[np.float64]:
+        """What F is in each row, shape (n,): along the path [mm/min], or of the angles [deg/min] where only they move."""
+        return np.where(self.only_turns, self.feed_deg_min, self.feed_mm_min)
 
     @cached_property
     def duration_s(self) -> NDArray[np.float64]:
@@ -103,7 +121,7 @@ class Toolpath:
         and Z it is a turning speed. [RS274/NGC 2.1.2.5; LinuxCNC does the same]
         """
         way = np.where(self.tip_mm > 0.0, self.tip_mm, self.turn_deg)
-        feeding = np.divide(60.0 * way, self.feed_mm_min, out=np.zeros(len(self)), where=self.kind == Step.FEED)
+        feeding = np.divide(60.0 * way, self.feed, out=np.zeros(len(self)), where=self.kind == Step.FEED)
         rapid = 60.0 * np.maximum(self.tip_mm / RAPID_MM_MIN, self.turn_deg / RAPID_DEG_MIN)
         return self.dwell_s + np.where(self.kind == Step.RAPID, rapid, feeding)
 
@@ -133,8 +151,12 @@ class Toolpath:
 
     def subdivided(self, step_mm: float, step_deg: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Rows and shares, shapes (k,), that pass through all moves in pieces no longer than these steps."""
+        return in_pieces(self.pieces(step_mm, step_deg))
+
+    def pieces(self, step_mm: float, step_deg: float) -> NDArray[np.int64]:
+        """Number of pieces of each row that are no longer than these steps, shape (n,)."""
         pieces = np.maximum(np.ceil(np.maximum(self.tip_mm / step_mm, self.turn_deg / step_deg)), 1.0)
-        return in_pieces(np.where(np.isnan(pieces), 1.0, pieces).astype(np.int64))
+        return np.where(np.isnan(pieces), 1.0, pieces).astype(np.int64)
 
     def _interpolated(self, at: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
         known = ~np.isnan(self.poses[:, 0])
@@ -144,6 +166,9 @@ class Toolpath:
         ends = np.concatenate([[0.0 if first == 0 else ends[first - 1]], ends[known]])
         nodes = np.vstack([self.before[first], self.poses[known]])
         return np.column_stack([np.interp(at, ends, nodes[:, axis]) for axis in range(6)])
+
+
+_NO_FEED = (np.nan, np.nan)
 
 
 class ToolpathBuilder:
@@ -157,29 +182,37 @@ class ToolpathBuilder:
     def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
         self.name = name
         self.corner_mm: float | None = None
+        self.numbers: tuple[int, ...] = ()
         self._start = start
         self._pose = np.full(6, np.nan) if start is None else np.asarray(start, dtype=np.float64)
-        self._rows: list[tuple[Step, NDArray[np.float64], float, float, int]] = []
+        self._rows: list[tuple[Step, NDArray[np.float64], tuple[float, float], float, int]] = []
         self._text: dict[int, str] = {}
         self._count = 0
 
     def rapid(self, pose: NDArray[np.float64], *, line: int = 0) -> None:
         """Add a move as fast as the machine can, to a pose of shape (6,) [mm, deg]."""
-        self._add(Step.RAPID, pose[None], np.nan, 0.0, line)
+        self._add(Step.RAPID, pose[None], _NO_FEED, 0.0, line)
 
-    def feed(self, poses: NDArray[np.float64], feed_mm_min: float, *, line: int = 0) -> None:
-        """Add moves at a feed through poses of shape (k, 6) [mm, deg]."""
-        self._add(Step.FEED, poses, feed_mm_min, 0.0, line)
+    def feed(self, poses: NDArray[np.float64], mm_min: float, deg_min: float | None = None, *, line: int = 0) -> None:
+        """Add moves at a feed through poses of shape (k, 6) [mm, deg].
+
+        Args:
+            poses: to go through.
+            mm_min: feed of the tool tip [mm/min].
+            deg_min: feed of moves that only turn [deg/min]; None: the same number.
+            line: of the program.
+        """
+        self._add(Step.FEED, poses, (mm_min, mm_min if deg_min is None else deg_min), 0.0, line)
 
     def dwell(self, seconds: float, *, line: int = 0) -> None:
         """Add a stop of known duration."""
-        self._add(Step.DWELL, self._pose[None], np.nan, seconds, line)
+        self._add(Step.DWELL, self._pose[None], _NO_FEED, seconds, line)
 
     def say(self, kind: Step, text: str, *, line: int = 0) -> None:
         """Add a pause, a comment or a function with its words."""
         if text:
             self._text[self._count] = text
-        self._add(kind, self._pose[None], np.nan, 0.0, line)
+        self._add(kind, self._pose[None], _NO_FEED, 0.0, line)
 
     def taken_back(self) -> str:
         """Remove the last row, which `say` added, and return its text."""
@@ -199,16 +232,23 @@ class ToolpathBuilder:
             name=self.name,
             kind=np.repeat(np.array([row[0] for row in self._rows], dtype=np.int8), count),
             poses=np.vstack([np.empty((0, 6)), *(row[1] for row in self._rows)]),
-            feed_mm_min=np.repeat(np.array([row[2] for row in self._rows], dtype=np.float64), count),
+            feed_mm_min=np.repeat(np.array([row[2][0] for row in self._rows], dtype=np.float64), count),
+            feed_deg_min=np.repeat(np.array([row[2][1] for row in self._rows], dtype=np.float64), count),
             dwell_s=np.repeat(np.array([row[3] for row in self._rows], dtype=np.float64), count),
             line=np.repeat(np.array([row[4] for row in self._rows], dtype=np.int64), count),
             text=MappingProxyType(dict(self._text)),
             start=self._start,
             corner_mm=self.corner_mm,
+            numbers=self.numbers,
         )
 
-    def _add(self, kind: Step, poses: NDArray[np.float64], feed_mm_min: float, dwell_s: float, line: int) -> None:
-        self._rows.append((kind, np.array(poses, dtype=np.float64), feed_mm_min, dwell_s, line))
+    def __len__(self) -> int:
+        return self._count
+
+    def _add(
+        self, kind: Step, poses: NDArray[np.float64], feed: tuple[float, float], dwell_s: float, line: int
+    ) -> None:
+        self._rows.append((kind, np.array(poses, dtype=np.float64), feed, dwell_s, line))
         self._count += len(poses)
         self._pose = self._rows[-1][1][-1]
 
@@ -225,7 +265,8 @@ def rounded(poses: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.hstack([np.round(poses[:, :3], DECIMALS_MM), np.round(poses[:, 3:], DECIMALS_DEG)]) + 0.0
 
 
-def _norm(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lengths of vectors, shape (n, 3); zero where a place is not known."""
-    length: NDArray[np.float64] = np.linalg.norm(np.nan_to_num(vectors), axis=1)
+def _norm(vectors: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+    """Lengths of vectors, shape (n, 3), without components below the least; zero where a place is not known."""
+    known = np.nan_to_num(vectors)
+    length: NDArray[np.float64] = np.linalg.norm(np.where(np.abs(known) < least, 0.0, known), axis=1)
     return length

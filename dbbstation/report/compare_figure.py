@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from dbbstation.diagnosis.compare_summary import by_angle_um
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, in_style
-from dbbstation.report.svg import as_svg
+from dbbstation.report.figure_format import FigureFormat, in_format
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +22,7 @@ OVERLAYS = 3
 COLOUR_A, COLOUR_B = AFTER, BEFORE
 
 
-def compare_figure(found: Comparison) -> bytes:
+def compare_figure(found: Comparison, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
     """Draw maps of the difference over test and angle, and the worst runs of three tests, as SVG."""
     tests = list(dict.fromkeys((run.pair.test, run.pair.number) for run in found.runs))
     with in_style():
@@ -39,7 +39,7 @@ def compare_figure(found: Comparison) -> bytes:
             _overlay(lines[0, k], lines[1, k], run)
         lines[0, 0].set_ylabel("length less commanded, µm")
         lines[1, 0].set_ylabel("B less A, µm")
-        return as_svg(figure)
+        return in_format(figure, wanted)
 
 
 def _worst(found: Comparison) -> list[RunDifference]:

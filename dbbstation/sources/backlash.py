@@ -10,7 +10,7 @@ from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.play_ends import first_side
 
 if TYPE_CHECKING:
@@ -35,9 +35,11 @@ class Backlash(ErrorSource):
 
     name = "backlash"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-speed-sign"
     rough = True
+    form_uncertainty = 0.1  # friction and wear differ along the screw and between directions
     texts = Texts(
         what="A strut's drive has play, or winds up against friction, each time the strut turns from growing to "
         "shrinking.",

@@ -32,6 +32,7 @@ class BallForm(LinearSource):
     name = "ball-form"
     belongs_to = Owner.INSTRUMENT
     varies_with = "angle"
+    form_uncertainty = 0.05  # form errors of balls are measured to a few per cent
     texts = Texts(
         what="The ball that the bar turns about is not round, or dirty: the bar's cup is lifted by it.",
         shows="The same small figure of two to five lobes in every circle, at every place and tilt and in both "
@@ -52,6 +53,7 @@ class BallForm(LinearSource):
                 "µm",
                 0.2,
                 f"height of the ball's surface as the {name} of {order} times the angle from +X towards +Y",
+                part=f"{order} lobes",
             )
             for order in ORDERS
             for wave, name in (("cos", "cosine"), ("sin", "sine"))

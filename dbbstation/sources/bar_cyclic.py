@@ -34,6 +34,7 @@ class BarCyclic(ErrorSource):
     belongs_to = Owner.SESSION
     needs = frozenset({Need.READING})
     varies_with = "reading"
+    form_uncertainty = 0.2  # the wave of an encoder changes along the scale
     texts = Texts(
         what="The encoder in the bar divides its signal period unevenly: its two signals differ in size, zero or phase.",
         shows="A fine ripple in the readings, quick where they change fast; the same at the same reading, wherever the "

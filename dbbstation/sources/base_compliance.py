@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import base_loads
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.weights import MM_PER_N, platform_masses, stated_tensions
 
 if TYPE_CHECKING:
@@ -28,6 +28,8 @@ class BaseCompliance(LinearSource):
 
     name = "base-compliance"
     belongs_to = Owner.MACHINE
+    form_uncertainty = 0.05  # a frame is no spring at one point
+    detail_mm = SMOOTH_MM
     weighs = True
     texts = Texts(
         what="The frame above is elastic: the base joints move with the forces of their struts.",

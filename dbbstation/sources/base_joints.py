@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,6 +23,7 @@ class BaseJoints(LinearSource):
 
     name = "base-joints"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     texts = Texts(
         what="The centres of the base joints are not where the controller has them.",
         shows="Circles shifted, deformed and differently so at every place and tilt; the same in both directions.",

@@ -41,6 +41,7 @@ class FollowsTemperature(LinearSource):
     needs = frozenset({Need.POSE, Need.TIME, Need.TEMPERATURE})
     varies_with = "temperature"
     rough = True  # as its thermometer is
+    form_uncertainty = 0.1  # a thermometer shows one place of a body
     growth: ClassVar[Parameter]
     """What it grows by for one kelvin."""
     thermometers: ClassVar[tuple[tuple[str, ...], ...]]
@@ -50,6 +51,7 @@ class FollowsTemperature(LinearSource):
         """Take name, owner and texts from the cause."""
         super().__init_subclass__()
         cls.name, cls.belongs_to, cls.texts = cause.name, cause.belongs_to, cause.texts
+        cls.detail_mm = cause.detail_mm
 
     @abstractmethod
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:

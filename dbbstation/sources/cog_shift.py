@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import DOWN, GRAVITY_M_S2, Load, stretch_mm, strut_tensions
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.weights import for_such_struts, platform_masses, strut_compliance
 
 if TYPE_CHECKING:
@@ -28,6 +28,8 @@ class CogShift(LinearSource):
 
     name = "cog-shift"
     belongs_to = Owner.MACHINE
+    form_uncertainty = 0.02  # weights are known to a per cent, compliance is linear
+    detail_mm = SMOOTH_MM
     weighs = True
     loads_struts = True
     texts = Texts(

@@ -8,6 +8,7 @@ current.
 
 from __future__ import annotations
 
+import math
 import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
@@ -171,6 +172,12 @@ class Motion:
         return frozenset(need for need, there in given.items() if there)
 
 
+BEYOND_PLAUSIBLE = 100.0
+"""A value of so many usual sizes is none that a machine has: 20 mm on a strut's reference length, 5 mm on a joint, 0.3 mm
+of play. With ten, joints that a kinematic fit pulls for gravity's sake (up to 0.27 mm of 0.05 mm) come near; a slip of
+the pen by a decimal point more, or millimetres for micrometres, is beyond it wherever a value is of its usual size."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One number of a source.
@@ -185,6 +192,8 @@ class Parameter:
         tolerance: standard deviation that the machine file states, in that unit: a fit takes it for known; None where
             nothing is stated.
         newer: True for one that the source had not always: models written before lack it, and it is zero there.
+        part: amplitudes with one label may be wrong alone, such as those of one order of a ball's form; empty for those of a
+            strut, which its name says, and for a source that has no parts.
     """
 
     name: str
@@ -194,6 +203,17 @@ class Parameter:
     shape: tuple[float, ...] = ()
     tolerance: float | None = None
     newer: bool = False
+    part: str = ""
+
+    @property
+    def alone_with(self) -> str:
+        """Part of the source that may be wrong while the others are not: that of its strut, or the one stated."""
+        return self.part or (f"strut {self.strut}" if self.strut else "")
+
+    @property
+    def largest(self) -> float:
+        """Greatest size of a value that a model may have, in the parameter's unit."""
+        return max(BEYOND_PLAUSIBLE * self.plausible, *(10.0 * abs(value) for value in self.shape), 0.0)
 
     @property
     def strut(self) -> int | None:
@@ -245,6 +265,14 @@ def _sum(a: NDArray[np.float64] | None, b: NDArray[np.float64] | None) -> NDArra
     return a + b
 
 
+SMOOTH_MM = math.inf
+"""`detail_mm` of a source that follows the geometry: it bends over hundreds of millimetres."""
+
+UNSTATED_MM = 4.0
+"""What is taken for a source that says nothing of its detail: shorter than the lead of most screws, and a program is
+still not longer than one point for each millimetre."""
+
+
 class ErrorSource(ABC):
     """One physical cause.
 
@@ -261,12 +289,21 @@ class ErrorSource(ABC):
     rough: ClassVar[bool] = False
     """True for a law that machines follow only roughly, as friction and warm-ups are: what little others bring beside it may
     only make up for that."""
+    form_uncertainty: ClassVar[float] = 0.05
+    """Standard deviation, as a share of the effect, by which real machines depart from the formula: what is smaller beside this
+    cause may be a matter of its formula. Few hundredths for geometry and springs, a tenth to three tenths for friction, play
+    and warm-ups; each source says why."""
     weighs: ClassVar[bool] = False
     """True for what weights do, which a model asks for at the poses and joints that the machine really has."""
     loads_struts: ClassVar[bool] = False
     """True for a weight: it has a `load_n`, and its `strut_mm` is counted with the compliance of the machine given."""
     weighs_struts: ClassVar[bool] = False
     """True where its `load_n` is that of the strut weights, which the machine file may state as well."""
+    detail_mm: ClassVar[float] = UNSTATED_MM
+    """Shortest way of a strut or of the tool tip over which the effect goes up and down once [mm]: so closely it is looked
+    at where programs are compensated. `SMOOTH_MM` for one that follows the geometry, or does nothing finer than that but
+    where a strut turns round: no chord fits a step, however closely it is looked at. Where it hangs on machine or values,
+    see `shortest_period_mm`."""
     texts: ClassVar[Texts]
     candidate: ClassVar[bool] = True
     """Whether a diagnosis may name it; False for what only describes an error and is no cause of one."""
@@ -294,6 +331,10 @@ class ErrorSource(ABC):
         if self.belongs_to is Owner.SESSION:
             return motion.setup.session
         return motion.setup.mounting if self.belongs_to is Owner.MOUNTING else motion.setup.instrument
+
+    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+        """Shortest way over which the effect of these values goes up and down once [mm]: `detail_mm`, if nothing else."""
+        return self.detail_mm
 
     def stated_mm(self, motion: Motion) -> NDArray[np.float64] | None:  # noqa: ARG002
         """Standard deviations, shape (p,), that plan and session state for this motion's set; None: not stated.

@@ -10,7 +10,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources.backlash import follow
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.rates import driven_in_time, speed_mm_s
 from dbbstation.sources.weights import platform_masses, stated_loads
 
@@ -49,8 +49,10 @@ class DriveFriction(ErrorSource):
 
     name = "drive-friction"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME, Need.CURRENT})
     varies_with = "strut-speed-sign"
+    form_uncertainty = 0.2  # friction differs along the screw and with temperature
     texts = Texts(
         what="Between the load of a strut and the current of its motor lie the gain of the drive and friction: a constant "
         "part, one that grows with the speed and one that grows with the load.",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import platform_weight, stretch_mm, strut_tensions
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.weights import MM_PER_N, platform_masses, strut_compliance
 
 if TYPE_CHECKING:
@@ -32,8 +32,10 @@ class Gravity(LinearSource):
 
     name = "gravity"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     weighs = True
     varies_with = "strut-force"
+    form_uncertainty = 0.02  # struts are nearly linear springs
     texts = Texts(
         what="The struts are elastic: the platform's weight pulls some of them longer and pushes others shorter.",
         shows="Circles with the spindle tilted, above all off the centre, are deformed by tens of µm, the same in both "

@@ -32,6 +32,7 @@ class JigDistortion(ErrorSource):
 
     name = "jig-distortion"
     belongs_to = Owner.SESSION
+    form_uncertainty = 0.2  # a clamped plate bends in more ways than one
     texts = Texts(
         what="Clamps, or a chip under the plate, bend the jig plate: its bores rise or sink and its holders lean.",
         shows="Tests at the outer bores are shifted, at long holders and risers sideways and most; a bow sends opposite "

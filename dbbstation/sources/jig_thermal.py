@@ -29,6 +29,7 @@ class JigThermal(LinearSource):
 
     name = "jig-thermal"
     belongs_to = Owner.SESSION
+    form_uncertainty = 0.03  # plate and holders are of one material and warm alike to a few per cent
     texts = Texts(
         what="The jig plate is warmer or colder on the machine than it was on the coordinate measuring machine: its "
         "balls stand further apart and higher, or closer and lower.",

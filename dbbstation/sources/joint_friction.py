@@ -11,7 +11,7 @@ from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import stretch_mm, strut_tensions, transverse_load
 from dbbstation.sources.backlash import follow
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.weights import for_such_struts, strut_compliance
 
 if TYPE_CHECKING:
@@ -46,9 +46,11 @@ class JointFriction(LinearSource):
 
     name = "joint-friction"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "joint-angle-speed-sign"
     rough = True
+    form_uncertainty = 0.3  # friction of joints differs with load and angle
     texts = Texts(
         what="The joints at the base turn heavily. Friction drags at the platform against its movement, and the struts "
         "stretch under that.",

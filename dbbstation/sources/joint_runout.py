@@ -10,7 +10,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.travel import middle
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,8 +50,10 @@ class JointRunout(LinearSource):
 
     name = "joint-runout"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     varies_with = "joint-angle"
     rough = True
+    form_uncertainty = 0.2  # a joint out of true has more than one harmonic
     texts = Texts(
         what="A joint is not a point: the two axes of a universal joint do not meet, or the ball of a ball joint is oval.",
         shows="Circles shifted and deformed by a few micrometres, the same in both directions, growing with the square "

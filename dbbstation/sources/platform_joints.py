@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,6 +24,8 @@ class PlatformJoints(LinearSource):
 
     name = "platform-joints"
     belongs_to = Owner.MACHINE
+    form_uncertainty = 0.0  # a rigid shift is exact
+    detail_mm = SMOOTH_MM
     texts = Texts(
         what="The centres of the platform joints are not where the controller has them, seen from the tool tip.",
         shows="Upright circles show nothing that base joints and strut lengths could not do as well. The spindle tilted, "

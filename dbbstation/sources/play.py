@@ -11,7 +11,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.play_ends import first_side
 from dbbstation.sources.weights import platform_masses
 
@@ -42,9 +42,11 @@ class Play(ErrorSource):
 
     name = "play"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-force"
     rough = True
+    form_uncertainty = 0.2  # play differs with load and place
     texts = Texts(
         what="Nut, bearing or joint of a strut has play that the platform's weight keeps closed. Where the force in the "
         "strut changes from pull to push, the strut gives way by the play.",

@@ -10,7 +10,7 @@ from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,9 +44,11 @@ class ReversalSpike(ErrorSource):
 
     name = "reversal-spike"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-speed-sign"
     rough = True
+    form_uncertainty = 0.3  # sticking differs from reversal to reversal
     texts = Texts(
         what="A strut sticks for a moment when it turns from growing to shrinking or back, until the position loop has "
         "raised the motor's torque by twice the friction.",

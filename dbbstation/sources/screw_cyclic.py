@@ -30,6 +30,7 @@ class ScrewCyclic(LinearSource):
     name = "screw-cyclic"
     belongs_to = Owner.MACHINE
     varies_with = "strut-length"
+    form_uncertainty = 0.1  # the error of one turn differs along the screw
     texts = Texts(
         what="The screw wobbles in its bearing, or its encoder sits off the axis: the error repeats with every turn.",
         shows="A fine ripple on the circle, quick where that strut moves fast and slow where it turns round; the same at "
@@ -53,6 +54,14 @@ class ScrewCyclic(LinearSource):
             for i in range(STRUTS)
             for wave in ("sine", "cosine")
         )
+
+    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+        """The lead.
+
+        Raises:
+            ModelError: the machine file has no screw lead.
+        """
+        return screw_lead_mm(self.name, machine)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each strut answers to its own two waves.

@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,7 +29,9 @@ class ScrewLead(LinearSource):
 
     name = "screw-lead"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     varies_with = "strut-length"
+    form_uncertainty = 0.02  # the lead of a ground screw is even to a few per cent of its error
     texts = Texts(
         what="The lead of a strut's screw, or the scale that measures it, is not the one in the control: the strut "
         "travels too far or not far enough.",

@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.rates import driven_in_time, speed_mm_s
 
 if TYPE_CHECKING:
@@ -37,8 +37,10 @@ class ServoLag(ErrorSource):
 
     name = "servo-lag"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
     varies_with = "strut-speed"
+    form_uncertainty = 0.1  # a drive lags by a filter, not by one time
     texts = Texts(
         what="The drives follow their commands late, and not all by the same time: position loops with different "
         "gains, or feed-forward that fits some struts only.",

@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.sources import by_temperature
 from dbbstation.sources.by_temperature import MACHINE, FollowsTemperature
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
@@ -36,9 +36,11 @@ class SpindleGrowth(ErrorSource):
 
     name = "spindle-growth"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     needs = frozenset({Need.TIME})
     varies_with = "time"
     rough = True
+    form_uncertainty = 0.2  # a warm-up has its own law, in stages
     texts = Texts(
         what="The spindle and its nose warm up and push the tool out of the platform. The growth given is counted from "
         "the first sample of the session; begun says how much of it was there already, against the cold spindle.",

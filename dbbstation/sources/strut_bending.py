@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import DOWN
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,7 +38,9 @@ class StrutBending(LinearSource):
 
     name = "strut-bending"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     varies_with = "strut-length"
+    form_uncertainty = 0.05  # ends of struts are neither free nor clamped
     texts = Texts(
         what="A strut sags under its own weight; bent, it is shorter from joint to joint than its drive measures along "
         "it.",

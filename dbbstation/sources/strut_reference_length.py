@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,6 +20,7 @@ class StrutReferenceLength(LinearSource):
 
     name = "strut-reference-length"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     texts = Texts(
         what="The length of a strut at its reference mark is not the one the controller assumes.",
         shows="Circles shifted and deformed, more so away from the middle; the same in both directions.",

@@ -11,7 +11,7 @@ from dbbstation.machine.geometry import StrutMasses
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import motor_loads, stretch_mm, strut_tensions, transverse_load, transverse_pull
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.weights import for_such_struts, strut_compliance
 
 if TYPE_CHECKING:
@@ -35,6 +35,8 @@ class StrutWeight(LinearSource):
 
     name = "strut-weight"
     belongs_to = Owner.MACHINE
+    form_uncertainty = 0.02  # masses are known to a few per cent
+    detail_mm = SMOOTH_MM
     weighs = True
     loads_struts = True
     weighs_struts = True

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.sources import by_temperature
 from dbbstation.sources.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
@@ -29,9 +29,11 @@ class ThermalFrame(ErrorSource):
 
     name = "thermal-frame"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     needs = frozenset({Need.TIME})
     varies_with = "time"
     rough = True
+    form_uncertainty = 0.2  # a warm-up has its own law, in stages
     texts = Texts(
         what="The base plate that carries the struts warms up while the machine works, or with the shop, and grows. The "
         "growth given is counted from the first sample of the session.",

@@ -9,7 +9,7 @@ from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources import by_temperature
 from dbbstation.sources.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
 
 if TYPE_CHECKING:
@@ -33,9 +33,11 @@ class ThermalStruts(ErrorSource):
 
     name = "thermal-struts"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.TIME})
     varies_with = "time"
     rough = True
+    form_uncertainty = 0.2  # a warm-up has its own law, in stages
     texts = Texts(
         what="The struts' screws warm up while the machine works and grow, quickly at first and then ever more slowly. "
         "The growth given is counted from the first sample of the session.",

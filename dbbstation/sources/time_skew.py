@@ -40,6 +40,7 @@ class TimeSkew(ErrorSource):
     belongs_to = Owner.INSTRUMENT
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
     varies_with = "speed"
+    form_uncertainty = 0.05  # clocks drift a little
     texts = Texts(
         what="Readings carry a time, or the turn a starting angle, that is a little off: the instrument filters or "
         "sends late, or the beginning of the turn was found too late.",

@@ -23,6 +23,7 @@ class ToolBallOffset(LinearSource):
 
     name = "tool-ball-offset"
     belongs_to = Owner.SESSION
+    form_uncertainty = 0.0  # a rigid shift is exact
     texts = Texts(
         what="The ball in the spindle is not at the tool tip that the control reckons with: its length was entered "
         "wrongly, or its holder runs out.",

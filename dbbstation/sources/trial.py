@@ -64,6 +64,9 @@ def undeclared(kind: type[ErrorSource]) -> list[str]:
     needs: object = kind.needs
     if not isinstance(needs, frozenset) or not all(isinstance(need, Need) for need in needs):
         faults.append("its `needs` must be a frozenset of Need")
+    detail_mm: object = kind.detail_mm
+    if not isinstance(detail_mm, int | float) or not detail_mm > 0.0:
+        faults.append("its `detail_mm` must be a length above zero, or SMOOTH_MM")
     texts = getattr(kind, "texts", None)
     if not isinstance(texts, Texts):
         faults.append("it needs `texts`, a Texts that says " + ", ".join(f.name for f in fields(Texts)))

@@ -10,7 +10,7 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.travel import middle
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.screws import screw_lead_mm
 
 if TYPE_CHECKING:
@@ -34,7 +34,9 @@ class UjointScrew(LinearSource):
 
     name = "ujoint-screw"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     varies_with = "joint-angle"
+    form_uncertainty = 0.05  # joint axes are square to a few hundredths
     texts = Texts(
         what="The struts hang in universal joints. As the platform moves, the joints turn nut and screw against each other, "
         "and the strut travels without its motor turning.",

@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import GRAVITY_M_S2, platform_weight, strut_tensions
-from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter
 from dbbstation.sources.unexplained_points import piecewise_linear, texts, values_at
 from dbbstation.sources.weights import platform_masses
 
@@ -31,6 +31,7 @@ class UnexplainedByForce(LinearSource):
 
     name = "unexplained-by-force"
     belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
     varies_with = "strut-force"
     candidate = False
     texts = texts("axial force", "actual minus driven length = sum over points k of v_ik hat_k(T_i)")

@@ -37,6 +37,10 @@ class UnexplainedByLength(LinearSource):
         """Values at the points, strut by strut."""
         return values_at(_points_mm(machine), "mm")
 
+    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+        """A point up and its neighbours down."""
+        return float(2.0 * np.diff(_points_mm(machine))[0])
+
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each strut answers to its own values on both sides of its length."""
         frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)

@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
-from dbbstation.sources.contract import Effect, ErrorSource, Motion, Owner, Parameter
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Owner, Parameter
 from dbbstation.sources.unexplained_points import MM_PER_UM, PLAUSIBLE_UM, TOLERANCE_UM, texts
 
 if TYPE_CHECKING:
@@ -44,6 +44,12 @@ class UnexplainedWave(ErrorSource):
             period = f"strut_{i + 1}_period_mm"
             found += [Parameter(period, "mm", 20.0, f"period of the wave of strut {i + 1}", PERIODS_MM)]
         return tuple(found)
+
+    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+        """That of the shortest wave."""
+        by_strut = values.reshape(STRUTS, 3)
+        there = (by_strut[:, :2] != 0.0).any(axis=1) & (by_strut[:, 2] != 0.0)
+        return float(np.abs(by_strut[there, 2]).min(initial=SMOOTH_MM))
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Wave of each strut."""

@@ -6,6 +6,8 @@ import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.bar_reach import unlike_bar
 from dbbstation.files.session_writer import SessionDetails
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
@@ -53,10 +55,15 @@ class Job:
         """Dry-run the plan; to be done before an instrument is opened.
 
         Raises:
-            InputError: a test that readings cannot follow.
+            InputError: a test that readings cannot follow, or that the bar cannot reach.
             TravelError: a circle leaves the machine's travel.
         """
-        check_plan(self.plan.to_domain(), self.machine, file=plan_file)
+        plan = self.plan.to_domain()
+        bar = self.details.bar
+        fault = None if bar is None else unlike_bar(bar.calibrated_length_mm, bar.stroke_mm, plan)
+        if fault is not None:
+            raise InputError([Problem(plan_file, 0, 0, *fault)])
+        check_plan(plan, self.machine, file=plan_file)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from dbbstation.station.detector import DWELL_BEHIND_S, live_phi_deg
 from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
 from dbbstation.trace.cut import cut
+from dbbstation.trace.loss import AFTER_LOSS, lost_samples, too_many_lost
 from dbbstation.trace.recording import Recording
 
 if TYPE_CHECKING:
@@ -81,8 +82,15 @@ class RunRecord:
         rest_s = self.circle.feed_in_mm / 2.0 / (self.circle.feed_mm_min / 60.0)
         return self.fed_out_s is not None and t_s >= self.fed_out_s + rest_s + DWELL_BEHIND_S
 
-    def circle_figures(self) -> tuple[CircleFigures | None, str]:
-        """Return the figures of the circle, or None and why there is none."""
+    def circle_figures(self, largest_loss_percent: float) -> tuple[CircleFigures | None, str]:
+        """Return the figures of the circle, or None and why there is none.
+
+        Args:
+            largest_loss_percent: share of the samples that may be lost [%].
+        """
+        lost = max(self.lost, lost_samples(np.array(self._t_s)))
+        if problem := too_many_lost(lost, len(self), largest_loss_percent):
+            return None, f"{problem}; {AFTER_LOSS}"
         recording = Recording(
             name=self.run.label,
             t_s=np.array(self._t_s),

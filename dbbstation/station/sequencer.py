@@ -249,7 +249,7 @@ class Sequencer:
             raise RuntimeError(f"no run is recorded while {self.state}")
         found = None
         if not problem:
-            found, problem = record.circle_figures()
+            found, problem = record.circle_figures(self.plan.largest_loss_percent)
         self._out.append(events.RunCompleted(record.run, len(record), record.lost, found, problem))
         self._edges = None
         return found is not None

@@ -26,14 +26,20 @@ ANSWERS = "answers.json"
 FORMAT = "blind-answers/1"
 
 
-def verdict_folder(folder: Path, candidates: Sequence[str]) -> Path:
+def verdict_folder(folder: Path, candidates: Sequence[str], *, by_sets: bool = False) -> Path:
     """Where the verdicts of a study with these candidates are kept."""
-    names = ",".join(sorted(candidates))
+    names = ",".join(sorted(candidates)) + (" by sets" if by_sets else "")
     return folder / "verdicts" / hashlib.sha256(names.encode()).hexdigest()[:12]
 
 
 def judge_sessions(
-    folder: Path, candidates: Sequence[str], jobs: int, progress: Callable[[int, int], None], *, again: bool = False
+    folder: Path,
+    candidates: Sequence[str],
+    jobs: int,
+    progress: Callable[[int, int], None],
+    *,
+    again: bool = False,
+    by_sets: bool = False,
 ) -> dict[str, dict[str, Any]]:
     """Diagnose every session of a folder; those that have a verdict already are not judged twice.
 
@@ -43,6 +49,7 @@ def judge_sessions(
         jobs: processes.
         progress: told how many of how many sessions are judged.
         again: judge all of them anew, for a diagnosis that has changed since.
+        by_sets: compare sets of causes.
 
     Returns:
         By session, `seconds` it took and `summary` of the diagnosis, or `error` where there was none.
@@ -54,12 +61,12 @@ def judge_sessions(
     if not sessions:
         what = "no session folders in here"
         raise InputError([Problem(str(folder), 0, 0, what, "make some: python -m tests.plant.blind FOLDER")])
-    kept = verdict_folder(folder, candidates)
+    kept = verdict_folder(folder, candidates, by_sets=by_sets)
     kept.mkdir(parents=True, exist_ok=True)
     waiting = [path for path in sessions if again or not (kept / f"{path.name}.json").exists()]
     done = len(sessions) - len(waiting)
     progress(done, len(sessions))
-    work = partial(_judge, candidates=tuple(candidates), kept=kept)
+    work = partial(_judge, candidates=tuple(candidates), kept=kept, by_sets=by_sets)
     if jobs == 1 or len(waiting) <= 1:
         for path in waiting:
             work(path)
@@ -97,14 +104,18 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
     return {answer["session"]: answer for answer in answers["sessions"]}
 
 
-def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path) -> None:
+def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path, by_sets: bool) -> None:
     begun = time.perf_counter()
     verdict: dict[str, Any] = {"session": path.name}
     try:
-        verdict["summary"] = diagnose_sessions([path], candidates, (), lambda _: None).summary()
+        verdict["summary"] = diagnose_sessions([path], candidates, (), _quiet, by_sets=by_sets).summary()
     except StationError as error:
         verdict["error"] = str(error)
     except Exception as error:  # noqa: BLE001 - a diagnosis that breaks is a result of the study, and the worst one
         verdict["error"] = f"{type(error).__name__}: {error}"
     verdict["seconds"] = time.perf_counter() - begun
     write_text(kept / f"{path.name}.json", json.dumps(verdict, indent=1) + "\n", force=True)
+
+
+def _quiet(_: str) -> None:
+    """Say nothing."""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.studies.coverage import WITHIN, wilson
+from dbbstation.studies.blind_reliability import Forecast, equivalents, forecasts, reliability, share_of, sure
+from dbbstation.studies.coverage import WITHIN
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -21,6 +22,9 @@ HELD_OUT = (0.8, 1.3)
 
 SIZES = ((0.0, 2.0), (2.0, 5.0), (5.0, np.inf))
 """Classes of size, in testable limits."""
+
+EXACT = ("clean", "outside")
+"""Kinds of session in which nothing has a law to be off from."""
 
 NO_CANDIDATE = "not-a-candidate"
 """Kind of a session whose listed effects were not all looked for: they are then as good as outside the list."""
@@ -36,7 +40,8 @@ class Outcome:
         plan: what kind was measured.
         rate_hz: samples per second.
         angles: the recording has commanded angles.
-        kind: `clean`, `single`, `pair`, `outside`, `concealed` or `not-a-candidate`.
+        kind: `clean`, `single`, `pair`, `triple`, `faint`, `outside`, `concealed` or `not-a-candidate`.
+        perturbed: what is hidden follows its law only roughly.
         truth: names of what is hidden, listed or not.
         sizes: of each, in testable limits.
         error: why there is no diagnosis; empty where there is one.
@@ -44,8 +49,8 @@ class Outcome:
         identified: names that it gives.
         declared: names that it says it cannot tell apart, with those that each is not told from.
         named: each hidden effect is identified.
-        within: each hidden effect is identified or in a declared ambiguity of at most three: it with its own rivals, or
-            all that hang together.
+        within: each hidden effect is identified or in a declared ambiguity of at most three: it with its own rivals, all
+            that hang together, or the class of what no test tells from a name that is given.
         wrong: names given, alone or as an ambiguity, where nothing of the kind is hidden.
         located: what is left, or the misfit, is put on the right strut or variable; None where nothing was asked.
         quiet: none of the hidden effects is claimed at a size that it has not (for what nobody can see).
@@ -54,6 +59,7 @@ class Outcome:
         held_out: residual of left-out tests in units of their predicted covariance, with what was found.
         gain: residual of left-out tests before over after.
         said: the answer in short.
+        forecasts: causes with the probability that they were given; empty where a diagnosis gives none.
     """
 
     session: str
@@ -62,6 +68,7 @@ class Outcome:
     rate_hz: float
     angles: bool
     kind: str
+    perturbed: bool
     truth: tuple[str, ...]
     sizes: tuple[float, ...]
     error: str
@@ -78,6 +85,7 @@ class Outcome:
     held_out: float
     gain: float
     said: str
+    forecasts: tuple[Forecast, ...]
 
     @property
     def given_a_name(self) -> bool:
@@ -90,6 +98,11 @@ class Outcome:
         return "recorded angles" if self.angles else f"angles from the edges, {self.rate_hz:g} Hz"
 
     @property
+    def law(self) -> str:
+        """How closely what is hidden follows its law."""
+        return "law followed roughly" if self.perturbed else "law followed exactly"
+
+    @property
     def right(self) -> bool:
         """Whether the answer is what could be asked of it."""
         if self.error:
@@ -98,7 +111,7 @@ class Outcome:
             return not self.detected and not self.given_a_name
         if self.kind in {"outside", NO_CANDIDATE}:
             return not self.given_a_name and self.located is not False
-        if self.kind == "concealed":
+        if self.kind in {"concealed", "faint"}:
             return self.quiet and not self.wrong
         return self.within and not self.wrong
 
@@ -139,9 +152,10 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any], candidates: S
     asked = listed if kind != "concealed" else {e["name"] for e in effects if e["testable"]}
     found = [name for name in asked if name in identified]
     groups = _hanging_together(declared)
-    close = [name for name in asked if _declared_closely(name, declared, groups)]
+    classes = [equivalents(by_name[name]) for name in identified]
+    close = [name for name in asked if _declared_closely(name, declared, [*groups, *classes])]
     # A name is no lie where what nobody can see is really there.
-    wrong = [name for name in identified if name not in listed]
+    wrong = [name for name, equal in zip(identified, classes, strict=True) if not listed & equal]
     wrong += [name for name in declared if not any(name in group and listed & group for group in groups)]
     unexplained = summary["unexplained"]
     before, after = summary["held_out_rms_um"]["before"], summary["held_out_rms_um"]["after"]
@@ -152,6 +166,7 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any], candidates: S
         rate_hz=answer["circumstances"]["rate_hz"],
         angles=answer["circumstances"]["angles"],
         kind=kind,
+        perturbed=bool(answer.get("perturbed")),
         truth=tuple(effect["name"] for effect in effects),
         sizes=tuple(float(effect["size"]) for effect in effects),
         error=verdict.get("error", ""),
@@ -172,7 +187,8 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any], candidates: S
         pulls=_pulls(answer, summary),
         held_out=summary["held_out_normalised"]["after"],
         gain=before / after if after else float("nan"),
-        said=_said(identified, groups, unexplained, verdict),
+        said=_said(classes, groups, unexplained, verdict),
+        forecasts=forecasts(summary["sources"], listed, perturbed=bool(answer.get("perturbed"))),
     )
 
 
@@ -189,6 +205,11 @@ def numbers(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         ("pair", ("both named", "", lambda o: o.named)),
         ("pair", ("both named or within a declared ambiguity", ">= 80 %", lambda o: o.within)),
         ("pair", ("wrongly named", "<= 2 %", lambda o: bool(o.wrong))),
+        ("triple", ("all named", "", lambda o: o.named)),
+        ("triple", ("all named or within a declared ambiguity", ">= 80 %", lambda o: o.within)),
+        ("triple", ("wrongly named", "<= 2 %", lambda o: bool(o.wrong))),
+        ("faint", ("named or within a declared ambiguity", "", lambda o: o.within)),
+        ("faint", ("wrongly named", "<= 2 %", lambda o: bool(o.wrong))),
         ("outside", ("detected", "", lambda o: o.detected)),
         ("outside", ("given a name", "<= 5 %", lambda o: o.given_a_name)),
         ("outside", ("located", ">= 80 %", lambda o: bool(o.located))),
@@ -206,9 +227,12 @@ def numbers(outcomes: Sequence[Outcome]) -> dict[str, Any]:
                 f"single of {max(low, 1.0):.0f} to {high:.0f} limits" if high < np.inf else f"single above {low:.0f}"
             )
             table[f"{title}: named or within"] = {"target": "", **_share(within, lambda o: o.within)}
+    said = [one for o in outcomes for one in o.forecasts]
+    if (certain := sure(said))["count"]:
+        table["said with a probability of 0.95 to 1: there"] = {"target": ">= 93 %", **certain}
     deviations = [z for o in outcomes for z in o.deviations.values()]
     pulls = [z for o in outcomes if o.right for z in o.pulls]
-    right = [o for o in outcomes if o.kind in {"single", "pair"} and o.right and o.named]
+    right = [o for o in outcomes if o.kind in {"single", "pair", "triple"} and o.right and o.named]
     return {
         "sessions": len(outcomes),
         "without_a_diagnosis": [o.session for o in outcomes if o.error],
@@ -217,6 +241,11 @@ def numbers(outcomes: Sequence[Outcome]) -> dict[str, Any]:
             label: _share([o for o in outcomes if o.angles_from == label], lambda o: o.right)
             for label in sorted({o.angles_from for o in outcomes})
         },
+        "right_by_law": {
+            law: _share([o for o in outcomes if o.law == law and o.kind not in EXACT], lambda o: o.right)
+            for law in sorted({o.law for o in outcomes if o.kind not in EXACT})
+        },
+        "reliability": reliability(said),
         "effects": _by_effect(single),
         "confusion": _confusion(outcomes),
         "parameters_in_sigma": _spread(deviations),
@@ -308,14 +337,15 @@ def _pulls(answer: Mapping[str, Any], summary: Mapping[str, Any]) -> tuple[float
 
 
 def _said(
-    identified: Sequence[str],
+    classes: Sequence[frozenset[str]],
     groups: Sequence[frozenset[str]],
     unexplained: Mapping[str, Any],
     verdict: Mapping[str, Any],
 ) -> str:
     if "error" in verdict:
         return str(verdict["error"])
-    parts = [*identified, *(f"({' or '.join(sorted(group))})" for group in groups)]
+    parts = [" = ".join(sorted(equal)) for equal in dict.fromkeys(classes)]
+    parts += [f"({' or '.join(sorted(group))})" for group in groups]
     if unexplained["rms_um"] > 0:
         strut = f" strut {unexplained['strut']}" if unexplained["strut"] else ""
         parts.append(f"[left {unexplained['rms_um']:.2g} µm by {unexplained['variable']}{strut}]")
@@ -323,10 +353,7 @@ def _said(
 
 
 def _share(outcomes: Sequence[Outcome], of: Callable[[Outcome], bool]) -> dict[str, Any]:
-    count = len(outcomes)
-    hits = sum(bool(of(outcome)) for outcome in outcomes)
-    low, high = wilson(hits / count, count) if count else (0.0, 1.0)
-    return {"count": count, "hits": hits, "share": hits / count if count else None, "interval": [low, high]}
+    return share_of(of(outcome) for outcome in outcomes)
 
 
 def _by_effect(single: Sequence[Outcome]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
-from dbbstation.report.svg import as_svg
+from dbbstation.report.figure_format import FigureFormat, in_format
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 COLOURS = (MEASURED, BEFORE, AFTER)
 
 
-def concealed_figure(study: ConcealedGravity) -> bytes:
+def concealed_figure(study: ConcealedGravity, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
     """Draw residuals on the jig, the tilted circle and the pull on the joints, as SVG."""
     with in_style():
         figure = Figure(figsize=(11.0, 5.4), layout="constrained")
@@ -26,7 +26,7 @@ def concealed_figure(study: ConcealedGravity) -> bytes:
         _residuals(jig, study)
         _circle(figure.add_subplot(1, 3, 2, projection="polar"), study)
         _pull(pull, study)
-        return as_svg(figure)
+        return in_format(figure, wanted)
 
 
 def _residuals(axes: Axes, study: ConcealedGravity) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dbbstation.report.drawing import in_style
-from dbbstation.report.svg import as_svg
+from dbbstation.report.figure_format import FigureFormat, in_format
 from dbbstation.studies.concealed_figure import COLOURS
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ MOST_POINTS = 3000
 """Points of a line that are drawn: more make a large file and the same picture."""
 
 
-def drive_figure(diagnosis: DriveDiagnosis) -> bytes:
+def drive_figure(diagnosis: DriveDiagnosis, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
     """Draw a diagnosis of a drive, as SVG."""
     with in_style():
         figure = Figure(figsize=(11.0, 6.2), layout="constrained")
@@ -30,7 +30,7 @@ def drive_figure(diagnosis: DriveDiagnosis) -> bytes:
         _force(force, diagnosis)
         _left(left, diagnosis)
         _friction(figure.add_subplot(grid[:, 1]), diagnosis)
-        return as_svg(figure)
+        return in_format(figure, wanted)
 
 
 def _force(axes: Axes, diagnosis: DriveDiagnosis) -> None:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import TraceError
-from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.circle import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.trace.average import means
 from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.loss import AFTER_LOSS, lost_samples, share_lost
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -74,8 +75,22 @@ def cut(recording: Recording, circle: Circle) -> RawCircle:
 
     Raises:
         TraceError: no feed-in or feed-out, a gap, a bar that left the circle, or a feed that is not the
-            programmed one.
+            programmed one; with the lost samples first where the times show some, since these may be the cause.
     """
+    try:
+        return _cut(recording, circle)
+    except TraceError as error:
+        lost = lost_samples(recording.t_s)
+        if not lost:
+            raise
+        raise TraceError(
+            f"{share_lost(lost, len(recording))}; {error.what}",
+            where=error.where,
+            remedy=f"{AFTER_LOSS}; where that does not help: {error.remedy}",
+        ) from error
+
+
+def _cut(recording: Recording, circle: Circle) -> RawCircle:
     if recording.theta_deg is not None:
         phi = _along(circle.phi_deg(recording.theta_deg))
         return _selected(recording, circle, phi, np.ones(len(recording), dtype=bool))
@@ -279,13 +294,17 @@ def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64]
             remedy="look after balls, seats and cable, and repeat the run",
         )
     off = np.abs(length - circle.bar_mm)
-    if off.max() > circle.feed_in_mm:
+    # Recorded angles need no edges: only the bar's travel bounds how far such a machine may be off.
+    timed = recording.theta_deg is None
+    if off.max() > (circle.feed_in_mm if timed else USUAL_STROKE_MM):
         worst = int(np.argmax(off))
+        coarser = "raise feed_in_mm, or begin with a coarse calibration from recordings with theta_deg"
         raise TraceError(
             f"the length is {length[worst]:.3f} mm, {off[worst]:.3f} mm off the bar's {circle.bar_mm:g} mm, at "
             f"{circle.theta_deg(phi)[worst] % FULL_TURN_DEG:.1f} degrees",
             where=recording.name,
-            remedy="check bar length, units and plan; a ball that left its seat means repeating the run",
+            remedy="check bar length, units and plan; a ball that left its seat means repeating the run; or the machine is "
+            f"that far off: {coarser if timed else 'set its reference lengths first'}",
         )
     return RawCircle(
         name=recording.name,

@@ -31,7 +31,8 @@ _IDLE_S = 0.005
 """Real seconds between looks while nothing is under way; a request wakes it at once."""
 
 _BACKLOG = 4096
-"""Frames that wait for a program that does not read; later samples are dropped, which the counter shows."""
+"""Frames that wait for a program that does not read. Then the instrument falls behind its clock and takes its samples later,
+each with the length of its own time: on a fast clock a busy computer would otherwise lose thousands at once."""
 
 
 @dataclass(slots=True)
@@ -230,10 +231,10 @@ class VirtualInstrument:
 
     def _sample(self, now_s: float, *, connected: bool) -> None:
         """Take the samples of a stream that are due; where nobody listens they are gone, as on a real line."""
-        while self._running and self._next_sample_s <= now_s:
+        while self._running and self._next_sample_s <= now_s and not (connected and len(self._outgoing) >= _BACKLOG):
             at_s = self._next_sample_s
             self._next_sample_s += 1.0 / self._rate_hz
-            if connected and len(self._outgoing) < _BACKLOG:
+            if connected:
                 self._send_sample(at_s, at_s + self.protocol.timing.latch_delay_s)
             else:
                 self._counter += 1

@@ -177,7 +177,7 @@ def test_sessions_of_two_machines(run, spoilt, tmp_path):
     spoilt.replace("machine.yaml", first, str(float(first) + 1.0))
     outcome = run("calibrate", tmp_path / "other", spoilt.folder, "--out", tmp_path / "model.yaml")
     assert outcome.code == FAILED
-    assert outcome.err.startswith(f"{spoilt.folder}: its nominal machine ")
+    assert outcome.err.startswith(f"{spoilt.folder / 'machine.yaml'}: its machine file is not that of ")
     assert "is not that of" in outcome.err
     assert not (tmp_path / "model.yaml").exists()
 

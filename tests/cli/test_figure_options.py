@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from xml.etree import ElementTree as ET
 
-from dbbstation.cli import DONE, FAILED
+import pytest
+
+from dbbstation.cli import DONE, FAILED, USAGE
 
 
 def drawn_twice(run, target, *arguments):
@@ -40,3 +42,39 @@ def test_a_calibration_without_known_places_drawn(run, elsewhere, tmp_path):
     outcome = run("calibrate", elsewhere, "--method", "conv-a", "--figure", drawn)
     assert outcome.code == DONE, outcome.err
     assert "no ball of known place" in drawn.read_text(encoding="utf-8")
+
+
+BEGINS = {".png": b"\x89PNG\r\n\x1a\n", ".pdf": b"%PDF-1."}
+"""PNG: ISO/IEC 15948, 5.2; PDF: ISO 32000-1, 7.5.2."""
+
+
+@pytest.mark.parametrize("ending", [".png", ".pdf", ".PNG"])
+@pytest.mark.parametrize("command", [("calibrate",), ("diagnose", "--sources", "backlash")])
+def test_the_ending_says_the_format(run, elsewhere, tmp_path, command, ending):
+    target = tmp_path / f"figure{ending}"
+    outcome = run(command[0], elsewhere, *command[1:], "--figure", target)
+    assert outcome.code == DONE, outcome.err
+    first = target.read_bytes()
+    assert first.startswith(BEGINS[ending.lower()])
+    assert len(first) > 5000
+    assert run(command[0], elsewhere, *command[1:], "--figure", target, "--force").code == DONE
+    assert target.read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("calibrate", "session"),
+        ("diagnose", "session"),
+        ("compare", "one", "other"),
+        ("drive", "recording.csv"),
+        ("study", "gravity"),
+        ("study", "concealed-gravity"),
+    ],
+)
+@pytest.mark.parametrize("name", ["figure.jpg", "figure.svg.gz", "figure"])
+def test_other_endings_are_refused_before_anything_is_read(run, tmp_path, command, name):
+    outcome = run(*command, "--figure", tmp_path / name)
+    assert (outcome.code, outcome.out) == (USAGE, "")
+    assert ".svg, .png, .pdf" in " ".join(outcome.err.split())
+    assert not (tmp_path / name).exists()

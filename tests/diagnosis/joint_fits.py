@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from dbbstation.calibration.fit import calibrate, default_sources
+from dbbstation.calibration.missing_physics import misfit_of
 from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained, Verdict
-from dbbstation.diagnosis.naming import misfit_of
 from dbbstation.files.plan_file import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.inference.held_out import HeldOut

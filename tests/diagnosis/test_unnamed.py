@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.fit import calibrate
+from dbbstation.calibration.missing_physics import misfit_of
 from dbbstation.calibration.outliers import calibrate_robust
 from dbbstation.diagnosis.channel import channel_of, thinned
-from dbbstation.diagnosis.naming import misfit_of
 from dbbstation.diagnosis.shapes import moves_struts, variable_of
 from dbbstation.diagnosis.unexplained import unexplained
 from dbbstation.recorded import load_sessions

@@ -49,7 +49,7 @@ def make_session(folder: Path) -> None:
             crc=True,
         )
         source = read_session(recorded)
-        bar = Bar("DBB-0042", 150.0003, 0.0005, BEGUN - timedelta(minutes=20), 20.3, 10.6)
+        bar = Bar("DBB-0042", 150.0003, 0.0005, BEGUN - timedelta(minutes=20), 20.3, 10.6, 10.0)
         details = SessionDetails("PM600-0007", "first shift", 20.4, bar)
         writer = SessionWriter.create(folder, source.machine, read_inline_plan(recorded / "plan.yaml"), details)
         runs = [source.runs[0], source.runs[1], *source.runs[1:]]

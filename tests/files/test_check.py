@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 import subprocess
@@ -121,3 +122,20 @@ def test_help_imports_neither_schemas_nor_mathematics() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
     assert done.stdout.endswith("[]\n")
+
+
+def test_samples_that_a_run_lost_are_named(capsys, tmp_path: Path) -> None:
+    """A sampled run of 400 rows without 20 of them, in one piece."""
+    session = tmp_path / "session"
+    shutil.copytree(FIXTURES / "sessions" / "small", session)
+    path = session / "runs" / "a-ccw-1.csv"
+    rows = [f"{k * 0.1:.3f},150.0,{360.0 * k / 399:.4f}" for k in range(400) if not 100 <= k < 120]
+    path.write_text("t_s,length_mm,theta_deg\n" + "\n".join(rows) + "\n")
+    text = (session / "session.yaml").read_text()
+    noted = text.split("a-ccw-1.csv")[1].split("sha256: ")[1][:64]
+    (session / "session.yaml").write_text(text.replace(noted, hashlib.sha256(path.read_bytes()).hexdigest()))
+    code, _, err = run(capsys, session)
+    assert code == 0, err
+    assert err.count("samples were lost") == 1
+    assert "a-ccw-1.csv: 20 of 400 samples were lost (5 %), more than the 0.5 % that the plan allows" in err
+    assert run(capsys, path)[1].endswith("run: 380 samples in 39.9 s, 20 lost\n")

@@ -219,3 +219,40 @@ def test_the_example_reads_with_the_package_s_own_sources() -> None:
     model = read_model(SMALL, known_sources())
     assert [one.source.name for one in model.model.sources] == ["strut-reference-length", "bar-offset", "mounting"]
     assert model.covariance.shape == (10, 10)
+
+
+@pytest.mark.parametrize(
+    ("source", "parameter", "value"),
+    [
+        ("strut-reference-length", "strut_3_mm", 100.0),
+        ("strut-reference-length", "strut_3_mm", -2500.0),
+        ("base-joints", "joint_2_z_mm", 40.0),
+        ("backlash", "strut_1_um", 5e5),
+        ("gravity", "strut_compliance_um_kn", 1e4),
+        ("unexplained-wave", "strut_6_period_mm", 1e5),
+    ],
+)
+def test_a_value_that_no_machine_has_is_refused_by_its_name(tmp_path, source, parameter, value) -> None:
+    machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
+    known = known_sources()
+    one = known[source]
+    names = [p.name for p in one.parameters(machine)]
+    path = tmp_path / "model.yaml"
+
+    def wrote(number: float) -> None:
+        values = np.zeros(len(names))
+        values[names.index(parameter)] = number
+        model = MachineModel(machine, (Fitted(one, values),))
+        write_model(path, IdentifiedModel(model, (), np.zeros((0, 0))), force=True)
+
+    limit = one.parameters(machine)[names.index(parameter)].largest
+    assert abs(value) > limit
+    wrote(value)
+    with pytest.raises(InputError) as caught:
+        read_model(path, known)
+    (problem,) = caught.value.problems
+    assert f"{source} {parameter}: {value:g}" in problem.what
+    assert "is not plausible" in problem.what
+    assert f"{value!r}".rstrip("0").rstrip(".") in path.read_text().splitlines()[problem.line - 1]
+    wrote(np.copysign(limit, value))
+    read_model(path, known)

@@ -154,6 +154,7 @@ def test_a_name_that_is_taken(tmp_path):
         ("texts = Texts", "text = Texts", "it needs `texts`, a Texts that says what, shows"),
         ('"The scale of a strut is bowed."', '" "', "its texts say nothing under what"),
         ("    belongs_to", '    needs = {"pose"}\n    belongs_to', "its `needs` must be a frozenset of Need"),
+        ("detail_mm = SMOOTH_MM", "detail_mm = 0", "its `detail_mm` must be a length above zero"),
         ("50.0, f", "0.0, f", "its parameter strut_1_um needs a plausible size above zero"),
         ("{i + 1}_um", "um", "two of its parameters are called strut_um"),
         ("strut_mm=1e-3", "tool_tip_mm=1e-3", "tool_tip_mm of its derivative has the shape (181, 6, 6), not (3, 6)"),
@@ -176,7 +177,7 @@ def test_a_derivative_that_is_not_that_of_the_effect_is_told(tmp_path):
 def test_an_error_in_its_own_code_has_its_line(tmp_path):
     path = changed(tmp_path, ("shortest, longest = machine.travel.strut_mm", "shortest, longest = machine.travel"))
     text = told(path)
-    assert re.search(r"own\.py:29: ScaleBow: TypeError: .*, when it was tried on a circle", text)
+    assert re.search(r"own\.py:30: ScaleBow: TypeError: .*, when it was tried on a circle", text)
 
 
 def test_all_faults_of_all_files_are_told(tmp_path):

@@ -117,6 +117,53 @@ def test_compensate_writes_one_file_and_says_what(tmp_path, model_file):
         run(compensate, part, "--model", model_file, "--out", out)
 
 
+def test_what_the_model_knows_is_set_against_the_chord_asked_for(tmp_path, model_file):
+    """Each of 24 coordinates and lengths is known within 1 µm: the tip within a few."""
+    part = tmp_path / "part.ngc"
+    part.write_text(PART)
+    arguments = [part, "--model", model_file, "--force", "--out", tmp_path / "true.ngc"]
+    (told,) = json.loads(run(compensate, *arguments, "--chord-um", "0.2", "--json").stdout)["programs"]
+    assert told["chord_asked_um"] == pytest.approx(0.2)
+    assert 1.0 < told["model_uncertainty_um"] < 10.0
+    text = run(compensate, *arguments, "--chord-um", "0.2").output
+    assert "the chord error asked for is 0.2 µm: moves are split finer than the model knows them" in text
+    assert "finer than" not in run(compensate, *arguments, "--chord-um", "50").output
+    assert "; standard uncertainty of the model along the path " in (tmp_path / "true.ngc").read_text()
+
+
+@pytest.mark.parametrize("command", ["program", "compensate"])
+def test_the_limit_of_corrections_is_an_option_within_limits(tmp_path, model_file, command):
+    part = tmp_path / "part.ngc"
+    part.write_text(PART)
+    arguments = {
+        "program": [program, "--plan", PLAN, "--machine", MACHINE, "--test", "a"],
+        "compensate": [compensate, part],
+    }[command]
+    arguments += ["--model", model_file, "--out", tmp_path / "out"]
+    with pytest.raises(StationError, match=r"more than 0\.01 mm"):
+        run(*arguments, "--largest-correction-mm", "0.01")
+    assert not (tmp_path / "out").exists()
+    assert run(*arguments, "--largest-correction-mm", "11").exit_code == 2
+    assert run(*arguments, "--largest-correction-mm", "2").exit_code == 0
+
+
+def test_no_option_lifts_the_travel(tmp_path, model_file):
+    part = tmp_path / "part.ngc"
+    part.write_text(PART.replace("X100", "X400"))
+    with pytest.raises(TravelError):
+        run(
+            compensate,
+            part,
+            "--model",
+            model_file,
+            "--out",
+            tmp_path / "o.ngc",
+            "--force",
+            "--largest-correction-mm",
+            "10",
+        )
+
+
 def test_a_part_that_leaves_the_travel_leaves_nothing_on_disk(tmp_path, model_file):
     part, out = tmp_path / "part.ngc", tmp_path / "true.ngc"
     part.write_text(PART.replace("X100", "X400"))

@@ -13,12 +13,12 @@ FIRST = "G21 G90 G94\nG0 X0 Y0 Z-1000 A0 B0 C0\n"
 
 
 def ends(text: str) -> np.ndarray:
-    path = read_program(FIRST + text, "part.ngc")
+    path = read_program(FIRST + text + "\nM2\n", "part.ngc")
     return path.poses[path.is_move][1:]
 
 
 def test_moves_feeds_and_dwells():
-    path = read_program(FIRST + "G1 X10 F600\nY5\nG4 P1.5\nG0 Z-990\n", "part.ngc")
+    path = read_program(FIRST + "G1 X10 F600\nY5\nG4 P1.5\nG0 Z-990\nM2\n", "part.ngc")
     assert [Step(kind).name for kind in path.kind] == ["RAPID", "FEED", "FEED", "DWELL", "RAPID"]
     np.testing.assert_array_equal(path.poses[2], [10, 5, -1000, 0, 0, 0])
     np.testing.assert_array_equal(path.feed_mm_min[1:3], [600, 600])
@@ -30,16 +30,16 @@ def test_inches_increments_numbers_lower_case_and_blanks():
     np.testing.assert_allclose(ends("g20\nn10 g91 g1 x1 f 1 0\n")[-1], [25.4, 0, -1000, 0, 0, 0])
     np.testing.assert_allclose(ends("G91 G1 X1 A2 F100\nX1 A2\nG90 Y3\n")[-1], [2, 3, -1000, 4, 0, 0])
     np.testing.assert_allclose(ends("G1X1 2.5Y-.5F100")[-1], [12.5, -0.5, -1000, 0, 0, 0])
-    assert read_program(FIRST + "G20\nG1 X1 F10", "p").feed_mm_min[-1] == 254.0
+    assert read_program(FIRST + "G20\nG1 X1 F10\nM2", "p").feed_mm_min[-1] == 254.0
 
 
 def test_a_turn_without_a_way_takes_its_feed_in_degrees():
-    path = read_program(FIRST + "G1 A3 B4 F60\nX60 A0\n", "part.ngc")
+    path = read_program(FIRST + "G1 A3 B4 F60\nX60 A0\nM2\n", "part.ngc")
     np.testing.assert_allclose(path.duration_s[1:], [5.0, 60.0])
 
 
 def test_comments_pauses_functions_and_the_end():
-    path = read_program("%\n" + FIRST + "(one) ; two\nS1200 M3\n(MSG, look)\nM0\nM1\nM2\nrubbish\n", "part.ngc")
+    path = read_program("%\n" + FIRST + "(one) ; two\nS1200 M3\n(MSG, look)\nM0\nM1\nM2\nrubbish\n%\n", "part.ngc")
     assert [path.text.get(row, "") for row in range(1, len(path))] == ["one", "two", "S1200 M3", "look", ""]
     assert [Step(kind).name for kind in path.kind[1:]] == ["COMMENT", "COMMENT", "FUNCTION", "PAUSE", "PAUSE"]
     assert len(read_program("%\n" + FIRST + "%\nG0 X5\n", "part.ngc")) == 1
@@ -109,7 +109,7 @@ def test_a_helix_moves_the_other_axes_evenly():
 )
 def test_a_fault_names_line_and_column(line, column, says):
     with pytest.raises(InputError) as caught:
-        read_program(FIRST + line + "\n", "part.ngc")
+        read_program(FIRST + line + "\nM2\n", "part.ngc")
     (problem,) = caught.value.problems
     assert (problem.file, problem.line, problem.column) == ("part.ngc", 3, column)
     assert says in problem.what
@@ -118,7 +118,7 @@ def test_a_fault_names_line_and_column(line, column, says):
 
 def test_unreadable_words_are_all_named_at_once():
     with pytest.raises(InputError) as caught:
-        read_program("G0 X1 ?\nG43\nG0 X1\nO100 call\n", "part.ngc")
+        read_program("G0 X1 ?\nG43\nG0 X1\nO100 call\nM2\n", "part.ngc")
     assert [problem.line for problem in caught.value.problems] == [1, 2, 4]
 
 
@@ -130,11 +130,11 @@ def test_a_program_of_another_language_does_not_flood_the_terminal():
 
 def test_the_first_move_must_say_where_the_machine_is():
     with pytest.raises(InputError, match=r"part.ngc:1:4: nobody knows where A, B, C stand before this move"):
-        read_program("G0 X1 Y2 Z-1000\n", "part.ngc")
+        read_program("G0 X1 Y2 Z-1000\nM2\n", "part.ngc")
     with pytest.raises(InputError, match=r"X, Y, Z, A, B, C stand"):
-        read_program("G91 G0 X1 Y2 Z-1 A0 B0 C0\n", "part.ngc")
+        read_program("G91 G0 X1 Y2 Z-1 A0 B0 C0\nM2\n", "part.ngc")
     start = np.array([0.0, 0.0, -1000.0, 1.0, 2.0, 3.0])
-    path = read_program("G91 G0 X1\n", "part.ngc", start=start)
+    path = read_program("G91 G0 X1\nM2\n", "part.ngc", start=start)
     np.testing.assert_array_equal(path.poses[0], [1, 0, -1000, 1, 2, 3])
     assert path.tip_mm[0] == 1.0
 

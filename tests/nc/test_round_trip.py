@@ -49,8 +49,8 @@ def test_linuxcnc_reads_back_what_was_written(first, steps):
     np.testing.assert_array_equal(read.kind, written.kind)
     np.testing.assert_allclose(read.poses[:, :3], written.poses[:, :3], rtol=0.0, atol=0.5001e-6)
     np.testing.assert_allclose(read.poses[:, 3:], written.poses[:, 3:], rtol=0.0, atol=0.5001e-7)
-    np.testing.assert_allclose(read.feed_mm_min, written.feed_mm_min, rtol=1e-6)
-    np.testing.assert_allclose(read.dwell_s, written.dwell_s, rtol=1e-6, atol=1e-300)
+    np.testing.assert_allclose(read.feed, written.feed, rtol=1e-6)
+    np.testing.assert_allclose(read.dwell_s, written.dwell_s, rtol=1e-6, atol=1e-15)
     assert read.text == written.text
     assert dialect.write(read) == text
 

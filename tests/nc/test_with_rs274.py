@@ -5,21 +5,15 @@ Needs `rs274` from the package `linuxcnc-uspace` (Debian, Ubuntu) on the path.
 
 from __future__ import annotations
 
-import re
-import shutil
-import subprocess
-
 import numpy as np
 import pytest
 
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.toolpath import Step
+from tests.nc.interpreter import RS274, calls
 
-RS274 = shutil.which("rs274")
 pytestmark = pytest.mark.skipif(RS274 is None, reason="LinuxCNC's interpreter rs274 is not installed")
-
-CALL = re.compile(r"(STRAIGHT_TRAVERSE|STRAIGHT_FEED|ARC_FEED|DWELL|PROGRAM_STOP|SET_FEED_RATE)\(([^)]*)\)")
 
 BY_HAND = """\
 G21 G90 G94 G17 G64 P0.001
@@ -43,17 +37,13 @@ def canonical(tmp_path):
     """What the interpreter hands to the motion controller: kind and numbers of each call."""
 
     def run(text: str) -> list[tuple[str, list[float]]]:
-        (tmp_path / "tool.tbl").write_text("T1 P1 D0.1 Z0\n")
-        (tmp_path / "rs274.var").write_text("")
-        (tmp_path / "program.ngc").write_text(text)
-        command = [str(RS274), "-g", "-t", "tool.tbl", "-v", "rs274.var", "program.ngc"]
-        done = subprocess.run(
-            command, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=120
-        )
-        assert done.returncode == 0, done.stdout[-1000:] + done.stderr
-        assert "PROGRAM_END()" in done.stdout
-        found = CALL.findall(done.stdout)
-        return [(name, [float(number) for number in numbers.split(",") if number.strip()]) for name, numbers in found]
+        found = calls(text, tmp_path)
+        assert found is not None
+        return [
+            (name, [float(one) for one in printed.split(",") if one.strip()])
+            for name, printed in found
+            if "UNITS" not in name
+        ]
 
     return run
 

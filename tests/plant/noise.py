@@ -26,6 +26,11 @@ class Noise:
     second_correlation: float = 0.9
 
     @property
+    def total_um(self) -> float:
+        """Standard deviation [µm] of a single reading."""
+        return float(np.sqrt(self.white_um**2 + self.correlated_um**2 + self.second_um**2))
+
+    @property
     def slow_um(self) -> float:
         """Standard deviation [µm] of white noise that is as loud at low frequencies: what fits of smooth curves feel."""
         parts = ((self.correlated_um, self.correlation), (self.second_um, self.second_correlation))

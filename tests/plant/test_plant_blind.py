@@ -10,7 +10,7 @@ import pytest
 
 from tests.plant.blind.circumstances import drawn
 from tests.plant.blind.families import families
-from tests.plant.blind.hide import Hider
+from tests.plant.blind.hide import Hidden, Hider
 from tests.plant.blind.limits import BAR_UM, FREE_MM, Limits
 from tests.plant.blind.listed import CONCEALED, LISTED, SINGLE
 from tests.plant.blind.sessions import KINDS, Task, make_session, make_study, tasks
@@ -96,7 +96,7 @@ def test_sizes_are_what_was_asked_for(session: LinearSession) -> None:
     assert 1.0 <= single["size"] <= 10.0
     assert single["size_with_all_amplitudes_free"] <= single["size"] * (1 + 1e-6)
     assert single["unconcealed_rms_um"] <= single["signature_rms_um"]
-    for hidden in hider.pair():
+    for hidden in hider.several(2):
         assert hidden.answer["testable"]
     outside = hider.outside("lobed-socket")[0].answer
     assert not outside["listed"]
@@ -109,14 +109,82 @@ def test_sizes_are_what_was_asked_for(session: LinearSession) -> None:
 
 
 def test_counts_and_names_in_turn() -> None:
-    planned = tasks({"clean": 3, "single": 50, "pair": 2, "outside": 12, "concealed": 7}, 1)
-    assert [task.number for task in planned] == list(range(1, 75))
+    counts = {"clean": 3, "single": 50, "pair": 2, "outside": 12, "concealed": 7, "triple": 4, "faint": 26}
+    planned = tasks(counts, 1)
+    assert [task.number for task in planned] == list(range(1, 105))
     kinds = [task.kind for task in planned]
-    assert {kind: kinds.count(kind) for kind in KINDS} == dict(zip(KINDS, (3, 50, 2, 12, 7), strict=True))
+    assert {kind: kinds.count(kind) for kind in KINDS} == counts
     assert {task.name for task in planned if task.kind == "single"} == set(SINGLE)
+    assert {task.name for task in planned if task.kind == "faint"} == set(SINGLE)
     assert {task.name for task in planned if task.kind == "outside"} == set(UNLISTED)
     # The order says nothing.
     assert kinds != sorted(kinds, key=KINDS.index)
+
+
+def test_a_share_of_the_sessions_is_perturbed() -> None:
+    counts = {"single": 400}
+    assert not any(task.perturbed for task in tasks(counts, 1))
+    assert all(task.perturbed for task in tasks(counts, 1, 1.0))
+    some = tasks(counts, 1, 0.3)
+    assert 90 <= sum(task.perturbed for task in some) <= 150
+    # Nothing else changes with it.
+    assert [(task.kind, task.name) for task in some] == [(task.kind, task.name) for task in tasks(counts, 1)]
+
+
+def test_three_effects_are_each_seen_beside_the_two_others() -> None:
+    """Every size is that of a fit which has all amplitudes of the two others, too."""
+    rng = np.random.default_rng(14)
+    circumstances = drawn(rng, 14)
+    hider = Hider(rng, circumstances)
+    found = hider.several(3)
+    assert len({hidden.effect.name for hidden in found}) == 3
+    session = LinearSession(circumstances.scene())
+    base = [circumstances.kinematics]
+    limits = Limits(session, circumstances.noise, circumstances.rate_hz, base, angles=circumstances.angles)
+
+    def column(hidden: Hidden, amplitudes: np.ndarray) -> np.ndarray:
+        step = 1e-3 * hidden.effect.most
+        return session.change(hidden.effect.make(step * amplitudes), [*base, *hidden.effect.carried_by()]) / step
+
+    for hidden in found:
+        others = [
+            column(other, sign * row)
+            for other in found
+            if other is not hidden
+            for sign, row in zip(other.effect.signs(), np.eye(len(other.effect.direction)), strict=True)
+        ]
+        own = column(hidden, hidden.scale * hidden.effect.direction)
+        assert hidden.answer["size"] * 5.0 == pytest.approx(limits.sigmas(own, np.stack(others, axis=1)), rel=1e-6)
+        assert hidden.answer["size"] >= 1.0 - 1e-9
+
+
+@pytest.mark.parametrize("name", ["gravity", "backlash"])
+def test_faint_effects_are_three_to_seven_standard_deviations_out(name: str) -> None:
+    counts = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        faint, *beside = Hider(rng, drawn(rng, seed)).faint(name)
+        assert faint.effect.name == name
+        assert 3.0 <= 5.0 * faint.answer["size"] <= 7.0
+        assert all(loud.answer["testable"] for loud in beside)
+        counts.append(len(beside))
+    assert set(counts) == {0, 1}
+
+
+def test_a_perturbed_session_says_how_far_it_is_off_the_laws(tmp_path: FilePath) -> None:
+    exact, off = (make_session(tmp_path / str(p), 8, Task(3, "single", "gravity", perturbed=p)) for p in (False, True))
+    assert (exact["perturbed"], off["perturbed"]) == (False, True)
+    told = off["effects"][0]["deviation"]
+    assert 0.01 <= told["size"] <= 0.04
+    assert told["forms"] == ["strut", "load"]
+    assert 0.2 < told["signature_share"] / told["size"] < 3.0
+    assert told["sigmas_beside_the_law"] > 0.0
+    # All else is the same: the size, the machine, the noise.
+    assert {**off["effects"][0], "deviation": None} == {**exact["effects"][0], "deviation": None}
+    assert off["circumstances"] == exact["circumstances"]
+    runs = [sorted((tmp_path / str(p) / "0003" / "runs").iterdir()) for p in (False, True)]
+    readings = [np.loadtxt(run[0], delimiter=",", comments=["#", "t_s"], usecols=1) for run in runs]
+    assert 0.0 < np.abs(readings[1] - readings[0]).max() < 0.05
 
 
 def test_the_same_seed_makes_the_same_session(tmp_path: FilePath) -> None:

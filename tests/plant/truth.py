@@ -135,7 +135,7 @@ class Truth:
         """Writes the answer; never into the session, where whoever examines it would find it."""
         if file.resolve().is_relative_to(self.folder.resolve()):
             raise ValueError(f"{file} lies inside the session: the answer belongs elsewhere")
-        file.write_text(json.dumps(self.as_dict(), indent=1, default=_plain) + "\n", encoding="utf-8")
+        file.write_text(json.dumps(self.as_dict(), indent=1, default=plain) + "\n", encoding="utf-8")
 
     def _kinematics(self) -> list[Kinematics]:
         return [item for item in self.mechanisms if isinstance(item, Kinematics)]
@@ -144,7 +144,8 @@ class Truth:
         return Motion(self.scene, np.broadcast_to(np.asarray(session_s, dtype=float), len(poses)), poses)
 
 
-def _plain(value: object) -> object:
-    if isinstance(value, (np.ndarray, np.floating, np.integer)):
+def plain(value: object) -> object:
+    """An array or a number of numpy as JSON knows it."""
+    if isinstance(value, (np.ndarray, np.floating, np.integer, np.bool_)):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} has no place in an answer")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from typing import TYPE_CHECKING
 
@@ -106,6 +107,33 @@ def test_garbage_and_half_lines_cost_single_samples(one_circle: Path, tmp_path: 
     lengths = session.load(session.runs[0]).recording.length_mm
     assert lengths.min() > 148.0
     assert lengths.max() < 152.0
+
+
+def test_a_run_that_lost_more_than_the_plan_allows_is_measured_again(one_circle: Path, tmp_path: Path) -> None:
+    """60 of some 3200 samples, from the middle of the turn: the circle is there, and nobody would see it."""
+    out = tmp_path / "session"
+    with bench(one_circle, scale=30.0) as place:
+        code, said = spoilt(place, out, lambda: place.wire.drop_samples(60))
+        assert code == 0, said
+    assert re.search(r"a-ccw-1: 60 of \d{4} samples were lost \(1\.\d %\), more than the 0\.5 %", said), said
+    session = read_session(out)
+    assert [(run.label, run.state) for run in session.runs] == [
+        ("a ccw 1", RunState.REJECTED),
+        ("a ccw 2", RunState.ACCEPTED),
+        ("b ccw 1", RunState.ACCEPTED),
+    ]
+    assert "60 of" in session.runs[0].reason
+
+
+def test_a_plan_may_allow_more(one_circle: Path, tmp_path: Path) -> None:
+    """The run counts then, and its count is told."""
+    out = tmp_path / "session"
+    one_circle.write_text(one_circle.read_text(encoding="utf-8") + "largest_loss_percent: 5\n", encoding="utf-8")
+    with bench(one_circle, scale=30.0) as place:
+        code, said = spoilt(place, out, lambda: place.wire.drop_samples(60))
+    assert code == 0, said
+    assert ", 60 samples lost" in said
+    assert [run.state for run in read_session(out).runs] == [RunState.ACCEPTED, RunState.ACCEPTED]
 
 
 def test_a_wrong_baud_rate(one_circle: Path, tmp_path: Path) -> None:

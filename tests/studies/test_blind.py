@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from dbbstation.cli import main
 from dbbstation.errors import InputError
 from dbbstation.studies.blind import judge_sessions, read_answers, verdict_folder
+from dbbstation.studies.blind_figure import reliability_figure
+from dbbstation.studies.blind_reliability import Forecast, reliability
 from dbbstation.studies.blind_score import compare, numbers, score
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
@@ -120,6 +123,113 @@ def test_known_verdicts_make_a_known_table():
     json.dumps(found, allow_nan=False)
 
 
+def with_probabilities(said, probabilities, *, evidence=None, classes=None):
+    """The same verdict with a probability for each named source, and for some a log Bayes factor or a class."""
+    for source in said["summary"]["sources"]:
+        if source["name"] in probabilities:
+            source["probability"] = probabilities[source["name"]]
+            source["log_evidence"] = (evidence or {}).get(source["name"])
+            source["class"] = list((classes or {}).get(source["name"], ()))
+    return said
+
+
+def test_three_causes_and_faint_ones_have_rows_of_their_own():
+    three = [effect(name) for name in ("backlash", "gravity", "bar-drift")]
+    both = {"bar-drift": ["thermal-struts"], "thermal-struts": ["bar-drift"]}
+    outcomes = [
+        compare(answer("01", "triple", *three), verdict("backlash", "gravity", "bar-drift")),
+        compare(answer("02", "triple", *three), verdict("backlash", "gravity", declared=both)),
+        compare(answer("03", "triple", *three), verdict("backlash", "gravity")),
+        compare(answer("04", "triple", *three), verdict("backlash", "gravity", "bar-drift", "play")),
+        # Faint ones may go unnamed; a wrong name is wrong.
+        compare(answer("05", "faint", effect("gravity", 0.8)), verdict()),
+        compare(answer("06", "faint", effect("gravity", 1.2)), verdict("play")),
+    ]
+    found = numbers(outcomes)
+    hits = {title: (share["hits"], share["count"]) for title, share in found["shares"].items()}
+    assert hits == {
+        "triple: all named": (2, 4),
+        "triple: all named or within a declared ambiguity": (3, 4),
+        "triple: wrongly named": (1, 4),
+        "faint: named or within a declared ambiguity": (0, 2),
+        "faint: wrongly named": (1, 2),
+    }
+    assert found["shares"]["triple: all named or within a declared ambiguity"]["target"] == ">= 80 %"
+    assert {failure["session"] for failure in found["failures"]} == {"03", "04", "06"}
+    assert found["reliability"] is None
+
+
+def test_perturbed_sessions_are_counted_apart():
+    rough = answer("01", "single", effect("gravity")) | {"perturbed": True}
+    outcomes = [compare(rough, verdict("play")), compare(answer("02", "single", effect("gravity")), verdict("gravity"))]
+    table = numbers([*outcomes, compare(answer("03", "clean"), verdict())])["right_by_law"]
+    assert {law: (s["hits"], s["count"]) for law, s in table.items()} == {
+        "law followed roughly": (0, 1),
+        "law followed exactly": (1, 1),
+    }
+
+
+def test_a_name_that_no_test_tells_from_the_hidden_one_is_within_and_not_wrong():
+    equal = {"gravity": ("strut-weight",)}
+    said = with_probabilities(verdict("gravity"), {"gravity": 0.99}, classes=equal)
+    outcome = compare(answer("01", "single", effect("strut-weight")), said)
+    assert (outcome.named, outcome.within, outcome.wrong) == (False, True, ())
+    assert outcome.said == "gravity = strut-weight"
+    assert [one.right for one in outcome.forecasts] == [True]
+    assert compare(answer("02", "single", effect("play")), said).wrong == ("gravity",)
+    # A class of four says too little.
+    wide = {"gravity": ("strut-weight", "play", "backlash")}
+    said = with_probabilities(verdict("gravity"), {"gravity": 0.99}, classes=wide)
+    assert not compare(answer("03", "single", effect("strut-weight")), said).within
+
+
+def test_a_class_makes_one_forecast_and_what_is_not_testable_none():
+    equal = {"gravity": ("play",), "play": ("gravity",)}
+    given = {"gravity": 0.6, "play": 0.97, "backlash": 0.05}
+    said = with_probabilities(verdict("gravity"), given, classes=equal)
+    next(s for s in said["summary"]["sources"] if s["name"] == "backlash")["verdict"] = "not-testable"
+    (one,) = compare(answer("01", "single", effect("gravity")), said).forecasts
+    assert (one.probability, one.right) == (0.97, True)
+
+
+def test_known_probabilities_make_a_known_table():
+    """One hundred verdicts said with 0.97, of which 90 are right; ten with 0.3, of which 4 are, half of them modest."""
+    sure_of = [with_probabilities(verdict("gravity"), {"gravity": 0.97}, evidence={"gravity": 500.0})] * 100
+    unsure = [with_probabilities(verdict(), {"gravity": 0.3}, evidence={"gravity": 3.0 + k}) for k in range(5)]
+    unsure += [with_probabilities(verdict(), {"gravity": 0.3}, evidence={"gravity": -2.0})] * 5
+    true = ["gravity"] * 90 + ["play"] * 10 + ["gravity", "play"] * 4 + ["play"] * 2
+    said = zip(true, [*sure_of, *unsure], strict=True)
+    found = numbers([compare(answer("01", "single", effect(name)), one) for name, one in said])
+    whole, modest = found["reliability"].values()
+    assert list(found["reliability"]) == ["all verdicts", "log Bayes factor of 3 to 20"]
+    counted = {(e["from"], e["to"]): (e["hits"], e["count"]) for e in whole if e["count"]}
+    assert counted == {(0.2, 0.5): (4, 10), (0.95, 1.0): (90, 100)}
+    assert [e["count"] for e in modest] == [0, 0, 0, 5, 0, 0, 0]
+    (certain,) = [e for e in whole if e["from"] == 0.95]
+    assert certain["mean_probability"] == pytest.approx(0.97)
+    # Wilson's interval of 90 in 100, by his formula with 1.96.
+    assert certain["interval"] == pytest.approx([0.8256, 0.9448], abs=1e-4)
+    row = found["shares"]["said with a probability of 0.95 to 1: there"]
+    assert (row["hits"], row["count"], row["target"]) == (90, 100, ">= 93 %")
+    json.dumps(found, allow_nan=False)
+
+
+@pytest.mark.parametrize(("probability", "place"), [(0.0, 0), (0.01, 1), (0.0499, 1), (0.5, 4), (0.95, 6), (1.0, 6)])
+def test_the_lower_edge_belongs_to_a_bin(probability, place):
+    table = reliability([Forecast(probability, None, right=True, perturbed=False)])["all verdicts"]
+    assert [entry["count"] for entry in table].index(1) == place
+
+
+def test_the_diagram_shows_every_bin_with_its_count():
+    said = [Forecast(0.97, 5.0, right=k < 40, perturbed=True) for k in range(43)]
+    drawn = reliability_figure(reliability(said))
+    texts = "".join(ET.fromstring(drawn).itertext())  # noqa: S314 - our own file
+    assert texts.count("(43)") == 3
+    assert texts.count("(0)") == 18
+    assert "sessions with perturbed laws" in texts
+    assert drawn == reliability_figure(reliability(said))
+
+
 def test_an_ambiguity_counts_only_where_the_diagnosis_declares_it():
     hidden = answer("01", "single", effect("bar-drift"))
     assert not compare(hidden, verdict("thermal-struts")).within
@@ -207,6 +317,39 @@ def test_the_command_prints_the_tables(study, capsys):
     printed = capsys.readouterr().out
     assert "clean: false alarm" in printed
     assert "joints and lengths" in printed
+
+
+def test_the_command_draws_what_was_given_a_probability(study, tmp_path, capsys):
+    names = ("gravity", "backlash")
+    figure = tmp_path / "reliability.svg"
+    arguments = ["study", "blind", str(study), "--candidates", ",".join(names), "--jobs", "1", "--figure", str(figure)]
+    kept = verdict_folder(study, names)
+    judge_sessions(study, names, 1, lambda _done, _total: None)
+    before = {path: path.read_text() for path in kept.iterdir()}
+    for path in kept.iterdir():
+        said = json.loads(before[path])
+        for source in said["summary"]["sources"]:
+            source.pop("probability", None)
+        path.write_text(json.dumps(said))
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 1
+    assert "no verdict has a probability" in capsys.readouterr().err
+    assert not figure.exists()
+    for path in kept.iterdir():
+        said = json.loads(before[path])
+        for source in said["summary"]["sources"]:
+            source |= {"probability": 0.99 if source["verdict"] == "identified" else 0.004, "log_evidence": 90.0}
+        path.write_text(json.dumps(said))
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    printed = capsys.readouterr().out
+    assert left.value.code == 0
+    assert "probabilities of all verdicts" in printed
+    assert "1 of 1" in next(line for line in printed.splitlines() if line.startswith("0.95 to 1"))
+    assert ET.fromstring(figure.read_bytes()).tag.endswith("svg")  # noqa: S314 - our own file
+    for path, text in before.items():
+        path.write_text(text)
 
 
 def test_a_folder_without_answers_says_what_is_missing(tmp_path):

@@ -153,5 +153,16 @@ def test_a_machine_wrong_by_a_millimetre_is_cut_all_the_same(error_mm):
 
 def test_a_bar_of_another_length_is_refused():
     recording = trace()
-    with pytest.raises(TraceError, match=r"mm off the bar's 150 mm"):
+    with pytest.raises(TraceError, match=r"mm off the bar's 150 mm") as refused:
         cut(replace(recording, length_mm=recording.length_mm + 5.0), CIRCLE)
+    assert "the machine is that far off: raise feed_in_mm, or begin with a coarse calibration" in refused.value.remedy
+
+
+@pytest.mark.parametrize("feed_in_mm", [0.0, 1.5])
+def test_with_recorded_angles_a_machine_may_be_off_as_far_as_a_bar_reaches(feed_in_mm):
+    theta = np.arange(0, 360, 1.0)
+    circle = replace(CIRCLE, feed_in_mm=feed_in_mm)
+    off = 9.5 * np.cos(np.radians(theta))
+    assert np.allclose(cut(Recording("a run", theta, 150 + off, theta), circle).length_mm, 150 + off)
+    with pytest.raises(TraceError, match="mm off the bar's 150 mm"):
+        cut(Recording("a run", theta, 150 + off * 1.1, theta), circle)

@@ -105,6 +105,36 @@ def test_the_stream_loses_nothing(pty: bool) -> None:  # noqa: FBT001 (a paramet
     assert [(one.counter - readings[0].counter) % 100_000 for one in readings] == list(range(2500))
 
 
+@LINES
+def test_a_program_that_reads_late_gets_every_sample(pty: bool) -> None:  # noqa: FBT001 (a parameter of the test)
+    """6000 samples come due while nobody reads, more than line and instrument keep; they come later, at their own times."""
+    clock = HandClock()
+    with (
+        VirtualInstrument(ENCODER, lambda t_s: 100.0 + t_s, clock=clock, pty=pty) as virtual,
+        serial.serial_for_url(virtual.port, 115200, timeout=5) as port,
+    ):
+        first = decode(ENCODER, next_line(port, clock))
+        clock.now_s += 24.0
+        time.sleep(0.2)
+        came = [decode(ENCODER, port.readline()) for _ in range(5900)]
+    assert [(one.counter - first.counter) % 100_000 for one in came] == list(range(1, 5901))
+    assert [one.length_mm - first.length_mm for one in came] == pytest.approx(
+        [n / 250.0 for n in range(1, 5901)], abs=2e-5
+    )
+
+
+def next_line(port: serial.SerialBase, clock: HandClock) -> bytes:
+    """The first whole line of a stream, its clock moved until it has come."""
+    port.timeout = 0.05
+    give_up_s = time.monotonic() + 10.0
+    raw = b""
+    while not raw.endswith(b"\n") and time.monotonic() < give_up_s:
+        clock.now_s += 0.001
+        raw += port.readline()
+    port.timeout = 5
+    return raw
+
+
 @pytest.mark.parametrize(("protocol", "tolerance_s"), [(ND, 0.02), (ENCODER, 0.01)], ids=["display", "encoder"])
 def test_samples_are_stamped_when_they_were_taken(protocol: Protocol, tolerance_s: float) -> None:
     # The display's reply ends 70 ms after it took the length.

@@ -16,32 +16,55 @@ import click
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes; all cores if left out.")
 @click.option("--again", is_flag=True, help="Judge sessions anew that have a verdict: the diagnosis has changed.")
+@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Reliability diagram, as SVG.")
+@click.option("--by-sets", is_flag=True, help="Judge by comparing sets of causes, as `diagnose --by-sets` does.")
+@click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
-def blind(*, folder: Path, candidates: str | None, jobs: int | None, again: bool, as_json: bool) -> None:
+def blind(
+    *,
+    folder: Path,
+    candidates: str | None,
+    jobs: int | None,
+    again: bool,
+    by_sets: bool,
+    figure: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
     r"""Diagnose sessions in which somebody has hidden effects, and score the verdicts.
 
     FOLDER has one session folder per recording and `answers.json`, which is opened only after every session has
     its verdict. Verdicts are kept in FOLDER/verdicts at once, so that a study can be interrupted and goes on where
-    it stopped. The simulation under tests/plant makes such folders: it shares no code with this program.
+    it stopped. --figure draws how often causes were there that were given a probability. The simulation under tests/plant makes such folders: it shares no code with this program.
 
     \b
     Examples:
       python -m tests.plant.blind hidden --clean 100 --single 200 --pairs 40 --outside 40 --concealed 20 --seed 1
       dbbstation study blind hidden
       dbbstation study blind hidden --again --json > blind.json
+      dbbstation study blind hidden --by-sets --figure reliability.svg
     """
-    from dbbstation.cli.output import print_json
+    from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import progress_bar
     from dbbstation.diagnosed import default_candidates
+    from dbbstation.errors import InputError, Problem
+    from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.sources.registry import known_sources
     from dbbstation.studies.blind import judge_sessions, read_answers
     from dbbstation.studies.blind_score import numbers, score
 
+    if figure is not None:
+        refuse_existing(figure, force=force)
     names = [n.strip() for n in candidates.split(",")] if candidates else default_candidates(known_sources())
     total = len(list(folder.glob("*/session.yaml")))
     with progress_bar("sessions", total) as advance:
         verdicts = judge_sessions(
-            folder, names, jobs or os.cpu_count() or 1, lambda done, _: advance(done), again=again
+            folder,
+            names,
+            jobs or os.cpu_count() or 1,
+            lambda done, _: advance(done),
+            again=again,
+            by_sets=by_sets,
         )
     found: dict[str, Any] = {
         "candidates": list(names),
@@ -51,6 +74,15 @@ def blind(*, folder: Path, candidates: str | None, jobs: int | None, again: bool
         print_json(found)
     else:
         _print(found)
+    if figure is None:
+        return
+    if found["reliability"] is None:
+        what = "no verdict has a probability, so there is no reliability to draw"
+        raise InputError([Problem(str(folder), 0, 0, what, "judge the sessions with --again, or leave --figure out")])
+    from dbbstation.studies.blind_figure import reliability_figure
+
+    write_bytes(figure, reliability_figure(found["reliability"]), force=force)
+    say(f"figure written to {figure}")
 
 
 def _print(found: dict[str, Any]) -> None:
@@ -65,6 +97,12 @@ def _print(found: dict[str, Any]) -> None:
     print_table(["", "", "share", "95 % interval", "target"], rows)
     click.echo("\nright answers of all kinds by how the samples got their angles")
     print_table(["", ""], [[label, f"{s['hits']} of {s['count']}"] for label, s in found["right_by_recording"].items()])
+    if len(found["right_by_law"]) > 1:
+        click.echo("\nright answers by how closely hidden effects follow their laws")
+        print_table(["", ""], [[label, f"{s['hits']} of {s['count']}"] for label, s in found["right_by_law"].items()])
+    for title, table in (found["reliability"] or {}).items():
+        click.echo(f"\nprobabilities of {title}")
+        print_table(["said", "mean", "there", "share", "95 % interval"], [_bin(entry) for entry in table])
     click.echo()
     rows = []
     for name, effect in found["effects"].items():
@@ -94,3 +132,12 @@ def _print(found: dict[str, Any]) -> None:
             for f in found["failures"]
         ]
         print_table(["session", "seed", "recorded", "kind", "hidden (size in limits)", "said"], rows)
+
+
+def _bin(entry: dict[str, Any]) -> list[object]:
+    said, count = f"{entry['from']:g} to {entry['to']:g}", f"{entry['hits']} of {entry['count']}"
+    if not entry["count"]:
+        return [said, "", count, "", ""]
+    low, high = (100 * bound for bound in entry["interval"])
+    share = f"{100 * entry['share']:.1f} %"
+    return [said, f"{entry['mean_probability']:.3f}", count, share, f"{low:.1f} to {high:.1f} %"]

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from dbbstation.cli.figure_option import figure_option, format_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @click.command()
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of everything random.")
-@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write the figure here, as SVG.")
+@figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def concealed_gravity(*, seed: int, figure: Path | None, force: bool, as_json: bool) -> None:
@@ -36,7 +40,7 @@ def concealed_gravity(*, seed: int, figure: Path | None, force: bool, as_json: b
     jig, conditions = read_plan(plans / "table2.yaml"), read_plan(plans / "gravity-conditions.yaml")
     found = experiment(machine, jig, conditions, seed, lambda text: say(f"... {text}"))
     if figure is not None:
-        write_bytes(figure, concealed_figure(found), force=force)
+        write_bytes(figure, concealed_figure(found, format_of(figure)), force=force)
         say(f"figure written to {figure}")
     if as_json:
         print_json(found.numbers)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from dbbstation.cli.figure_option import figure_option, format_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 ROWS = {
     "without": "kinematics calibrated, gravity not compensated",
@@ -19,7 +23,7 @@ ROWS = {
 @click.command()
 @click.option("--machines", default=60, show_default=True, type=click.IntRange(min=3), help="Random machines.")
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of the first machine.")
-@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Write the figure here, as SVG.")
+@figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def gravity(*, machines: int, seed: int, figure: Path | None, force: bool, as_json: bool) -> None:
@@ -51,7 +55,7 @@ def gravity(*, machines: int, seed: int, figure: Path | None, force: bool, as_js
     with progress_bar("machines", machines) as advance:
         study = gravity_study(machine, jig, conditions, range(seed, seed + machines), advance)
     if figure is not None:
-        write_bytes(figure, gravity_figure(study), force=force)
+        write_bytes(figure, gravity_figure(study, format_of(figure)), force=force)
         say(f"figure written to {figure}")
     numbers = {"seed": seed, **study.numbers()}
     if as_json:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dbbstation.nc.dialect import Dialect
+from dbbstation.nc.dialect import Dialect, plain
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, Step, rounded
 
@@ -27,8 +28,8 @@ tool tip. A program must not inherit any of these from the one before it."""
 FEED_DIGITS = 7
 """Significant digits of a feed."""
 
-LONGEST_COMMENT = 200
-"""LinuxCNC refuses lines of more than 255 characters."""
+MOST_DECIMALS = 15
+"""No feed and no dwell needs more; a line has an end."""
 
 
 class LinuxCNC(Dialect):
@@ -48,12 +49,15 @@ class LinuxCNC(Dialect):
 
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
         """Return the program."""
-        lines = [f"; {_plain(text)}".rstrip() for text in header]
-        lines.append(MODES)
+        # What does not move by the decimals that are written does not move.
+        toolpath = replace(toolpath, poses=rounded(toolpath.poses))
+        lines = [f"; {plain(text)}".rstrip() for text in header]
+        numbers = [f"N{number} " for number in toolpath.numbers] or [""]
+        lines.append(numbers[0] + MODES)
         if toolpath.corner_mm is not None:
             lines.append(_path_control(toolpath.corner_mm))
         lines.extend(_body(toolpath))
-        lines.append("M2")
+        lines.append(numbers[-1] + "M2")
         return "\n".join(lines) + "\n"
 
     def read(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
@@ -63,7 +67,7 @@ class LinuxCNC(Dialect):
 
 def _body(toolpath: Toolpath) -> Iterator[str]:
     kinds, words = toolpath.kind.tolist(), _axis_words(toolpath)
-    feeds, dwells = toolpath.feed_mm_min.tolist(), toolpath.dwell_s.tolist()
+    feeds, dwells = toolpath.feed.tolist(), toolpath.dwell_s.tolist()
     last_words: tuple[str, ...] = ("",) * 6
     last_feed = math.nan
     for row, kind in enumerate(kinds):
@@ -87,10 +91,10 @@ def _said(kind: Step, text: str) -> Iterator[str]:
     if kind == Step.FUNCTION:
         yield text
     elif kind == Step.COMMENT:
-        yield f"; {_plain(text)}".rstrip()
+        yield f"; {plain(text)}".rstrip()
     else:
         if text:
-            yield f"(MSG, {_plain(text).replace('(', '[').replace(')', ']')})"
+            yield f"(MSG, {plain(text).replace('(', '[').replace(')', ']')})"
         yield "M0"
 
 
@@ -113,13 +117,6 @@ def digits(value: float) -> str:
     """A positive number with seven significant digits and no exponent, which RS274/NGC does not know."""
     if value == 0.0:
         return "0"
-    decimals = max(0, FEED_DIGITS - 1 - math.floor(math.log10(abs(value))))
+    decimals = min(max(0, FEED_DIGITS - 1 - math.floor(math.log10(abs(value)))), MOST_DECIMALS)
     text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
-
-
-def _plain(text: str) -> str:
-    """Text on one line of printable ASCII, no longer than a comment may be."""
-    ascii_text = text.replace("µ", "u").encode("ascii", "replace").decode()
-    printable = "".join(letter if letter.isprintable() else " " for letter in ascii_text)
-    return printable[:LONGEST_COMMENT].strip()

@@ -18,6 +18,9 @@ RADIUS_ABSOLUTE_MM, RADIUS_RELATIVE, RADIUS_WORST = 0.02 * math.sqrt(2.0), 1e-3,
 """Radii to start and end of an arc may differ: by less than the first, or by less than the second share of the radius
 while below the first times the third. Such an arc is a spiral. [LinuxCNC's own limits]"""
 
+LEAST_RADIUS_MM = 0.00127
+"""Arcs of a smaller radius are none. [LinuxCNC's own limit, RADIUS_TOLERANCE]"""
+
 REACH_MM = 0.00127
 """By how much the radius of an arc given by R may be too short for its ends. [LinuxCNC's own limit]"""
 
@@ -52,27 +55,38 @@ class Arc:
         """Whether both ends lie on one circle, within what LinuxCNC allows."""
         first, last = self.radii_mm()
         off, radius = abs(first - last), max(first, last)
-        if min(first, last) <= 0.0 or off > RADIUS_ABSOLUTE_MM * RADIUS_WORST:
+        if min(first, last) < LEAST_RADIUS_MM or off > RADIUS_ABSOLUTE_MM * RADIUS_WORST:
             return False
         return off <= RADIUS_ABSOLUTE_MM or off <= RADIUS_RELATIVE * radius
+
+    @property
+    def swept_rad(self) -> float:
+        """Angle from start to end in the arc's own direction, all turns together."""
+        begin, end = (self._angle_rad(pose) for pose in (self.start, self.end))
+        swept = math.fmod(end - begin if not self.clockwise else begin - end, math.tau)
+        while swept <= FULL_TURN_RAD:
+            swept += math.tau
+        return swept + (self.turns - 1) * math.tau
+
+    @property
+    def chords(self) -> int:
+        """Number of straight moves that keep `CHORD_ERROR_MM`."""
+        return max(1, math.ceil(self.swept_rad / math.sqrt(8.0 * CHORD_ERROR_MM / max(self.radii_mm()))))
 
     def poses(self) -> NDArray[np.float64]:
         """End points of the chords, shape (k, 6) [mm, deg]."""
         (x, y), (first, last) = self.centre_mm, self.radii_mm()
-        sign = -1.0 if self.clockwise else 1.0
-        begin = math.atan2(self.start[1] - y, self.start[0] - x)
-        swept = math.fmod(sign * (math.atan2(self.end[1] - y, self.end[0] - x) - begin), math.tau)
-        while swept <= FULL_TURN_RAD:
-            swept += math.tau
-        swept += (self.turns - 1) * math.tau
-        count = max(1, math.ceil(swept / math.sqrt(8.0 * CHORD_ERROR_MM / max(first, last))))
-        share = np.arange(1, count + 1) / count
+        turned = -self.swept_rad if self.clockwise else self.swept_rad
+        share = np.arange(1, self.chords + 1) / self.chords
         poses = self.start + share[:, None] * (self.end - self.start)
-        radius, angle = first + share * (last - first), begin + sign * share * swept
+        radius, angle = first + share * (last - first), self._angle_rad(self.start) + share * turned
         poses[:, 0] = x + radius * np.cos(angle)
         poses[:, 1] = y + radius * np.sin(angle)
         poses[-1] = self.end
         return poses
+
+    def _angle_rad(self, pose: NDArray[np.float64]) -> float:
+        return math.atan2(pose[1] - self.centre_mm[1], pose[0] - self.centre_mm[0])
 
 
 def centre_by_radius(

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from dbbstation.errors import Problem
 from dbbstation.nc.rs274 import codes
 from dbbstation.nc.rs274.codes import Group
 from dbbstation.nc.rs274.tokens import BadLine, Place, Word, tokens
 
-if TYPE_CHECKING:
-    from dbbstation.errors import Problem
+BLANKS = " \t\r"
+
+LONGEST_BYTES = 252
+"""LinuxCNC's interpreter refuses lines of more bytes, the CR before the line feed counted [measured with rs274 2.9]."""
+
+_CONTROL = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028\u2029]")
+"""All control characters but the tab, and the line separators of Unicode."""
 
 MOST_FAULTS = 20
 """A program of another language has a fault in every line; the first ones tell."""
@@ -39,28 +45,64 @@ class Block:
 
 
 def blocks(text: str, file: str, faults: list[Problem]) -> list[Block]:
-    """Return all lines up to the program's end, with faults added to `faults`."""
+    """Return all lines up to the program's end, with faults added to `faults`; a program without an end is one."""
+    lines = text.split("\n")
+    percent, first = _opening(lines)
     found: list[Block] = []
-    percent = False
-    for number, line in enumerate(text.splitlines(), 1):
-        place = Place(file, number)
-        if line.strip() == "%":
-            # Between percent signs the program needs no end; what follows the second one is not part of it.
-            if percent:
-                break
-            percent = True
-            continue
+    for number, line in enumerate(lines[first:], first + 1):
+        if percent and _is_percent(line):
+            return found
         try:
-            block = _block(line, place)
+            block = _block(_one_line(line, Place(file, number)), Place(file, number))
         except BadLine as fault:
             faults.append(fault.problem)
             if len(faults) >= MOST_FAULTS:
-                break
+                return found
             continue
         found.append(block)
         if block.code(Group.STOP) in {2.0, 30.0}:
-            break
+            if percent and not any(_is_percent(after) for after in lines[number:]):
+                faults.append(_cut_short(file, lines, "the % that closes it"))
+            return found
+    faults.append(_cut_short(file, lines, "the % that closes it" if percent else "M2 or M30"))
     return found
+
+
+def _opening(lines: list[str]) -> tuple[bool, int]:
+    """Whether the first line that is not empty is a percent sign, and the index of the first line to be read.
+
+    Between percent signs a program needs no other end; what follows the second one is not part of it. Elsewhere a
+    percent sign is a fault, as for LinuxCNC.
+    """
+    start = next((index for index, line in enumerate(lines) if line.strip(BLANKS)), 0)
+    return (True, start + 1) if _is_percent(lines[start]) else (False, 0)
+
+
+def _is_percent(line: str) -> bool:
+    return line.strip(BLANKS) == "%"
+
+
+def _cut_short(file: str, lines: list[str], end: str) -> Problem:
+    what = f"the program ends without {end}: it may have been cut short"
+    return Problem(file, len(lines), 0, what, "copy it again, or add its end where it is whole")
+
+
+def _one_line(line: str, place: Place) -> str:
+    """The line without the CR that may come before the line feed.
+
+    Raises:
+        BadLine: it is longer than LinuxCNC reads, or has a character in it that some programs take for the end of a line.
+    """
+    line_bytes = len(line.encode("utf-8", "surrogatepass"))
+    if line_bytes > LONGEST_BYTES:
+        what = f"the line has {line_bytes} characters"
+        raise place.fault(LONGEST_BYTES + 1, what, f"LinuxCNC reads {LONGEST_BYTES}: write it as two lines")
+    line = line.removesuffix("\r")
+    control = _CONTROL.search(line)
+    if control is not None:
+        what = f"the control character U+{ord(control[0]):04X}, which ends a line for some programs and not for others"
+        raise place.fault(control.start() + 1, what, "remove it, or end the line with a line feed")
+    return line
 
 
 def _block(line: str, place: Place) -> Block:
@@ -73,6 +115,8 @@ def _block(line: str, place: Place) -> Block:
         elif token.letter not in codes.LETTERS:
             what = f"words with the letter {token.letter} are not read ({token.letter}{token.value:g})"
             raise place.fault(token.column, what, "post the program without it")
+        elif token.letter == "N" and (block.words or block.codes or block.comments):
+            raise place.fault(token.column, "the line number N does not stand first", "write it at the line's begin")
         elif token.letter in block.words:
             what = f"a second {token.letter} in one line"
             raise place.fault(token.column, what, "write one move per line")

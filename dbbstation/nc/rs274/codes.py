@@ -9,7 +9,7 @@ class Group(StrEnum):
     """Codes of one group exclude each other in a line."""
 
     MOTION = "motion"
-    DWELL = "dwell"
+    ONCE = "not modal"
     PLANE = "plane"
     UNITS = "units"
     DISTANCE = "distance"
@@ -19,7 +19,6 @@ class Group(StrEnum):
     TOOL_LENGTH = "tool length"
     CYCLE = "cycle"
     OFFSET = "work offset"
-    MACHINE = "machine coordinates"
     PATH = "path control"
     STOP = "stop"
     SPINDLE = "spindle"
@@ -31,13 +30,13 @@ G_CODES: dict[float, Group] = {
     1: Group.MOTION,
     2: Group.MOTION,
     3: Group.MOTION,
-    4: Group.DWELL,
+    4: Group.ONCE,
     17: Group.PLANE,
     20: Group.UNITS,
     21: Group.UNITS,
     40: Group.CUTTER,
     49: Group.TOOL_LENGTH,
-    53: Group.MACHINE,
+    53: Group.ONCE,
     54: Group.OFFSET,
     61: Group.PATH,
     64: Group.PATH,

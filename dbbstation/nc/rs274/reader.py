@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,21 @@ from dbbstation.nc.toolpath import Step, Toolpath, ToolpathBuilder
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from dbbstation.nc.rs274.tokens import Word
+
 AXES = "XYZABC"
 MM_PER_INCH = 25.4
 MESSAGE = "MSG,"
+
+MOST_ROWS = 1_000_000
+"""Moves and stops that a program may have once its arcs are chords: 260 full turns of 150 mm, or a path of 50 m in steps
+of 0.05 mm. All of it is inverted at once, for the sake of sources with a history; it takes some gigabytes then."""
+
+FARTHEST_MM, FARTHEST_DEG = 100_000.0, 36_000.0
+"""No increment may lead farther than this, as no number may be larger."""
+
 RAPID, LINEAR, CLOCKWISE, COUNTER_CLOCKWISE = 0.0, 1.0, 2.0, 3.0
+DWELL, MACHINE = 4.0, 53.0
 
 
 def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
@@ -44,10 +55,19 @@ def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = No
             interpreter.run(block)
     except BadLine as fault:
         raise InputError([fault.problem]) from None
+    numbered = [int(block.words["N"].value) for block in program if "N" in block.words]
+    interpreter.path.numbers = tuple(numbered[:: max(len(numbered) - 1, 1)])
     path = interpreter.path.built()
     if not path.is_move.any():
         raise InputError([Problem(file, 0, 0, "this program moves nothing", "check that it is the file you mean")])
     return path
+
+
+class Feed(NamedTuple):
+    """What F stands for: of the tool tip where it moves, of the angles where nothing but they move."""
+
+    mm_min: float
+    deg_min: float
 
 
 class _Interpreter:
@@ -58,7 +78,7 @@ class _Interpreter:
         self._pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64)
         self._moved = False
         self._motion: float | None = None
-        self._feed_mm_min = 0.0
+        self._speed = Feed(0.0, 0.0)
         self._unit_mm = 1.0
         self._absolute = True
         self._absolute_centres = False
@@ -71,13 +91,16 @@ class _Interpreter:
         self._units(block)
         self._feed(block)
         self._functions(block)
-        if Group.DWELL in block.codes:
+        self._shared_words(block)
+        if block.code(Group.ONCE) == DWELL:
             self.path.dwell(self._dwell_s(block), line=block.place.line)
         self._modes(block)
         self._move(block)
         if block.code(Group.STOP) in {0.0, 1.0}:
             self._pause(block)
         self._nothing_left(block)
+        if len(self.path) > MOST_ROWS:
+            raise _too_long(block)
 
     def _units(self, block: Block) -> None:
         units = block.code(Group.UNITS)
@@ -92,22 +115,52 @@ class _Interpreter:
         self._unit_mm = unit_mm
 
     def _feed(self, block: Block) -> None:
+        if Group.FEED_MODE in block.codes:
+            # LinuxCNC forgets F at every G94, even where it was in force already.
+            self._speed = Feed(0.0, 0.0)
         word = block.words.pop("F", None)
         if word is not None:
             if word.value < 0.0:
                 raise block.place.fault(word.column, f"the feed is negative (F{word.value:g})", "give a positive feed")
-            self._feed_mm_min = word.value * self._unit_mm
+            # Degrees are degrees in G20 as well: only the speed of the tool tip counts in inches.
+            self._speed = Feed(word.value * self._unit_mm, word.value)
 
     def _functions(self, block: Block) -> None:
+        speed = block.words.get("S")
+        if speed is not None and speed.value < 0.0:
+            raise block.place.fault(speed.column, f"the spindle's speed is negative (S{speed.value:g})", "use M3 or M4")
         said = [block.words.pop("S", None), block.codes.get(Group.SPINDLE), block.codes.get(Group.COOLANT)]
         text = " ".join(name(word.letter, word.value) for word in said if word is not None)
         if text:
             self.path.say(Step.FUNCTION, text, line=block.place.line)
 
+    def _shared_words(self, block: Block) -> None:
+        """Refuse codes in one line that take the same word, or of which one undoes the other."""
+        users = [self._in_line(block, Group.ONCE, {DWELL}), self._in_line(block, Group.PATH, {64.0})]
+        users += [self._in_line(block, Group.MOTION, {CLOCKWISE, COUNTER_CLOCKWISE}) or self._modal_arc(block)]
+        both = [code for code in users if code]
+        if len(both) > 1 and ("P" in block.words or both[0] == name("G", DWELL)):
+            column = block.words["P"].column if "P" in block.words else 1
+            what = f"{' and '.join(both)} both take P"
+            raise block.place.fault(column, what, "write them in separate lines")
+        if Group.CYCLE in block.codes and Group.MOTION in block.codes:
+            column = block.codes[Group.CYCLE].column
+            raise block.place.fault(column, "G80 ends the motion that the same line begins", "remove one of them")
+
+    @staticmethod
+    def _in_line(block: Block, group: Group, values: set[float]) -> str:
+        value = block.code(group)
+        return name("G", value) if value in values and value is not None else ""
+
+    def _modal_arc(self, block: Block) -> str:
+        """The arc that this line makes without saying so again; empty where it makes none."""
+        is_arc = self._motion in {CLOCKWISE, COUNTER_CLOCKWISE} and Group.MOTION not in block.codes
+        return name("G", self._motion or 0.0) if is_arc and block.words.keys() & set(AXES + "IJ") else ""
+
     def _dwell_s(self, block: Block) -> float:
         word = block.words.pop("P", None)
         if word is None or word.value < 0.0:
-            column = block.codes[Group.DWELL].column
+            column = block.codes[Group.ONCE].column
             raise block.place.fault(column, "G4 needs the seconds to wait", "write G4 P0.5 for half a second")
         return word.value
 
@@ -139,43 +192,68 @@ class _Interpreter:
         if motion is not None:
             self._motion = motion
         named = [letter for letter in AXES if letter in block.words]
-        is_turn = self._motion in {CLOCKWISE, COUNTER_CLOCKWISE} and ("I" in block.words or "J" in block.words)
-        if not named and not is_turn:
+        is_arc = self._motion in {CLOCKWISE, COUNTER_CLOCKWISE}
+        is_turn = is_arc and (motion is not None or "I" in block.words or "J" in block.words)
+        machine = block.codes[Group.ONCE] if block.code(Group.ONCE) == MACHINE else None
+        if machine is not None:
+            self._check_machine(machine, block, named)
+        # LinuxCNC makes a move to where it stands of a motion code alone.
+        stays = motion in {RAPID, LINEAR} and not named and not np.isnan(self._pose).any()
+        if motion == LINEAR:
+            self._check_feed(block, _first_column(block))
+        if not named and not is_turn and not stays:
             return
         if self._motion is None:
             word = block.words[named[0]]
             raise block.place.fault(word.column, f"{word.letter} without a motion code", "write G0 or G1 before it")
-        machine = block.codes.get(Group.MACHINE)
-        if machine is not None and self._motion not in {RAPID, LINEAR}:
-            raise block.place.fault(machine.column, "G53 goes with G0 and G1 only", "remove it")
         target = self._target(block)
         if self._motion == RAPID:
             self.path.rapid(target, line=block.place.line)
         else:
-            column = _first_column(block)
-            if self._feed_mm_min <= 0.0:
-                raise block.place.fault(column, f"{name('G', self._motion)} without a feed", "give F before or in it")
-            poses = target[None] if self._motion == LINEAR else self._arc(block, target).poses()
-            self.path.feed(poses, self._feed_mm_min, line=block.place.line)
+            self._check_feed(block, _first_column(block))
+            poses = target[None] if self._motion == LINEAR else self._chords(block, target)
+            self.path.feed(poses, self._speed.mm_min, self._speed.deg_min, line=block.place.line)
         for letter in named:
             del block.words[letter]
         self._pose, self._moved = target, True
 
+    def _check_machine(self, machine: Word, block: Block, named: list[str]) -> None:
+        if self._motion not in {RAPID, LINEAR} or not named:
+            raise block.place.fault(machine.column, "G53 goes with G0 and G1 only, and with axes", "remove it")
+        if not self._absolute:
+            raise block.place.fault(
+                machine.column, "G53 goes with absolute distances (G90) only", "write G90 before it"
+            )
+
+    def _check_feed(self, block: Block, column: int) -> None:
+        if self._speed.mm_min <= 0.0:
+            raise block.place.fault(
+                column, f"{name('G', self._motion or 0.0)} without a feed", "give F before or in it"
+            )
+
     def _target(self, block: Block) -> NDArray[np.float64]:
         """Pose that a block leads to, shape (6,)."""
         target = self._pose.copy()
-        absolute = self._absolute or Group.MACHINE in block.codes
         for axis, letter in enumerate(AXES):
             word = block.words.get(letter)
             if word is not None:
                 value = word.value * (self._unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
-                target[axis] = value if absolute else target[axis] + value
+                target[axis] = value if self._absolute else target[axis] + value
         unknown = [letter for letter, value in zip(AXES, target, strict=True) if np.isnan(value)]
         if unknown:
             what = f"nobody knows where {', '.join(unknown)} stand{'s' if len(unknown) == 1 else ''} before this move"
             remedy = "name all six axes in the first move, absolutely (G90), or say where the machine stands"
             raise block.place.fault(_first_column(block), what, remedy)
+        if np.abs(target[:3]).max() > FARTHEST_MM or np.abs(target[3:]).max() > FARTHEST_DEG:
+            what = f"this move leads beyond {FARTHEST_MM:g} mm or {FARTHEST_DEG:g} degrees"
+            raise block.place.fault(_first_column(block), what, "check its numbers, and G91 and G20 before it")
         return target
+
+    def _chords(self, block: Block, target: NDArray[np.float64]) -> NDArray[np.float64]:
+        arc = self._arc(block, target)
+        if len(self.path) + arc.chords > MOST_ROWS:
+            raise _too_long(block)
+        return arc.poses()
 
     def _arc(self, block: Block, target: NDArray[np.float64]) -> Arc:
         clockwise = self._motion == CLOCKWISE
@@ -228,5 +306,11 @@ class _Interpreter:
 
 
 def _first_column(block: Block) -> int:
-    """Column of the first word that is neither a code nor a line number."""
-    return min(word.column for letter, word in block.words.items() if letter != "N")
+    """Column of the first word that is neither a code nor a line number; of the motion code where there is none."""
+    words = [word.column for letter, word in block.words.items() if letter != "N"]
+    return min(words) if words else block.codes[Group.MOTION].column
+
+
+def _too_long(block: Block) -> BadLine:
+    what = f"up to here the program has more than {MOST_ROWS} moves, arcs as chords"
+    return block.place.fault(0, what, "check the turns (P) of its arcs, or compensate it in parts")

@@ -11,21 +11,30 @@ from dbbstation.errors import Problem
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-# White space inside a number is legal: `X1 0` is X10 to LinuxCNC, and so it must be here.
+# White space inside a number is legal: `X1 0` is X10 to LinuxCNC, and so it must be here. Every repeat is possessive
+# (`*+`), so that no line is gone through twice.
 _TOKEN = re.compile(
-    r"""[ \t]*(?:
-        (?P<letter>[A-Za-z])[ \t]*(?P<number>[+-]?[ \t]*(?:\d[\d \t]*(?:\.[\d \t]*)?|\.[ \t]*\d[\d \t]*))
-      | \((?P<comment>[^()]*)\)
-      | ;(?P<rest>.*)
-      | (?P<end>$)
+    r"""[ \t]*+(?:
+        (?P<letter>[A-Za-z])[ \t]*+
+        (?P<number>[+-]?+[ \t]*+(?:[0-9][0-9 \t]*+(?:\.[0-9 \t]*+)?+|\.[ \t]*+[0-9][0-9 \t]*+))
+      | \((?P<comment>[^()]*+)\)
+      | ;(?P<rest>.*+)
+      | (?P<end>\Z)
     )""",
     re.VERBOSE,
 )
+
+LARGEST = {"N": 99_999_999.0, "F": 1e9, "S": 1e6, **dict.fromkeys("ABC", 36_000.0)}
+LARGEST_OTHER = 100_000.0
+"""Greatest size of a number after each letter: a hundred metres, a hundred turns, a dwell of a day. What is beyond is a
+slip of the pen, and would be drawn out into millions of points before any limit of the machine is looked at."""
 
 _NOT_READ = {
     "#": ("a parameter (#) is not read", "write its value"),
     "[": ("an expression ([ ]) is not read", "write its value"),
     "/": ("a line that can be skipped (/) is not read", "decide: remove the line, or the slash"),
+    "@": ("polar coordinates (@, ^) are not read", "write X and Y"),
+    "^": ("polar coordinates (@, ^) are not read", "write X and Y"),
     "(": ("a comment without its end, or inside another", "close it with ) before the line ends"),
     "%": ("% stands alone on the first and the last line", "remove it"),
 }
@@ -79,13 +88,25 @@ def tokens(text: str, place: Place) -> Iterator[Word | str]:
             raise _unreadable(text, position, place)
         position = match.end()
         if match["letter"]:
-            number = match["number"].replace(" ", "").replace("\t", "")
-            yield Word(match["letter"].upper(), float(number), match.start("letter") + 1)
+            yield _word(match, place)
         elif match["end"] is not None:
             return
         else:
             comment = match["comment"] if match["comment"] is not None else match["rest"]
             yield comment.strip()
+
+
+def _word(match: re.Match[str], place: Place) -> Word:
+    letter, column = match["letter"].upper(), match.start("letter") + 1
+    number = match["number"].replace(" ", "").replace("\t", "")
+    if letter == "N" and not number.isdecimal():
+        raise place.fault(column, f"N{number} is no line number", "write a whole number, or none")
+    value = float(number)
+    largest = LARGEST.get(letter, LARGEST_OTHER)
+    if abs(value) > largest:
+        what = f"the number after {letter} is {value:g}, beyond {largest:g}"
+        raise place.fault(column, what, "check its decimal point")
+    return Word(letter, value, column)
 
 
 def _unreadable(text: str, position: int, place: Place) -> BadLine:

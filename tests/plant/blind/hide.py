@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from tests.plant.blind.families import families
 from tests.plant.blind.limits import TESTABLE_SIGMA, Limits
 from tests.plant.blind.listed import CONCEALED, LISTED, SINGLE
+from tests.plant.blind.perturb import Perturbation, drawn_perturbation
 from tests.plant.blind.unlisted import UNLISTED
 from tests.plant.linear import LinearSession
 
@@ -24,10 +25,12 @@ if TYPE_CHECKING:
 DRAWS = 40
 LARGEST = 10.0
 """Sizes go from barely testable to so many times that, evenly in the logarithm."""
-FAINT = (0.1, 0.5)
+UNSEEN = (0.1, 0.5)
 """Sizes of what nobody can see."""
 SEPARABLE = 0.3
-"""Share of an effect's standard deviations that must be left with the other one fitted too."""
+"""Share of an effect's standard deviations that must be left with the others fitted too."""
+FAINT_SIGMAS = (3.0, 7.0)
+"""Standard deviations of faint effects: log Bayes factors of about half the square, less what the size's prior costs."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +40,13 @@ class Hidden:
     effect: Effect
     scale: float
     answer: dict[str, Any]
+    perturbation: Perturbation | None = None
 
     @property
     def mechanism(self) -> Mechanism:
         """As it acts."""
-        return self.effect.at(self.scale)
+        law = self.effect.at(self.scale)
+        return law if self.perturbation is None else self.perturbation.apply(law)
 
 
 class Hider:
@@ -65,18 +70,32 @@ class Hider:
                 return [self._hidden(effect, scale, None)]
         raise ArithmeticError("nothing of the list shows on this plan")
 
-    def pair(self) -> list[Hidden]:
-        """Two effects of the list, each of which shows with the other one fitted too."""
+    def several(self, count: int) -> list[Hidden]:
+        """So many effects of the list, each of which shows with all the others fitted too."""
         for _ in range(DRAWS):
-            names = [str(name) for name in self._rng.choice([*SINGLE, "cog-shift"], 2, replace=False)]
+            names = [str(name) for name in self._rng.choice([*SINGLE, "cog-shift"], count, replace=False)]
             effects = [self._drawn(name) for name in names]
-            if any(effect.carriers for effect in effects):
+            needy = next((effect for effect in effects if effect.carriers), None)
+            if needy is not None:
                 # What needs gravity is hidden beside it.
-                effects = [e for e in effects if e.carriers] + [*next(e for e in effects if e.carriers).carriers]
+                first = [needy, *needy.carriers]
+                known = {effect.name for effect in first}
+                effects = [*first, *(effect for effect in effects if effect.name not in known)][:count]
             found = self._together(effects)
             if found:
                 return found
-        raise ArithmeticError("no two effects of the list show together on this plan")
+        raise ArithmeticError(f"no {count} effects of the list show together on this plan")
+
+    def faint(self, name: str) -> list[Hidden]:
+        """One effect of the list, about as large as what is barely seen; every second time beside a loud one."""
+        for draw in range(DRAWS):
+            effect = self._drawn(name if draw < DRAWS // 4 else str(self._rng.choice(SINGLE)))
+            loud = self._drawn(str(self._rng.choice([other for other in SINGLE if other != effect.name])))
+            beside = [loud] if self._rng.random() < 0.5 else []
+            found = self._together([effect, *beside], faint=1)
+            if found:
+                return found
+        raise ArithmeticError("nothing of the list shows faintly on this plan")
 
     def outside(self, name: str) -> list[Hidden]:
         """One effect outside the list, of which no effect of the list leaves less than the size asked for."""
@@ -98,17 +117,37 @@ class Hider:
         """One effect that the kinematic parameters swallow so far that nobody can see it."""
         effect: Effect = CONCEALED[name](self._rng, self._scene)
         sigmas = self._limits.sigmas(self._unit(effect), self._columns(effect.carriers))
-        scale = min(float(self._rng.uniform(*FAINT)) * TESTABLE_SIGMA / max(sigmas, 1e-9), effect.most)
+        scale = min(float(self._rng.uniform(*UNSEEN)) * TESTABLE_SIGMA / max(sigmas, 1e-9), effect.most)
         hidden = [self._hidden(effect, scale, self._columns(effect.carriers))]
         return [*hidden, *(self._hidden(c, c.carrier_amplitude, None) for c in effect.carriers)]
 
-    def _together(self, effects: Sequence[Effect]) -> list[Hidden]:
-        columns = [self._columns([effect]) for effect in effects]
+    def perturbed(self, hidden: Hidden, rng: np.random.Generator) -> Hidden:
+        """The same effect off its law; the answer says how far, as a share of it and in standard deviations."""
+        perturbation = drawn_perturbation(rng, hidden.effect.name)
+        if perturbation is None:
+            return hidden
+        carriers = [*self._base, *hidden.effect.carried_by()]
+        exact = self._session.change(hidden.mechanism, carriers)
+        deviation = self._session.change(perturbation.apply(hidden.mechanism), carriers) - exact
+        told = {
+            "size": perturbation.size,
+            "forms": list(perturbation.forms),
+            "signature_share": float(np.sqrt(np.mean(deviation**2) / np.mean(exact**2))),
+            "sigmas_beside_the_law": self._limits.sigmas(deviation, self._columns([hidden.effect])),
+        }
+        return replace(hidden, answer={**hidden.answer, "deviation": told}, perturbation=perturbation)
+
+    def _together(self, effects: Sequence[Effect], faint: int = 0) -> list[Hidden]:
+        """Effects with the sizes asked for, the first `faint` of them small; none if one hides behind the others."""
         found = []
-        for effect, beside in zip(effects, reversed(columns), strict=True):
+        for place, effect in enumerate(effects):
+            beside = self._columns([other for other in effects if other is not effect])
             unit = self._unit(effect)
             alone, left = self._limits.sigmas(unit), self._limits.sigmas(unit, beside)
-            scale = effect.carrier_amplitude or self._size() * TESTABLE_SIGMA / max(left, 1e-9)
+            if place < faint:
+                scale = self._faint_sigmas() / max(left, 1e-9)
+            else:
+                scale = effect.carrier_amplitude or self._size() * TESTABLE_SIGMA / max(left, 1e-9)
             if left < SEPARABLE * alone or scale > effect.most:
                 return []
             found.append(self._hidden(effect, scale, beside))
@@ -120,6 +159,11 @@ class Hider:
 
     def _size(self) -> float:
         return float(np.exp(self._rng.uniform(0.0, np.log(LARGEST))))
+
+    def _faint_sigmas(self) -> float:
+        """Evenly in the square, as log Bayes factors go."""
+        least, most = FAINT_SIGMAS
+        return float(np.sqrt(self._rng.uniform(least**2, most**2)))
 
     def _unit(self, effect: Effect) -> FloatArray:
         """Signature `(m,)` [mm] per unit of the largest amplitude."""

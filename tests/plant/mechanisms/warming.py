@@ -6,7 +6,7 @@ scaled so that full heat for ever means `rise_k`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -76,6 +76,35 @@ class Shop(Warming):
         swing = self.rise_k * np.sin(2.0 * np.pi * times_s / self.period_s)
         since_s = np.maximum(times_s - self.door_s, 0.0)
         return times_s, self.start_k + swing + self.door_k * -np.expm1(-since_s / self.time_constant_s)
+
+
+@dataclass(frozen=True)
+class SeveralBodies(Warming):
+    """A part heated through several bodies at once, each `(share, factor)`: of the rise, and of the time constants.
+
+    Few bodies far apart make a warm-up with a fast and a slow part, many close together a stretched one.
+    """
+
+    bodies: tuple[tuple[float, float], ...] = ((1.0, 1.0),)
+
+    def history(self, scene: Scene, until_s: float) -> tuple[FloatArray, FloatArray]:
+        """Session times and temperatures, `(m,)` each, on a fine grid from the cold start on."""
+        law = {key.name: getattr(self, key.name) for key in fields(Warming)}
+        total_k: FloatArray | float = 0.0
+        for share, factor in self.bodies:
+            second_s = self.second_time_constant_s
+            law["time_constant_s"] = factor * self.time_constant_s
+            law["second_time_constant_s"] = None if second_s is None else factor * second_s
+            times_s, excess_k = Warming(**law).history(scene, until_s)
+            total_k = total_k + share * excess_k
+        return times_s, np.asarray(total_k)
+
+
+def stretched(spread: float) -> tuple[tuple[float, float], ...]:
+    """Five bodies whose time constants scatter log-normally, with `spread` as standard deviation of the logarithm."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(5)
+    shares = weights / weights.sum()
+    return tuple((float(share), float(np.exp(spread * node))) for share, node in zip(shares, nodes, strict=True))
 
 
 def _followed_steps(values: FloatArray, time_constant_s: float) -> FloatArray:

@@ -1,0 +1,26 @@
+"""`--largest-correction-mm`: for every command that writes compensated programs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from dbbstation.nc.limits import LARGEST_ALLOWED_MM, LARGEST_CORRECTION_MM
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+
+def largest_correction_option(function: _Function) -> _Function:
+    """Give a command the option; it takes `largest_mm`, a length [mm]."""
+    return click.option(
+        "--largest-correction-mm",
+        "largest_mm",
+        type=click.FloatRange(0.0, LARGEST_ALLOWED_MM, min_open=True),
+        default=LARGEST_CORRECTION_MM,
+        show_default=True,
+        help="Refuse a model that shifts any point by more [mm].",
+    )(function)

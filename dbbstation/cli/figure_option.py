@@ -1,0 +1,42 @@
+"""`--figure FILE`: a figure in the format that the ending of its name says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from dbbstation.report.figure_format import FigureFormat
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+
+def figure_option(what: str = "Write a figure here") -> Callable[[_Function], _Function]:
+    """Give a command this option; it takes the path as `figure`, None where none is wanted."""
+    return click.option(
+        "--figure",
+        type=click.Path(path_type=Path, dir_okay=False),
+        callback=_known_format,
+        help=f"{what}, as SVG, PNG or PDF by the ending of its name.",
+    )
+
+
+def format_of(path: Path) -> FigureFormat:
+    """Return the format of a path that the option took."""
+    return FigureFormat(path.suffix.lower())
+
+
+def _known_format(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:
+    """Refuse other endings before any work is done.
+
+    Raises:
+        click.BadParameter: the name ends otherwise.
+    """
+    if path is not None and path.suffix.lower() not in set(FigureFormat):
+        ending = f"`{path.suffix}` is no format of figures" if path.suffix else f"`{path.name}` has no ending"
+        raise click.BadParameter(f"{ending}; let the name end in {', '.join(FigureFormat)}")
+    return path

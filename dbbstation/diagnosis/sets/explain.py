@@ -1,0 +1,346 @@
+"""Naming: which sets of causes explain the recordings, with base and causes fitted anew about the most probable one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import chdtri
+
+from dbbstation.calibration.fit import Calibration, calibrate, default_sources
+from dbbstation.calibration.missing_physics import misfit_of
+from dbbstation.calibration.outliers import MOST, calibrate_robust
+from dbbstation.calibration.scatter import seats_of
+from dbbstation.calibration.strange_runs import in_place_after_all
+from dbbstation.calibration.stray_balls import set_free
+from dbbstation.diagnosis.naming import GRID
+from dbbstation.diagnosis.sets.channel import Channel
+from dbbstation.diagnosis.sets.unmodelled import Unmodelled
+from dbbstation.errors import CalibrationError, KinematicsError
+from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.outlier import Fit, Outlier
+    from dbbstation.inference.harmonics import Misfit, Spectrum
+    from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
+    from dbbstation.inference.projection import BesideBase
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource
+
+MOST_ROUNDS = 10
+"""Times that hypotheses and joint fit may settle against each other."""
+
+SURE = 0.95
+"""Probability from which on something is said to be there."""
+
+SEEDS = 3
+"""Most probable hypotheses that are looked at again after each change."""
+
+RIVALS = 3
+"""Causes in the place of each member that are laid out at their own best values before they are compared."""
+
+STEPS = 2
+"""Times that the nonlinear parameters of a rival are improved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """What the comparison came to.
+
+    Attributes:
+        after: joint fit of base and named causes of the most probable hypothesis.
+        posterior: over sets of causes, about that fit.
+        best: its most probable hypothesis, or one as probable, whose named causes were fitted.
+        comparison: that it came from.
+        causes: that were compared.
+        unmodelled: effects without a name among them.
+        noise: measured on what all causes together leave.
+        left: misfit of the joint fit.
+    """
+
+    after: Calibration
+    posterior: Posterior
+    best: Hypothesis
+    comparison: ModelComparison
+    causes: tuple[Cause, ...]
+    unmodelled: Unmodelled
+    noise: Spectrum
+    left: Misfit
+
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """Named causes of the most probable hypothesis."""
+        return tuple(m for m in self.best.members if m.cause.named)
+
+    @property
+    def noise_mm(self) -> float:
+        """Standard deviation of white noise that smooth things would feel as they feel this one, per sample [mm]."""
+        return float(np.sqrt(self.noise.power[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """Everything that the comparison needs and found.
+
+    Attributes:
+        before: fit of the base model.
+        outliers: balls and runs that are off, kept from pulling it.
+        channel: about that fit.
+        first: what it leaves.
+        settled: what the comparison came to.
+    """
+
+    before: Calibration
+    outliers: tuple[Outlier, ...]
+    channel: Channel
+    first: Misfit
+    settled: Settled
+
+
+def explain(
+    machine: Machine,
+    runs: Sequence[Observation],
+    sources: Sequence[ErrorSource],
+    progress: Callable[[str], None],
+) -> Explained:
+    """Compare sets of causes; balls and bars that are certainly off are set free, and the rest is compared again.
+
+    Runs that are no circle of this machine are left out before, and taken back where what was found explains them.
+    """
+    progress("kinematic calibration")
+    fit = partial(calibrate, machine)
+    before, outliers = calibrate_robust(fit, runs, balls=False)
+    explained = _with_set_up(fit, before, outliers, sources, progress)
+    if explained.settled.members and outliers:
+        belonging, staying = in_place_after_all(explained.settled.after, runs, outliers)
+        if len(staying) < len(outliers):
+            return _with_set_up(fit, fit(belonging), staying, sources, progress)
+    return explained
+
+
+def _with_set_up(
+    fit: Fit,
+    before: Calibration,
+    outliers: tuple[Outlier, ...],
+    sources: Sequence[ErrorSource],
+    progress: Callable[[str], None],
+) -> Explained:
+    """Compare; set free what balls and bars are certainly off, one after the other, and compare again."""
+    while True:
+        progress("candidates")
+        channel = Channel(before, sources)
+        settled = _settle(channel, progress)
+        explained = Explained(before, outliers, channel, misfit_of(before, settled.noise), settled)
+        off = [m for m in settled.best.members if m.cause.setup]
+        off = [m for m in off if settled.posterior.probability([m.cause.name]) >= SURE]
+        if not off or len(outliers) >= MOST:
+            return explained
+        worst = max(off, key=lambda m: settled.best.log_factor(m.cause.name))
+        step = set_free(fit, before, worst.cause.name, worst.variant.label)
+        if step is None:
+            return explained
+        outliers, before = (*outliers, step[0]), step[2]
+
+
+def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
+    """Compare; lay out likely causes at their best values and compare again; fit jointly; until nothing changes.
+
+    The most probable hypothesis and its rivals are laid out with tangents and slack before anything is added to them: what
+    a grid or a formula leaves of a large effect would call for causes that are not there.
+    """
+    unmodelled = Unmodelled(channel)
+    fit, noise_mm, scatter = channel.calibration, misfit_of(channel.calibration).noise, 1.0
+    unmodelled.look(fit, (), noise_mm)
+    fitted: frozenset[tuple[str, str]] = frozenset()
+    laid_out: set[tuple[str, str]] = set()
+    tried: set[frozenset[tuple[str, str]]] = set()
+    seeds: dict[frozenset[str], tuple[Member, ...]] = {}
+    impossible: set[str] = set()
+    looked = False
+    for _ in range(MOST_ROUNDS):
+        target = channel.target(fit)
+        noise = channel.noise(target, unmodelled.causes, noise_mm)
+        noise_mm = float(np.sqrt(noise.power[0]))
+        beside = channel.beside_base(noise_mm, scatter)
+        comparison = beside.comparison(target)
+        causes = (*(c for c in channel.named if c.name not in impossible), *channel.set_up, *unmodelled.causes)
+        posterior = search(comparison, causes, seeds.values())
+        best = _steady(posterior, fitted)
+        seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
+        settled = Settled(fit, posterior, best, comparison, causes, unmodelled, noise, misfit_of(fit, noise))
+        usual = _usual_scatter(fit) if any(m.cause.setup for m in best.members) else scatter
+        rough = [
+            (m, r)
+            for m, r in [*((m, m) for m in best.members if m.cause.named), *_rivals(comparison, causes, best)]
+            if (r.cause.name, r.variant.law) not in laid_out
+        ]
+        for member, rival in rough:
+            laid_out.add((rival.cause.name, rival.variant.law))
+            _lay_out(channel, beside, best, member, rival, fit, target)
+        named = frozenset((m.cause.name, m.variant.law) for m in best.members if m.cause.named)
+        if rough or usual > scatter:
+            scatter = max(usual, scatter)
+            continue
+        if named == fitted or named in tried:
+            break
+        tried.add(named)
+        progress("joint fit with " + (", ".join(sorted(name for name, _ in named)) or "nothing more"))
+        joint = _joint(channel, comparison, best)
+        if joint is None:
+            # An amplitude of next to nothing leaves a nonlinear parameter beside it without a hold, or a step leaves what
+            # the machine can reach: that cause cannot be modelled here.
+            weakest = min((m for m in best.members if m.cause.named), key=lambda m: best.log_factor(m.cause.name))
+            impossible.add(weakest.cause.name)
+            continue
+        fit, fitted = joint, named
+        for name, law in sorted(named):
+            channel.refine(name, law, _values_in(fit, name), fit)
+        if not looked:
+            unmodelled.look(fit, [m for m in best.members if m.cause.named], noise_mm)
+            looked = True
+    return _fitted_as_named(channel, settled)
+
+
+def _fitted_as_named(channel: Channel, settled: Settled) -> Settled:
+    """Return it with a joint fit of just the causes that its hypothesis names, where the rounds ended on another one.
+
+    Two hypotheses may take turns: each is the more probable one about the fit of the other.
+    """
+    base = {term.source.name for term in channel.calibration.layout.terms}
+    fitted = {term.source.name for term in settled.after.layout.terms} - base
+    if fitted == {m.cause.name for m in settled.members}:
+        return settled
+    joint = _joint(channel, settled.comparison, settled.best)
+    if joint is not None:
+        return replace(settled, after=joint, left=misfit_of(joint, settled.noise))
+    named = [h for h in settled.posterior.hypotheses if {m.cause.name for m in h.members if m.cause.named} == fitted]
+    return (
+        replace(settled, best=named[0])
+        if named
+        else replace(
+            settled,
+            after=channel.calibration,
+            best=Hypothesis((), 0.0),
+            left=misfit_of(channel.calibration, settled.noise),
+        )
+    )
+
+
+def _steady(posterior: Posterior, fitted: frozenset[tuple[str, str]]) -> Hypothesis:
+    """The most probable hypothesis, or one as probable whose named causes are fitted already."""
+    top = posterior.best.log_posterior
+    for hypothesis in posterior.hypotheses:
+        if hypothesis.log_posterior < top - AS_PROBABLE:
+            break
+        if frozenset((m.cause.name, m.variant.law) for m in hypothesis.members if m.cause.named) == fitted:
+            return hypothesis
+    return posterior.best
+
+
+AS_PROBABLE = 1.0
+"""Log odds within which one hypothesis is as probable as another: the exact fits of both would say the same of it."""
+
+
+def _joint(channel: Channel, comparison: ModelComparison, best: Hypothesis) -> Calibration | None:
+    """Fit base and named causes together, exactly, from the amplitudes of the comparison; None where that fails."""
+    members = [member for member in best.members if member.cause.named]
+    if not members:
+        return channel.calibration
+    start = {
+        m.cause.name: values
+        for m, values in zip(best.members, _estimated(channel, comparison, best), strict=True)
+        if values is not None
+    }
+    every = [*default_sources(), *(channel.source_of(m.cause.name, m.variant) for m in members)]
+    for within in (None, GRID):
+        # A shape that these runs hardly see, such as a decay shorter than their samples, runs away with its amplitude.
+        try:
+            return calibrate(channel.machine, channel.observations, every, start, shapes_within=within)
+        except (CalibrationError, KinematicsError):
+            continue
+    return None
+
+
+def _estimated(
+    channel: Channel, comparison: ModelComparison, hypothesis: Hypothesis
+) -> list[NDArray[np.float64] | None]:
+    """Values of all parameters of each named member, of the first set where there are several."""
+    values = comparison.estimates(hypothesis.members).values
+    found: list[NDArray[np.float64] | None] = []
+    for member in hypothesis.members:
+        own, values = values[: len(member.columns)], values[len(member.columns) :]
+        if not member.cause.named:
+            found.append(None)
+            continue
+        source = channel.source_of(member.cause.name, member.variant)
+        parameters = source.parameters(channel.machine)
+        shaped = np.array([bool(p.shape) for p in parameters])
+        whole = channel.to_whole(member.variant) @ own[: len(member.variant.columns)]
+        full = np.empty(len(parameters))
+        full[~shaped] = whole[: int((~shaped).sum())]
+        tangents = own[len(member.variant.columns) :][: int(shaped.sum())] if len(member.variant.slack) else 0.0
+        full[shaped] = np.array(member.variant.nonlinear) + tangents
+        for k in np.flatnonzero(shaped):
+            full[k] = np.clip(full[k], min(parameters[k].shape), max(parameters[k].shape))
+        found.append(full)
+    return found
+
+
+def _values_in(fit: Calibration, name: str) -> dict[str, NDArray[np.float64]]:
+    """Values of all parameters of a cause in a fit, by set."""
+    return {term.shared: fit.x[term.columns] for term in fit.layout.terms if term.source.name == name}
+
+
+def _rivals(comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[tuple[Member, Member]]:
+    """Named causes that do best in the place of each named member, with that member."""
+    found = []
+    for member in best.members:
+        if not member.cause.named:
+            continue
+        others = best.without(member.cause.name)
+        scan = comparison.scan(others, [c for c in causes if c.named and c.name not in best.names])
+        order = np.argsort(-scan.log_factor)[:RIVALS]
+        enough = 0.5 * best.log_factor(member.cause.name)
+        found += [(member, scan.best[k]) for k in order if scan.log_factor[k] > enough]
+    return found
+
+
+def _lay_out(
+    channel: Channel,
+    beside: BesideBase,
+    best: Hypothesis,
+    member: Member,
+    rival: Member,
+    fit: Calibration,
+    target: NDArray[np.float64],
+) -> None:
+    """Lay out a rival at the values that are best in the place of a member, with its slack."""
+    others = best.without(member.cause.name)
+    name, law = rival.cause.name, rival.variant.law
+    sets = list(dict.fromkeys(channel.sources[name, law].shared_by(motion) for motion in channel.motions))
+    for _ in range(STEPS if rival.variant.nonlinear else 1):
+        hypothesis = Hypothesis((*others, rival), 0.0)
+        values = _estimated(channel, beside.comparison(target), hypothesis)[-1]
+        if values is None or not values.any():
+            return
+        channel.refine(name, law, dict.fromkeys(sets, values), fit)
+        if not rival.variant.nonlinear:
+            return
+        refined = next(c for c in channel.named if c.name == name)
+        same = next(v for v in refined.variants if v.label == rival.variant.label and v.law == law)
+        rival = replace(rival, cause=refined, variant=same)
+
+
+def _usual_scatter(fit: Calibration) -> float:
+    """How many times as much as stated balls scatter: by chance half of them lie beyond their median, at least 1."""
+    seats = [seat for seat in seats_of(fit) if seat.freedom > 0]
+    if not seats:
+        return 1.0
+    return float(np.sqrt(max(1.0, np.median([seat.square / float(chdtri(seat.freedom, 0.5)) for seat in seats]))))

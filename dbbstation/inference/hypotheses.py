@@ -1,0 +1,265 @@
+"""Search over sets of causes, and the posterior probabilities that come of it.
+
+A hypothesis is a set of causes. Its log posterior is its marginal likelihood, averaged over variants and sizes of each
+cause beside the others, and the prior odds of all its causes. The search grows, shrinks and exchanges members of the
+best hypotheses until the neighbours of every likely one have been looked at.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import logsumexp
+
+from dbbstation.inference.model_comparison import FLEXIBLE, Member, with_slack_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from dbbstation.inference.model_comparison import Cause, ModelComparison, Scan, Variant
+
+PAIRS = 3
+"""Best pairs of named causes that are looked at together."""
+
+LIKELY = 8.0
+"""Log odds against the best hypothesis within which the neighbours of another one are looked at: what is less likely has a
+probability of 3e-4."""
+
+MOST_EXPANDED = 40
+"""Hypotheses whose neighbours are looked at, at the most."""
+
+SWEEPS = 2
+"""Times that every member is given the variant and size that suit it best beside the others."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A set of causes.
+
+    Attributes:
+        members: with the variants and sizes that suit them best.
+        log_posterior: log of its probability over that of the base alone.
+        log_factors: log Bayes factor of each member beside the others, averaged over its variants and sizes.
+    """
+
+    members: tuple[Member, ...]
+    log_posterior: float
+    log_factors: tuple[float, ...] = ()
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Of its causes."""
+        return frozenset(member.cause.name for member in self.members)
+
+    @property
+    def lean(self) -> bool:
+        """Whether every member is worth its prior odds: without one that is not, a hypothesis is more probable."""
+        return all(f + m.cause.log_prior_odds > 0.0 for m, f in zip(self.members, self.log_factors, strict=True))
+
+    def without(self, *names: str) -> tuple[Member, ...]:
+        """Members but for those named."""
+        return tuple(member for member in self.members if member.cause.name not in names)
+
+    def log_factor(self, name: str) -> float:
+        """Log Bayes factor of one of its causes beside the others."""
+        return next(f for m, f in zip(self.members, self.log_factors, strict=True) if m.cause.name == name)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Probabilities over sets of causes.
+
+    Attributes:
+        hypotheses: that were looked at, most probable first.
+        weights: log posterior of every set of names that was scored.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    weights: dict[frozenset[str], float]
+
+    @property
+    def best(self) -> Hypothesis:
+        """The most probable."""
+        return self.hypotheses[0]
+
+    def probability(self, names: Iterable[str]) -> float:
+        """Probability that at least one of these causes is there."""
+        wanted = frozenset(names)
+        inside = [weight for key, weight in self.weights.items() if key & wanted]
+        return float(np.exp(logsumexp(inside) - self._total)) if inside else 0.0
+
+    def probability_of(self, holds: Callable[[frozenset[str]], bool]) -> float:
+        """Probability of all sets of causes for which something holds."""
+        inside = [weight for key, weight in self.weights.items() if holds(key)]
+        return float(np.exp(logsumexp(inside) - self._total)) if inside else 0.0
+
+    @property
+    def _total(self) -> float:
+        return float(logsumexp(list(self.weights.values())))
+
+
+def search(comparison: ModelComparison, causes: Sequence[Cause], seeds: Iterable[Sequence[Member]] = ()) -> Posterior:
+    """Posterior over sets of causes.
+
+    Args:
+        comparison: of their columns.
+        causes: to choose from.
+        seeds: members of hypotheses to look at beside those that the search finds itself, such as those of an earlier one
+            about another linearisation.
+    """
+    return _Search(comparison, causes).run(seeds)
+
+
+class _Search:
+    def __init__(self, comparison: ModelComparison, causes: Sequence[Cause]) -> None:
+        self._comparison = comparison
+        self._causes = {cause.name: cause for cause in causes}
+        self._seen: dict[frozenset[str], Hypothesis] = {}
+        self._scored: dict[frozenset[str], float] = {}
+
+    def run(self, seeds: Iterable[Sequence[Member]]) -> Posterior:
+        """Look at neighbours of the most probable hypothesis not yet looked at, until none is likely."""
+        self._look_at(())
+        for members in seeds:
+            self._look_at([self._anew(member) for member in members if member.cause.name in self._causes])
+        self._pairs(())
+        expanded: set[frozenset[str]] = set()
+        challenged: set[frozenset[str]] = set()
+        while len(expanded) < MOST_EXPANDED:
+            waiting = [
+                h
+                for key, h in self._seen.items()
+                if key not in expanded and h.log_posterior > self._top - LIKELY and h.lean
+            ]
+            if waiting:
+                best = max(waiting, key=lambda h: h.log_posterior)
+                expanded.add(best.names)
+                self._expand(best)
+                continue
+            best = max(self._seen.values(), key=lambda h: h.log_posterior)
+            if best.names in challenged:
+                break
+            challenged.add(best.names)
+            self._challenge(best)
+        weights = {**self._scored, **{key: h.log_posterior for key, h in self._seen.items()}}
+        return Posterior(tuple(sorted(self._seen.values(), key=lambda h: -h.log_posterior)), weights)
+
+    @property
+    def _top(self) -> float:
+        """Log posterior of the most probable hypothesis so far."""
+        return max(h.log_posterior for h in self._seen.values())
+
+    def _expand(self, hypothesis: Hypothesis) -> None:
+        """Look at neighbours: one more, one less, one in the place of another."""
+        self._try_more(hypothesis.members, hypothesis.log_posterior)
+        for member, factor in zip(hypothesis.members, hypothesis.log_factors, strict=True):
+            others = hypothesis.without(member.cause.name)
+            without = hypothesis.log_posterior - factor - member.cause.log_prior_odds
+            self._score(others, without)
+            self._try_more(others, without)
+
+    def _challenge(self, hypothesis: Hypothesis) -> None:
+        """Try one cause in the place of two, and two in the place of one that is flexible or has no name."""
+        for pair in combinations(sorted(hypothesis.names), 2):
+            others = hypothesis.without(*pair)
+            scan = self._scan(others)
+            worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
+            self._look_at([*others, scan.best[int(worth.argmax())]])
+        for member in hypothesis.members:
+            if not member.cause.named or len(member.variant.columns) >= FLEXIBLE:
+                self._pairs(hypothesis.without(member.cause.name))
+
+    def _try_more(self, members: Sequence[Member], log_posterior: float) -> None:
+        """Score every further cause beside members; look at those that make a likely hypothesis more probable."""
+        scan = self._scan(members)
+        for cause, factor, best in zip(scan.causes, scan.log_factor, scan.best, strict=True):
+            worth = float(factor) + cause.log_prior_odds
+            self._score([*members, best], log_posterior + worth, worth=worth)
+
+    def _score(self, members: Sequence[Member], log_posterior: float, worth: float = 1.0) -> None:
+        """Keep a first score, and look at the hypothesis where it is likely and its last member is worth its odds."""
+        key = frozenset(member.cause.name for member in members)
+        self._scored.setdefault(key, log_posterior)
+        if worth > 0.0 and log_posterior > self._top - LIKELY:
+            self._look_at(members)
+
+    def _pairs(self, members: Sequence[Member]) -> None:
+        """Look at the best pairs of named causes beside members: each may show only beside the other."""
+        scan = self._scan(members)
+        hidden = {
+            c.name for c, factor in zip(scan.causes, scan.log_factor, strict=True) if factor + c.log_prior_odds <= 0.0
+        }
+        # What does not show alone seems small alone: beside what hides it, it may be as large as is plausible.
+        named = [
+            replace(member, scale=1.0) if member.cause.name in hidden else member
+            for member in (*scan.best, *scan.narrow)
+            if member is not None and member.cause.named
+        ]
+        evidences = self._comparison.log_evidence_of_pairs(members, named)
+        both = [
+            (evidence + named[a].cause.log_prior_odds + named[b].cause.log_prior_odds, a, b)
+            for (a, b), evidence in evidences.items()
+            if named[a].cause is not named[b].cause
+        ]
+        # A flexible form imitates two causes; what two that are not flexible do together is looked at by itself.
+        slim = [pair for pair in both if max(len(named[k].variant.columns) for k in pair[1:]) < FLEXIBLE]
+        for pairs in (both, slim):
+            for _, a, b in sorted(pairs, reverse=True)[:PAIRS]:
+                self._look_at([*members, named[a], named[b]])
+
+    def _scan(self, members: Sequence[Member]) -> Scan:
+        names = {member.cause.name for member in members}
+        return self._comparison.scan(members, [c for name, c in self._causes.items() if name not in names])
+
+    def _anew(self, member: Member) -> Member:
+        """The same form of a cause as it is laid out now."""
+        cause, old = self._causes[member.cause.name], member.variant
+        same = [v for v in cause.variants if (v.label, v.law) == (old.label, old.law)] or list(cause.variants)
+
+        def away(variant: Variant) -> float:
+            return float(np.abs(np.subtract(variant.nonlinear, old.nonlinear)).sum())
+
+        return Member(cause, min(same, key=away), member.scale)
+
+    def _look_at(self, members: Sequence[Member]) -> None:
+        """Give every member what suits it best and keep the hypothesis; look at it without a member that is not worth it."""
+        key = frozenset(member.cause.name for member in members)
+        if key in self._seen:
+            return
+        found = self._settled(list(members))
+        self._seen[key] = found
+        if not found.lean:
+            worth = [f + m.cause.log_prior_odds for m, f in zip(found.members, found.log_factors, strict=True)]
+            self._look_at(found.without(found.members[int(np.argmin(worth))].cause.name))
+
+    def _settled(self, members: list[Member]) -> Hypothesis:
+        for _ in range(SWEEPS if len(members) > 1 else 1):
+            for k, member in enumerate(members):
+                others = [*members[:k], *members[k + 1 :]]
+                members[k] = self._comparison.scan(others, [member.cause]).best[0]
+            members = self._with_slack(members)
+        evidence = self._comparison.log_evidence(members)
+        factors, more = [], 0.0
+        for k, member in enumerate(members):
+            others = [*members[:k], *members[k + 1 :]]
+            scan = self._comparison.scan(others, [member.cause])
+            averaged = float(scan.log_factor[0] - scan.log_best[0])
+            factors.append(evidence - self._comparison.log_evidence(others) + averaged)
+            more += averaged
+        odds = sum(member.cause.log_prior_odds for member in members)
+        return Hypothesis(tuple(members), evidence + more + odds, tuple(factors))
+
+    def _with_slack(self, members: list[Member]) -> list[Member]:
+        """Members whose slack belongs to the amplitudes that they have together."""
+        if not any(len(member.variant.slack) for member in members):
+            return members
+        values = self._comparison.estimates(members).values
+        found = []
+        for member in members:
+            own = len(member.variant.columns)
+            found.append(with_slack_of(member, values[:own]))
+            values = values[len(member.columns) :]
+        return found

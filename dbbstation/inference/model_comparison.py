@@ -1,0 +1,288 @@
+"""Causes that a base model may lack, compared by their marginal likelihood.
+
+The model is target = base + sum of causes + noise, linear in all amplitudes. The base is fitted anew beside every
+combination: its columns are projected out of all others once. Amplitudes have Gaussian priors, so that their marginal
+likelihood is known in closed form [MacKay, Bayesian interpolation, Neural Computation 4 (1992), eqs 2.5 and 4.1]. The
+size of an effect is known only to its order of magnitude: the standard deviation of the prior is itself unknown and is
+averaged over, and so are the variants of a cause.
+
+A machine follows the formula of a cause only roughly. What the formula may be off by are further columns of a variant,
+its slack; without its amplitudes it has none [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, on model
+discrepancy].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import cho_solve, solve_triangular
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
+"""Standard deviations of amplitudes that are averaged over, in units of the plausible size."""
+
+LOG_SCALE_WEIGHTS = np.log([0.19, 0.19, 0.19, 0.19, 0.19, 0.05])
+"""Their prior probabilities: log-uniform over two decades up to the plausible size, one in twenty beyond it."""
+
+NO_SLACK = np.zeros(0)
+FLEXIBLE = 12
+"""Amplitudes from which on a form can imitate two causes at once: two for each strut."""
+
+MOST_SLACK = 1.5
+"""Times the amplitudes that the slack of a variant was made for up to which it grows with them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """One form of a cause: columns of the comparison and what is known of their amplitudes.
+
+    Attributes:
+        columns: of the amplitudes, shape (p,).
+        plausible: their plausible sizes, shape (p,).
+        nonlinear: values of the nonlinear parameters that the columns were made with.
+        label: which of several things of a kind it is, or of which strut; empty where there is one only.
+        law: which law it follows, where a cause has several.
+        whole: columns of the form that has all amplitudes at the same point, shape (q,); empty where it is this one.
+        log_weight: log probability of this variant among those of its cause.
+        slack: columns of what the formula may be off by, shape (d,).
+        slack_sd: standard deviations of their coefficients at the amplitudes `slack_at`, shape (d,).
+        slack_at: root mean square of the amplitudes, in plausible ones, that the slack was made for.
+    """
+
+    columns: NDArray[np.int64]
+    plausible: NDArray[np.float64]
+    nonlinear: tuple[float, ...] = ()
+    label: str = ""
+    law: str = ""
+    whole: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    log_weight: float = 0.0
+    slack: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    slack_sd: NDArray[np.float64] = field(default_factory=lambda: NO_SLACK)
+    slack_at: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """Something that the base model may lack.
+
+    Attributes:
+        name: unique.
+        variants: its forms; their weights add up to one.
+        log_prior_odds: log odds of its being there before anything was measured.
+        named: it is a physical cause with a name; else an unmodelled effect, or a fault of the set-up.
+        setup: it is a fault of the set-up.
+    """
+
+    name: str
+    variants: tuple[Variant, ...]
+    log_prior_odds: float
+    named: bool = True
+    setup: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """A cause in a hypothesis, with the variant and the size that suit it best there.
+
+    Attributes:
+        cause: which.
+        variant: which of its forms.
+        scale: standard deviation of its amplitudes, in plausible ones.
+        slack_scale: standard deviation of its slack, in units of that of its variant.
+    """
+
+    cause: Cause
+    variant: Variant
+    scale: float
+    slack_scale: float = 1.0
+
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """Columns of amplitudes, then of slack."""
+        return np.concatenate([self.variant.columns, self.variant.slack])
+
+    @property
+    def sd(self) -> NDArray[np.float64]:
+        """Prior standard deviations of these."""
+        return np.concatenate([self.variant.plausible * self.scale, self.variant.slack_sd * self.slack_scale])
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Causes beside a hypothesis.
+
+    Attributes:
+        log_factor: log Bayes factor of each cause that was asked for, averaged over variants and sizes, shape (c,).
+        best: the variant and scale that suit it best.
+        log_best: log Bayes factor of that, without the weight of variant and scale, shape (c,).
+        narrow: the best of the variants that have fewer than `FLEXIBLE` amplitudes; None where that is `best`, or where
+            there is none.
+    """
+
+    causes: tuple[Cause, ...]
+    log_factor: NDArray[np.float64]
+    best: tuple[Member, ...]
+    log_best: NDArray[np.float64]
+    narrow: tuple[Member | None, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """Amplitudes of a hypothesis: posterior means and covariance, in the order of the members' columns."""
+
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+
+class ModelComparison:
+    """Marginal likelihoods over sets of causes.
+
+    Args:
+        gram: products of all columns, the base projected out, in units of the noise, shape (n, n).
+        towards: products of the columns with the target, shape (n,).
+    """
+
+    def __init__(self, gram: NDArray[np.float64], towards: NDArray[np.float64]) -> None:
+        self._gram, self._towards = gram, towards
+
+    def log_evidence(self, members: Sequence[Member]) -> float:
+        """Log marginal likelihood of base and members over that of the base alone."""
+        return self._eliminated(members)[2]
+
+    def explained(self, members: Sequence[Member]) -> float:
+        """Reduction of chi-square by members, less what their sizes cost."""
+        _, z, _ = self._eliminated(members)
+        return float(z @ z)
+
+    def estimates(self, members: Sequence[Member]) -> Estimates:
+        """Posterior means and covariance of the amplitudes and the slack of members."""
+        columns, sd = _stacked(members)
+        information = sd[:, None] * self._gram[np.ix_(columns, columns)] * sd + np.eye(len(sd))
+        factor = np.linalg.cholesky(information)
+        values = cho_solve((factor, True), sd * self._towards[columns])
+        inverse = cho_solve((factor, True), np.eye(len(sd)))
+        return Estimates(sd * values, sd[:, None] * inverse * sd)
+
+    def beside(self, members: Sequence[Member], columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Products of columns among each other, base and members projected out under their priors, shape (p, p)."""
+        own = self._gram[np.ix_(columns, columns)]
+        if not members:
+            return own
+        lower, _, _ = self._eliminated(members)
+        taken, sd = _stacked(members)
+        across = solve_triangular(lower, sd[:, None] * self._gram[np.ix_(taken, columns)], lower=True)
+        return np.asarray(own - across.T @ across, dtype=np.float64)
+
+    def log_evidence_of_pairs(self, members: Sequence[Member], more: Sequence[Member]) -> dict[tuple[int, int], float]:
+        """Log marginal likelihood of members with every pair of further ones, without the slack of these."""
+        lower, z, evidence = self._eliminated(members)
+        columns = np.concatenate([np.zeros(0, dtype=np.int64), *(m.variant.columns for m in more)])
+        sd = np.concatenate([np.zeros(0), *(m.variant.plausible * m.scale for m in more)])
+        towards = self._towards[columns]
+        gram = self._gram[np.ix_(columns, columns)]
+        if members:
+            taken, taken_sd = _stacked(members)
+            across = solve_triangular(lower, taken_sd[:, None] * self._gram[np.ix_(taken, columns)], lower=True)
+            gram, towards = gram - across.T @ across, towards - across.T @ z
+        information, along = sd[:, None] * gram * sd + np.eye(len(sd)), sd * towards
+        ends = np.cumsum([0, *(len(m.variant.columns) for m in more)])
+        found = {}
+        for a, b in combinations(range(len(more)), 2):
+            own = np.r_[ends[a] : ends[a + 1], ends[b] : ends[b + 1]]
+            half = np.linalg.cholesky(information[np.ix_(own, own)])
+            w = solve_triangular(half, along[own], lower=True, check_finite=False)
+            found[a, b] = evidence + 0.5 * float(w @ w) - float(np.log(np.diag(half)).sum())
+        return found
+
+    def scan(self, members: Sequence[Member], causes: Iterable[Cause]) -> Scan:
+        """Every cause beside members, each in all its variants and sizes.
+
+        Args:
+            members: of a hypothesis.
+            causes: none of theirs.
+        """
+        causes = tuple(causes)
+        variants = [(k, variant) for k, cause in enumerate(causes) for variant in cause.variants]
+        needed = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(v.columns for _, v in variants)]))
+        place = np.zeros(len(self._towards), dtype=np.int64)
+        place[needed] = np.arange(len(needed))
+        towards = self._towards[needed]
+        across = np.zeros((0, len(needed)))
+        if members:
+            lower, z, _ = self._eliminated(members)
+            taken, sd = _stacked(members)
+            across = solve_triangular(lower, sd[:, None] * self._gram[np.ix_(taken, needed)], lower=True)
+            towards = towards - across.T @ z
+        by_size: dict[int, list[int]] = {}
+        for number, (_, variant) in enumerate(variants):
+            by_size.setdefault(len(variant.columns), []).append(number)
+        factors = np.empty((len(variants), len(SCALES)))
+        for numbers in by_size.values():
+            columns = np.array([variants[number][1].columns for number in numbers])
+            own, plausible = place[columns], np.array([variants[number][1].plausible for number in numbers])
+            blocks = self._gram[columns[:, :, None], columns[:, None, :]]
+            if members:
+                beside = across.T[own]
+                blocks = blocks - beside @ beside.transpose(0, 2, 1)
+            blocks = plausible[:, :, None] * blocks * plausible[:, None, :]
+            seen, axes = np.linalg.eigh(blocks)
+            along = np.square(np.einsum("mpq,mp->mq", axes, plausible * towards[own]))
+            factors[numbers] = _log_factors(np.maximum(seen, 0.0), along)
+        weights = np.array([variant.log_weight for _, variant in variants])
+        weighted = factors + weights[:, None] + LOG_SCALE_WEIGHTS
+        owner = np.array([k for k, _ in variants], dtype=np.int64)
+        log_factor, log_best = np.empty(len(causes)), np.empty(len(causes))
+        best: list[Member] = []
+        narrow: list[Member | None] = []
+        ends = np.searchsorted(owner, np.arange(len(causes) + 1))
+        for k, cause in enumerate(causes):
+            own = weighted[ends[k] : ends[k + 1]]
+            form, scale = divmod(int(own.argmax()), len(SCALES))
+            top = own[form, scale]
+            log_factor[k] = top + np.log(np.exp(own - top).sum())
+            best.append(Member(cause, cause.variants[form], float(SCALES[scale])))
+            log_best[k] = factors[ends[k] + form, scale]
+            narrow.append(None)
+            slim = [i for i, v in enumerate(cause.variants) if len(v.columns) < FLEXIBLE]
+            if slim and form not in slim:
+                slot, size = divmod(int(own[slim].argmax()), len(SCALES))
+                narrow[-1] = Member(cause, cause.variants[slim[slot]], float(SCALES[size]))
+        return Scan(causes, log_factor, tuple(best), log_best, tuple(narrow))
+
+    def _eliminated(self, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Cholesky factor of the members' information, what it makes of the target, and their log evidence."""
+        if not members:
+            return np.zeros((0, 0)), np.zeros(0), 0.0
+        columns, sd = _stacked(members)
+        information = sd[:, None] * self._gram[np.ix_(columns, columns)] * sd + np.eye(len(sd))
+        lower = np.asarray(np.linalg.cholesky(information), dtype=np.float64)
+        z = solve_triangular(lower, sd * self._towards[columns], lower=True)
+        return lower, z, 0.5 * float(z @ z) - float(np.log(np.diag(lower)).sum())
+
+
+def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:
+    """Return the member with the slack that amplitudes of these values have, shape (p,)."""
+    if len(member.variant.slack) == 0:
+        return member
+    size = float(np.sqrt(np.mean(np.square(values / member.variant.plausible))))
+    return replace(member, slack_scale=min(size / member.variant.slack_at, MOST_SLACK))
+
+
+def _log_factors(seen: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Log Bayes factors at all scales, shape (m, s), from information and squared target along axes, shape (m, p)."""
+    squares = SCALES[:, None] ** 2
+    information = 1.0 + squares * seen[:, None, :]
+    return np.asarray(
+        0.5 * np.sum(squares * along[:, None, :] / information - np.log(information), axis=2), dtype=np.float64
+    )
+
+
+def _stacked(members: Sequence[Member]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    return np.concatenate([m.columns for m in members]), np.concatenate([m.sd for m in members])

@@ -1,0 +1,122 @@
+"""Where two machine files differ, in the words of the file; whether a model is of the machine that was measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, is_dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import STRUTS, Hexapod
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from dbbstation.machine.geometry import Machine
+
+DESCRIPTION = frozenset({"name"})
+"""Keys that say nothing of the machine itself."""
+
+NOT_PREDICTED = frozenset({"travel", "joint_tolerance_mm"})
+"""Keys that no prediction of a calibrated model uses: what the machine may reach, and what a fit took for likely."""
+
+CONTROL = frozenset({"base_joints_mm", "platform_joints_mm", "rotation", "reference_length_error_mm"})
+"""Keys that every prediction uses: what the control drives the struts by."""
+
+NOT_GIVEN = "not given"
+
+ROUNDED_MM = 1e-6
+"""Joints and lengths that differ by no more are the same, written with fewer decimals: a nanometre, which no test sees [mm]."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One value that two machine files do not share.
+
+    Attributes:
+        key: as the machine file has it, such as `masses.platform_kg`; with the strut where it has a value for each.
+        one: value in the first file, as text with every digit; `not given` where it has none.
+        other: value in the second.
+    """
+
+    key: str
+    one: str
+    other: str
+
+    @property
+    def text(self) -> str:
+        """Key and both values."""
+        return f"{self.key} {self.one} and {self.other}"
+
+    @property
+    def first_key(self) -> str:
+        """Key at the top of the machine file."""
+        return self.key.partition(".")[0].partition(" ")[0]
+
+
+def differences(one: Machine, other: Machine) -> tuple[Difference, ...]:
+    """Return every value that differs between two machines, joints and lengths beyond a nanometre, their names aside."""
+    return tuple(found for found in _between("", one, other) if found.key not in DESCRIPTION)
+
+
+def in_words(found: Sequence[Difference], most: int = 4) -> str:
+    """Name differences with both values; of many the first few, and how many more there are."""
+    more = f" and {len(found) - most} more" if len(found) > most else ""
+    return "; ".join(difference.text for difference in found[:most]) + more
+
+
+def check_model_is_of(machine: Machine, calibrated: Machine) -> None:
+    """Refuse a model that was calibrated on another machine than it is used for.
+
+    Travel, tolerances and the name may differ, and so may what only one of the two files states: a model does not use
+    what was added to the machine file later.
+
+    Args:
+        machine: that it is used for.
+        calibrated: nominal machine of the model.
+
+    Raises:
+        ModelError: names what differs, with both values.
+    """
+    found = [
+        difference
+        for difference in differences(calibrated, machine)
+        if difference.first_key not in NOT_PREDICTED
+        and (difference.first_key in CONTROL or NOT_GIVEN not in {difference.one, difference.other})
+    ]
+    if found:
+        what = f"the model was calibrated on another nominal machine ({calibrated.name}) than {machine.name}"
+        raise ModelError(
+            f"{what}: {in_words(found)}",
+            remedy="use the model of this machine, or the machine file that the model's sessions were recorded with",
+        )
+
+
+def _between(key: str, one: object, other: object) -> Iterator[Difference]:
+    if is_dataclass(one) and type(one) is type(other):
+        for field in fields(one):
+            # The machine file has the joints at its top.
+            inner = "" if isinstance(getattr(one, field.name), Hexapod) else field.name
+            yield from _between(
+                ".".join(filter(None, (key, inner))), getattr(one, field.name), getattr(other, field.name)
+            )
+    elif isinstance(one, np.ndarray) and isinstance(other, np.ndarray) and len(one) == len(other) == STRUTS:
+        for strut, (a, b) in enumerate(zip(one, other, strict=True), start=1):
+            if not np.allclose(a, b, rtol=0.0, atol=ROUNDED_MM):
+                yield Difference(f"{key} of strut {strut}", _said(a.tolist()), _said(b.tolist()))
+    elif one != other:
+        yield Difference(key, _said(one), _said(other))
+
+
+def _said(value: object) -> str:
+    if value is None:
+        return NOT_GIVEN
+    if isinstance(value, tuple):
+        return str(list(value))
+    if is_dataclass(value):
+        inside = "; ".join(f"{field.name} {_said(getattr(value, field.name))}" for field in fields(value))
+        return f"({inside})"
+    if isinstance(value, np.ndarray):
+        return str(value.tolist())
+    return str(value)

@@ -1,0 +1,85 @@
+"""Whether a program is fit to be compensated: nominal so far, and for this machine."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import StationError
+from dbbstation.nc.dialect import plain
+from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, Step
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.nc.toolpath import Toolpath
+
+COMPENSATED = "compensated, greatest correction"
+"""How a header says that a program is compensated."""
+
+CHECKSUMS = 99_999_999
+"""Line numbers have eight digits at most in LinuxCNC's language: one program in fifty million has its own by chance."""
+
+_MACHINE = re.compile(r"machine\s*[:=]\s*(?P<name>.*\S)\s*", re.IGNORECASE)
+
+
+def checksum(toolpath: Toolpath) -> int:
+    """Number of what a toolpath does: its moves, dwells and stops in order, with the decimals that programs write.
+
+    Comments, feeds, line numbers, units, and how numbers are written have no part in it.
+    """
+    told = np.isin(toolpath.kind, [Step.RAPID, Step.FEED, Step.DWELL, Step.PAUSE])
+    decimals = np.repeat([10.0**DECIMALS_MM, 10.0**DECIMALS_DEG], 3)
+    poses = np.where(toolpath.is_move[:, None], np.rint(toolpath.poses * decimals), 0.0)
+    digest = hashlib.sha256()
+    digest.update(toolpath.kind[told].astype("<i1").tobytes())
+    digest.update(poses[told].astype("<i8").tobytes())
+    digest.update(" ".join(f"{seconds:.6e}" for seconds in toolpath.dwell_s[told].tolist()).encode())
+    return 1 + int.from_bytes(digest.digest()[:8]) % CHECKSUMS
+
+
+def check_nominal(toolpath: Toolpath) -> None:
+    """Refuse a program that was compensated before.
+
+    It says so in a comment; and in case somebody took the comments out, its first and its last line carry the checksum
+    of its motion as their line number.
+
+    Raises:
+        StationError: it is compensated already.
+    """
+    said = any(text.startswith(COMPENSATED) for text in toolpath.text.values())
+    if said or (toolpath.numbers and checksum(toolpath) in toolpath.numbers):
+        how = "says its header" if said else "says the checksum in its line numbers"
+        raise StationError(
+            f"this program is compensated already, {how}",
+            where=toolpath.name,
+            remedy="compensate the nominal program that it was made from",
+        )
+
+
+def check_machine(toolpath: Toolpath, machine: Machine) -> None:
+    """Refuse a program whose header names another machine.
+
+    Raises:
+        StationError: names both.
+    """
+    own = plain(f"machine: {machine.name}")
+    for text in _header(toolpath):
+        named = _MACHINE.fullmatch(text)
+        if named and plain(f"machine: {named['name']}") != own:
+            raise StationError(
+                f"its header names the machine {named['name']!r}, the model is of {machine.name!r}",
+                where=toolpath.name,
+                remedy="give the model of that machine, or post the program for this one",
+            )
+
+
+def _header(toolpath: Toolpath) -> Iterator[str]:
+    """Comments before the first move."""
+    moves = np.flatnonzero(toolpath.is_move)
+    first = int(moves[0]) if len(moves) else len(toolpath)
+    return (text for row, text in toolpath.text.items() if row < first and toolpath.kind[row] == Step.COMMENT)

@@ -1,0 +1,94 @@
+"""Sessions of the independent plant, diagnosed by sets of causes: what is hidden is named, and nothing else."""
+
+from __future__ import annotations
+
+import pytest
+
+from dbbstation.diagnosed import diagnose_sessions
+from tests.diagnosis.engine_sessions import (
+    answer,
+    gravity_backlash_and_screw_cyclic,
+    screw_lead_and_gravity,
+    screw_wave_under_coloured_noise,
+    warm_up_in_two_stages,
+    warm_up_in_two_stages_and_warm_frame,
+    warm_up_of_unknown_time_constant,
+)
+
+SURE = 0.95
+
+
+def _diagnosed(recipe, folder):
+    truth = recipe(folder)
+    return diagnose_sessions([truth.folder], None, (), lambda _: None, by_sets=True), truth
+
+
+def _named(summary):
+    return {s["name"] for s in summary["sources"] if s["verdict"] == "identified"}
+
+
+def _doubtful(summary):
+    """Causes in doubt that are not just another word for an identified one."""
+    named = _named(summary)
+    return {
+        s["name"] for s in summary["sources"] if s["verdict"] == "ambiguous" and not named & set(s.get("class", ()))
+    }
+
+
+@pytest.mark.slow
+def test_a_lead_and_gravity_are_named_though_both_act_over_the_length(tmp_path):
+    found, _ = _diagnosed(screw_lead_and_gravity, tmp_path / "s")
+    summary = found.summary()
+    assert _named(summary) == {"screw-lead", "gravity"}
+    assert not _doubtful(summary)
+    gravity = next(s for s in summary["sources"] if s["name"] == "gravity")
+    # A strut's own weight does the same on these tests, and the answer says so.
+    assert "strut-weight" in gravity["class"]
+    compliance = gravity["parameters"]["strut_compliance_um_kn"]
+    assert abs(compliance["value"] - 4.84) < 3.0 * compliance["uncertainty"]
+    for strut, lead in enumerate((40.0, -20.0, 30.0, -40.0, 10.0, -30.0), 1):
+        screw = next(s for s in summary["sources"] if s["name"] == "screw-lead")["parameters"][f"strut_{strut}_um_m"]
+        assert abs(screw["value"] - lead) < 3.0 * screw["uncertainty"]
+    # Noise and uncertainties explain what is left of tests that were left out.
+    assert 0.8 < summary["held_out_normalised"]["after"] < 1.3
+
+
+@pytest.mark.slow
+def test_three_causes_at_once_are_all_named(tmp_path):
+    found, _ = _diagnosed(gravity_backlash_and_screw_cyclic, tmp_path / "s")
+    summary = found.summary()
+    assert _named(summary) == {"gravity", "backlash", "screw-cyclic"}
+    assert not _doubtful(summary)
+    assert all(s["probability"] >= SURE for s in summary["sources"] if s["verdict"] == "identified")
+
+
+@pytest.mark.slow
+def test_a_warm_up_needs_no_second_name_for_its_time_constant(tmp_path):
+    found, _ = _diagnosed(warm_up_of_unknown_time_constant, tmp_path / "s")
+    assert _named(found.summary()) == {"thermal-struts"}
+    assert not _doubtful(found.summary())
+
+
+@pytest.mark.slow
+def test_a_second_stage_of_a_warm_up_is_no_second_cause(tmp_path):
+    found, _ = _diagnosed(warm_up_in_two_stages, tmp_path / "s")
+    assert _named(found.summary()) == {"thermal-struts"}
+    assert not _doubtful(found.summary())
+    assert "formula of thermal-struts" in found.summary()["unexplained"]["text"]
+
+
+@pytest.mark.slow
+def test_a_frame_that_warms_beside_a_warm_up_in_two_stages_is_one(tmp_path):
+    found, _ = _diagnosed(warm_up_in_two_stages_and_warm_frame, tmp_path / "s")
+    assert _named(found.summary()) == {"thermal-struts", "thermal-frame"}
+
+
+@pytest.mark.slow
+def test_a_screw_wave_is_not_taken_for_noise(tmp_path):
+    found, truth = _diagnosed(screw_wave_under_coloured_noise, tmp_path / "s")
+    summary = found.summary()
+    assert _named(summary) == {"screw-cyclic"}
+    # Two samples are averaged in each of 720 sectors: the slow noise of their means is less by the root of their number.
+    samples = sum(len(o.raw) for o in found.recorded.observations) / len(found.recorded.observations)
+    expected_um = answer(truth)["noise_slow_um"] / (samples / 720) ** 0.5
+    assert summary["noise_um"] == pytest.approx(expected_um, rel=0.05)

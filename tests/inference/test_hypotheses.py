@@ -1,0 +1,146 @@
+"""The search over sets of causes against all sets and all sizes by brute force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbbstation.inference.hypotheses import LIKELY, search
+from dbbstation.inference.model_comparison import FLEXIBLE, Member
+from tests.inference.dense import Dense, cause, variant
+from tests.inference.subsets import inclusion, log_posteriors
+
+ODDS = float(np.log(0.05 / 0.95))
+T = np.linspace(0.0, 1.0, 40)
+BASE = np.column_stack([np.ones(40), T])
+
+
+def one_column_each(count, odds=ODDS):
+    return [cause(f"c{k}", variant(k), odds=odds) for k in range(count)]
+
+
+def probabilities(posterior, names):
+    return np.array([posterior.probability([name]) for name in names])
+
+
+@pytest.mark.parametrize(("alike", "noise"), [(0.0, 0.3), (1.0, 0.3), (3.0, 0.3), (0.0, 1.0), (3.0, 1.0)])
+def test_probabilities_are_those_of_all_sets_and_all_sizes(rng, alike, noise):
+    """Six causes, two of them there, columns more or less alike.
+
+    Sizes are averaged over one cause at a time, the others at their best: that moved log posteriors by 0.07 at the most.
+    Sets of several causes that are each not worth their odds are left out: that moved probabilities by 0.03.
+    """
+    causes = one_column_each(6)
+    names = [c.name for c in causes]
+    columns = rng.normal(size=(40, 6)) + alike * rng.normal(size=(40, 1))
+    target = columns @ [0.0, 0.5, 0.0, 0.0, 0.2, 0.0] + rng.normal(0, noise, 40)
+    problem = Dense(BASE, columns, target, noise)
+    posterior = search(problem.comparison(), causes)
+    full = log_posteriors(problem, causes)
+    off = probabilities(posterior, names) - inclusion(full, names)
+    top = posterior.best.log_posterior
+    likely = [h for h in posterior.hypotheses if h.log_posterior > top - LIKELY]
+    sizes = [h.log_posterior - full[h.names] for h in likely]
+    assert posterior.best.names == max(full, key=full.get)
+    assert np.abs(off).max() < 0.05
+    assert np.abs(sizes).max() < 0.2
+
+
+def test_a_single_cause_is_scored_exactly(rng):
+    columns = rng.normal(size=(40, 6))
+    problem = Dense(BASE, columns, columns[:, 2] + rng.normal(0, 0.5, 40), 0.5)
+    causes = one_column_each(6)
+    posterior, full = search(problem.comparison(), causes), log_posteriors(problem, causes[:3])
+    for key, expected in full.items():
+        if len(key) < 2:
+            assert posterior.weights[key] == pytest.approx(expected, abs=1e-9)
+
+
+def test_probabilities_add_up(rng):
+    columns = rng.normal(size=(40, 4))
+    problem = Dense(BASE, columns, 0.3 * columns[:, 1] + rng.normal(0, 0.5, 40), 0.5)
+    posterior = search(problem.comparison(), one_column_each(4))
+    assert posterior.probability_of(lambda _: True) == pytest.approx(1.0)
+    none = posterior.probability_of(lambda names: not names)
+    assert posterior.probability(["c0", "c1", "c2", "c3"]) == pytest.approx(1.0 - none)
+    assert posterior.probability(["of nobody"]) == 0.0
+
+
+def test_three_loud_causes_among_many_are_found_at_once(rng):
+    """Twelve of three columns each, nearly as many columns as samples."""
+    columns = rng.normal(size=(40, 60))
+    causes = [cause(f"c{k}", variant(3 * k, 3 * k + 1, 3 * k + 2), odds=ODDS) for k in range(12)]
+    there = np.zeros(60)
+    there[[0, 1, 2, 9, 10, 11, 30, 31, 32]] = [0.9, 0.8, -0.7, 0.6, 0.8, 1.0, -0.9, 0.5, 0.7]
+    problem = Dense(BASE, columns, columns @ there + rng.normal(0, 0.01, 40), 0.01)
+    posterior = search(problem.comparison(), causes)
+    assert posterior.best.names == {"c0", "c3", "c10"}
+    assert all(posterior.probability([name]) > 0.999 for name in posterior.best.names)
+    exact = problem.log_evidence([0, 1, 2, 9, 10, 11, 30, 31, 32], np.full(9, 1.0))
+    assert posterior.best.log_posterior == pytest.approx(exact + 3 * ODDS + 3 * np.log(0.19), abs=2.0)
+
+
+def test_two_causes_that_hide_each_other_are_found_together(rng):
+    """Their sum is a thirtieth of each: alone, each of them is worth less than its prior odds."""
+    axes = np.linalg.qr(np.hstack([BASE, rng.normal(size=(40, 3))]))[0] * np.sqrt(40)
+    common, own = axes[:, 2:3], axes[:, 3:]
+    columns = np.hstack([common + 0.02 * own[:, :1], -common + 0.02 * own[:, 1:], rng.normal(size=(40, 4))])
+    problem = Dense(BASE, columns, columns[:, 0] + columns[:, 1] + rng.normal(0, 0.01, 40), 0.01)
+    causes = one_column_each(6)
+    full = log_posteriors(problem, causes)
+    assert max(full[frozenset({name})] for name in ("c0", "c1")) < 0.0
+    assert max(full, key=full.get) == {"c0", "c1"}
+    assert search(problem.comparison(), causes).best.names == {"c0", "c1"}
+
+
+def test_a_flexible_cause_that_imitates_two_gives_way_to_them(rng):
+    """It holds both almost exactly, with ten more columns, and is better than either of them alone."""
+    two = rng.normal(size=(40, 2))
+    columns = np.hstack([two, two + 0.01 * rng.normal(size=(40, 2)), rng.normal(size=(40, FLEXIBLE))])
+    imitation = variant(*range(2, 2 + FLEXIBLE))
+    causes = [*one_column_each(2), cause("flexible", imitation, odds=ODDS), cause("other", variant(15), odds=ODDS)]
+    problem = Dense(BASE, columns, two @ [0.7, 0.9] + rng.normal(0, 0.05, 40), 0.05)
+    comparison = problem.comparison()
+    alone = comparison.scan([], causes).log_factor
+    assert alone.argmax() == 2
+    posterior = search(comparison, causes)
+    full = log_posteriors(problem, causes)
+    assert posterior.best.names == max(full, key=full.get) == {"c0", "c1"}
+    assert posterior.probability(["flexible"]) == pytest.approx(inclusion(full, ["flexible"])[0], abs=0.01)
+
+
+def test_a_seed_is_looked_at_in_the_form_that_its_cause_has_now(rng):
+    """Three causes of which only all together are worth anything: neither singles nor pairs lead there."""
+    own = rng.normal(size=(40, 3))
+    hidden = np.column_stack([own[:, 0] - own[:, 1], own[:, 1] - own[:, 2], own[:, 2] - own[:, 0]])
+    columns = np.hstack([hidden + 0.01 * rng.normal(size=(40, 3)), rng.normal(size=(40, 5))])
+    problem = Dense(BASE, columns, columns[:, :3] @ np.ones(3) + rng.normal(0, 0.003, 40), 0.003)
+    causes = one_column_each(6)
+    forms = (variant(0, nonlinear=(1.0,), log_weight=-np.log(2)), variant(7, nonlinear=(5.0,), log_weight=-np.log(2)))
+    causes[0] = cause("c0", *forms, odds=ODDS)
+    before = cause("c0", variant(3, nonlinear=(1.4,)), odds=ODDS)
+    seed = [Member(before, before.variants[0], 1.0), *(Member(c, c.variants[0], 1.0) for c in causes[1:3])]
+    gone = cause("gone", variant(0))
+    posterior = search(problem.comparison(), causes, [[*seed, Member(gone, gone.variants[0], 1.0)]])
+    assert posterior.best.names == {"c0", "c1", "c2"}
+    assert next(m for m in posterior.best.members if m.cause.name == "c0").variant is forms[0]
+
+
+def test_what_a_hypothesis_says_of_its_members(rng):
+    columns = rng.normal(size=(40, 4))
+    problem = Dense(BASE, columns, columns[:, 0] + columns[:, 1] + rng.normal(0, 0.1, 40), 0.1)
+    best = search(problem.comparison(), one_column_each(4)).best
+    assert best.names == {"c0", "c1"}
+    assert best.lean
+    assert [m.cause.name for m in best.without("c0")] == ["c1"]
+    full = log_posteriors(problem, one_column_each(2))
+    expected = full[frozenset({"c0", "c1"})] - full[frozenset({"c1"})] - ODDS
+    # The other's size is at its best, not averaged over.
+    assert best.log_factor("c0") == pytest.approx(expected, abs=1.0)
+
+
+def test_no_cause_at_all():
+    problem = Dense(BASE, np.zeros((40, 1)), T, 0.1)
+    posterior = search(problem.comparison(), [])
+    assert posterior.best.names == frozenset()
+    assert posterior.probability(["c0"]) == 0.0

@@ -1,0 +1,153 @@
+"""Causes beside a base against explicit least squares with the base's priors as further rows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import null_space
+
+from dbbstation.inference.model_comparison import Member
+from dbbstation.inference.projection import MARGIN, BesideBase, CauseColumns
+from dbbstation.inference.square_root import Columns
+from tests.inference.dense import cause, variant
+
+NOISE = 0.2
+SAMPLES = 80
+
+# Fitted columns, one of them within a tolerance, between random effects with a prior.
+PRIOR = np.array([np.inf, 0.5, np.inf, 0.03, 2.0, np.inf, np.inf])
+SCALE = np.array([1.0, 1.0, 3.0, 0.1, 1.0, 0.5, 2.0])
+RANDOM = np.array([False, True, False, False, True, False, False])
+FITTED = np.flatnonzero(~RANDOM)
+KNOWN = Columns(PRIOR, SCALE, RANDOM)
+
+
+@pytest.fixture
+def samples(rng):
+    """Base, causes and target, none of them orthogonal to another."""
+    common = rng.normal(size=(SAMPLES, 1))
+    base = rng.normal(size=(SAMPLES, len(PRIOR))) + common
+    causes = rng.normal(size=(SAMPLES, 5)) + base @ rng.normal(size=(len(PRIOR), 5)) * 0.2
+    target = base @ (0.1 * rng.normal(size=len(PRIOR))) + causes @ rng.normal(size=5) + rng.normal(0, NOISE, SAMPLES)
+    return base, causes, target
+
+
+def held_rows(rng, count):
+    """Orthonormal directions of the five fitted columns."""
+    return np.linalg.qr(rng.normal(size=(len(FITTED), count)))[0].T
+
+
+def penalties(held):
+    """Rows whose squares are what the priors of the base say, in units of the noise's, columns as in the base.
+
+    A stated standard deviation is a row of its own, and so is a held direction, whose coefficient in units of the
+    scales has a standard deviation of one.
+    """
+    rows = np.diag(1.0 / PRIOR)[np.isfinite(PRIOR)]
+    along = np.zeros((len(held), len(PRIOR)))
+    along[:, FITTED] = held / SCALE[FITTED]
+    return NOISE * np.vstack([rows, along])
+
+
+def left_by_base(base, held, columns):
+    """Columns with rows of zeros for the priors, less their least-squares fit by the base."""
+    penalty = penalties(held)
+    rows = np.vstack([base, penalty])
+    padded = np.vstack([columns, np.zeros((len(penalty), columns.shape[1]))])
+    return padded - rows @ np.linalg.lstsq(rows, padded)[0]
+
+
+def compared(base, causes, target, known, held):
+    """Products of columns and target that the comparison was given."""
+    columns = CauseColumns(len(target))
+    columns.add(causes)
+    return products(BesideBase(columns, base, known, held, NOISE).comparison(target), causes.shape[1])
+
+
+def products(comparison, count):
+    return comparison.beside([], np.arange(count)), comparison._towards
+
+
+@pytest.mark.parametrize("directions", [0, 1, 2])
+def test_the_base_is_projected_out_with_its_priors(samples, rng, directions):
+    base, causes, target = samples
+    held = held_rows(rng, directions)
+    gram, towards = compared(base, causes, target, KNOWN, held)
+    left = left_by_base(base, held, np.column_stack([causes, target]))
+    assert gram == pytest.approx(left[:, :-1].T @ left[:, :-1] / NOISE**2, rel=1e-9, abs=1e-8)
+    assert towards == pytest.approx(left[:, :-1].T @ left[:, -1] / NOISE**2, rel=1e-9, abs=1e-8)
+
+
+def test_a_flat_base_is_projected_out_wholly(samples):
+    base, causes, target = samples
+    flat = Columns(np.full(len(PRIOR), np.inf), SCALE, np.zeros(len(PRIOR), dtype=bool))
+    gram, towards = compared(base, causes, target, flat, np.zeros((0, len(PRIOR))))
+    beside = null_space(base.T)
+    assert gram == pytest.approx(causes.T @ beside @ beside.T @ causes / NOISE**2, abs=1e-8)
+    assert towards == pytest.approx(causes.T @ beside @ beside.T @ target / NOISE**2, abs=1e-8)
+
+
+def test_a_badly_conditioned_base_loses_no_digits(samples):
+    """Two columns that differ by 1e-6: their products alone would lose twelve digits."""
+    base, causes, target = samples
+    base = base.copy()
+    base[:, 5] = base[:, 6] + 1e-6 * base[:, 5]
+    gram, _ = compared(base, causes, target, KNOWN, held=np.zeros((0, len(FITTED))))
+    left = left_by_base(base, np.zeros((0, len(FITTED))), causes)
+    assert gram == pytest.approx(left.T @ left / NOISE**2, rel=1e-6)
+
+
+def test_the_evidence_beside_random_effects_is_the_dense_integral(samples):
+    """All columns of the base are random: the covariance of the target is noise, base and cause."""
+    base, causes, target = samples
+    known = Columns(np.full(len(PRIOR), 0.3), SCALE, np.ones(len(PRIOR), dtype=bool))
+    columns = CauseColumns(SAMPLES)
+    numbers = columns.add(causes)
+    comparison = BesideBase(columns, base, known, np.zeros((0, 0)), NOISE).comparison(target)
+    one = cause("one", variant(*numbers[:2]))
+
+    def log_marginal(size):
+        covariance = NOISE**2 * np.eye(SAMPLES) + 0.09 * base @ base.T + size**2 * causes[:, :2] @ causes[:, :2].T
+        _, logdet = np.linalg.slogdet(covariance)
+        return -0.5 * (logdet + target @ np.linalg.solve(covariance, target))
+
+    found = comparison.log_evidence([Member(one, one.variants[0], 0.1)])
+    assert found == pytest.approx(log_marginal(0.1) - log_marginal(0.0), abs=1e-8)
+
+
+@pytest.mark.parametrize("directions", [0, 2])
+def test_what_base_and_causes_leave_is_what_a_ridge_fit_leaves(samples, rng, directions):
+    base, causes, target = samples
+    held = held_rows(rng, directions)
+    columns = CauseColumns(SAMPLES)
+    columns.add(causes)
+    targets = np.column_stack([target, rng.normal(size=SAMPLES)])
+    sd = np.array([0.5, 0.0, 2.0, 0.1, 0.0])
+    found = BesideBase(columns, base, KNOWN, held, NOISE).left(targets, sd)
+    own = sd > 0.0
+    every = np.hstack([base, causes[:, own]])
+    penalty = penalties(held)
+    priors = np.zeros((len(penalty) + own.sum(), every.shape[1]))
+    priors[: len(penalty), : len(PRIOR)] = penalty
+    priors[len(penalty) :, len(PRIOR) :] = NOISE * np.diag(1.0 / sd[own])
+    padded = np.vstack([targets, np.zeros((len(priors), 2))])
+    fitted = np.linalg.lstsq(np.vstack([every, priors]), padded)[0]
+    assert found == pytest.approx(targets - every @ fitted, abs=1e-10)
+
+
+def test_columns_that_come_later_count_as_those_that_were_there(samples, rng):
+    """Also beyond the room that is made at first, and where a comparison was made in between."""
+    base, _, target = samples
+    causes = rng.normal(size=(SAMPLES, MARGIN + 60))
+    columns = CauseColumns(SAMPLES)
+    first = columns.add(causes[:, :3])
+    beside = BesideBase(columns, base, KNOWN, np.zeros((0, len(FITTED))), NOISE)
+    early, _ = products(beside.comparison(target), 3)
+    later = [columns.add(causes[:, a:b]) for a, b in ((3, 40), (40, 40), (40, MARGIN + 60))]
+    assert np.array_equal(np.concatenate([first, *later]), np.arange(MARGIN + 60))
+    found = products(beside.comparison(target), MARGIN + 60)
+    at_once = compared(base, causes, target, KNOWN, np.zeros((0, len(FITTED))))
+    assert found[0] == pytest.approx(at_once[0], abs=1e-7)
+    assert found[1] == pytest.approx(at_once[1], abs=1e-7)
+    assert early == pytest.approx(at_once[0][:3, :3], abs=1e-7)
+    assert columns.gram == pytest.approx(causes.T @ causes)

@@ -1,0 +1,157 @@
+"""Programs from a grammar, read by us and by LinuxCNC's own interpreter: the same machine motion, or refused by both.
+
+`DBBSTATION_FUZZ=5000` runs as many programs as that; `DBBSTATION_FUZZ_FROM` is the first seed.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from dbbstation.errors import InputError
+from dbbstation.nc.rs274.reader import read_program
+from dbbstation.nc.toolpath import Step, Toolpath
+from tests.nc.grammar import program
+from tests.nc.interpreter import RS274, Event, events
+
+pytestmark = [
+    pytest.mark.skipif(RS274 is None, reason="LinuxCNC's interpreter rs274 is not installed"),
+    pytest.mark.slow,
+]
+
+COUNT = int(os.environ.get("DBBSTATION_FUZZ", "500"))
+FIRST = int(os.environ.get("DBBSTATION_FUZZ_FROM", "0"))
+
+ONLY_BY_US = {
+    "where the machine stands": "nobody knows where",
+    "percent sign not closed": "the % that closes it",
+    "path control changed on the way": "changes how corners are rounded",
+    "F in the line that changes units": "counts in the units before it",
+    "code that is not read": r"[GM][\d.]+ is not read",
+    "word that is not read": "words with the letter|is not read",
+    "G80 beside a motion": "G80 ends the motion",
+    "P wanted twice": "both take P",
+    "nothing to compensate": "moves nothing",
+    "polar coordinates": "polar coordinates",
+    "skipped line": "can be skipped",
+    "word that does nothing": "nothing in this line uses",
+    "number with a second sign": "has no number",
+}
+"""What LinuxCNC runs and we refuse on purpose: what it depends on is not in the program, or two controls differ."""
+
+MOST_ONLY_BY_US = 0.08
+"""Share of programs; the grammar asks for such things more often than people do."""
+
+
+@pytest.fixture(scope="module")
+def verdicts(tmp_path_factory):
+    """(seed, text, what we say, what LinuxCNC says) of every program: toolpath or error, events or None."""
+    folder = tmp_path_factory.mktemp("rs274")
+    return [(seed, text, ours(text), events(text, folder)) for seed, text in programs()]
+
+
+def programs() -> list[tuple[int, str]]:
+    return [(seed, program(seed)) for seed in range(FIRST, FIRST + COUNT)]
+
+
+def ours(text: str) -> Toolpath | InputError:
+    try:
+        return read_program(text, "drawn.ngc")
+    except InputError as error:
+        return error
+
+
+def test_what_linuxcnc_refuses_is_refused(verdicts):
+    accepted = [text for _, text, we, they in verdicts if they is None and isinstance(we, Toolpath)]
+    assert not accepted, f"{len(accepted)} programs, the first:\n{accepted[0]}"
+
+
+def test_what_both_read_is_the_same_motion(verdicts):
+    both = [
+        (seed, text, we, they) for seed, text, we, they in verdicts if isinstance(we, Toolpath) and they is not None
+    ]
+    assert len(both) > 0.15 * len(verdicts)
+    for seed, text, we, they in both:
+        differs = difference(we, they)
+        assert not differs, f"seed {seed}: {differs}\n{text}"
+
+
+def test_what_only_we_refuse_is_little_and_has_a_name(verdicts):
+    reasons: dict[str, int] = {}
+    for seed, text, we, they in verdicts:
+        if they is not None and isinstance(we, InputError):
+            named = [name for name, said in ONLY_BY_US.items() if re.search(said, str(we))]
+            assert named, f"seed {seed}: {we}\n{text}"
+            reasons[named[0]] = reasons.get(named[0], 0) + 1
+    refused = sum(they is None for *_, they in verdicts)
+    equal = sum(isinstance(we, Toolpath) for _, _, we, _ in verdicts)
+    print(f"{len(verdicts)} programs, {equal} equal, {refused} refused by both, by us only: {reasons}")  # noqa: T201 - with -s
+    assert sum(reasons.values()) <= MOST_ONLY_BY_US * len(verdicts), reasons
+
+
+def difference(path: Toolpath, they: list[Event]) -> str:
+    """Where a toolpath and LinuxCNC's events differ; empty where they agree."""
+    groups = grouped(path)
+    if [kind for kind, _ in groups] != ["FEED" if event.kind == "ARC" else event.kind for event in they]:
+        return f"{[kind for kind, _ in groups]} and {[event.kind for event in they]}"
+    before: np.ndarray | None = None
+    for (_, rows), event in zip(groups, they, strict=True):
+        rounding = np.array([0.51e-4 * event.unit_mm] * 3 + [0.51e-4] * 3)
+        poses, line = path.poses[rows], path.line[rows[0]]
+        if event.kind in {"RAPID", "FEED", "ARC"}:
+            if (np.abs(poses[-1] - event.pose) > rounding).any():
+                return f"line {line}: {poses[-1]} and {event.pose}"
+            if event.kind == "ARC" and before is not None:
+                off_mm = off_arc_mm(before, poses, event)
+                if off_mm > 2e-3 * event.unit_mm:
+                    return f"line {line}: {off_mm} mm off the arc"
+            before = poses[-1]
+        if event.kind in {"FEED", "ARC"}:
+            mine = (path.feed_mm_min[rows[0]], path.feed_deg_min[rows[0]])
+            if not np.allclose(mine, event.feed, rtol=1e-9, atol=0.51e-4 * event.unit_mm):
+                return f"line {line}: feeds {mine} and {event.feed}"
+        if event.kind == "DWELL" and abs(path.dwell_s[rows[0]] - event.dwell_s) > 0.51e-4:
+            return f"line {line}: dwells {path.dwell_s[rows[0]]} and {event.dwell_s}"
+    return ""
+
+
+def grouped(path: Toolpath) -> list[tuple[str, np.ndarray]]:
+    """Rows of moves, dwells and pauses, moves at feed of one line together."""
+    told = [row for row, kind in enumerate(path.kind) if kind in {Step.RAPID, Step.FEED, Step.DWELL, Step.PAUSE}]
+    groups: list[list[int]] = []
+    for row in told:
+        same = (
+            groups
+            and path.kind[row] == Step.FEED == path.kind[groups[-1][-1]]
+            and path.line[row] == path.line[groups[-1][-1]]
+        )
+        if same:
+            groups[-1].append(row)
+        else:
+            groups.append([row])
+    return [(Step(path.kind[rows[0]]).name, np.array(rows)) for rows in groups]
+
+
+def off_arc_mm(start: np.ndarray, poses: np.ndarray, event: Event) -> float:
+    """Greatest distance between our chords and the arc that LinuxCNC runs, and of Z and angles from their even way."""
+    centre = np.array(event.centre_mm)
+    first, last = start[:2] - centre, event.pose[:2] - centre
+    sign = math.copysign(1.0, event.turns)
+    swept = (sign * (math.atan2(last[1], last[0]) - math.atan2(first[1], first[0]))) % math.tau
+    if swept < 1e-6 or math.tau - swept < 1e-6:
+        swept = math.tau
+    swept += (abs(event.turns) - 1) * math.tau
+    nodes = np.vstack([start, poses])
+    share = np.linspace(0.0, 1.0, len(nodes))
+    angle = math.atan2(first[1], first[0]) + sign * share * swept
+    radius = np.hypot(*first) + share * (np.hypot(*last) - np.hypot(*first))
+    there = start + share[:, None] * (event.pose - start)
+    there[:, 0], there[:, 1] = centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)
+    # Half-way between two points the chord is farthest inside its arc.
+    sagitta = max(radius[k] * (1.0 - math.cos((b - a) / 2.0)) for k, (a, b) in enumerate(pairwise(angle)))
+    return float(np.abs(nodes - there).max()) + sagitta

@@ -69,12 +69,12 @@ class Spectrum:
 
 
 def coefficients(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.float64]:
-    """Orthonormal Fourier coefficients of a whole period, harmonics 0 to `highest`, shape (2 highest + 1,).
+    """Orthonormal Fourier coefficients of a whole period, harmonics 0 to `highest`, shape (2 highest + 1,) or (..., m).
 
     White noise of standard deviation s has coefficients of standard deviation s, whatever the number of samples.
 
     Args:
-        residual: shape (n,), about equally spaced over the period.
+        residual: shape (n,), or (n, m) for several of the same period; about equally spaced over it.
         phase_rad: shape (n,), from 0 to 2 pi [rad].
         highest: below half of the samples.
     """
@@ -83,8 +83,15 @@ def coefficients(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], 
 
 def basis(phase_rad: NDArray[np.float64], highest: int) -> NDArray[np.float64]:
     """Constant, cosines and sines of mean square one, shape (n, 2 highest + 1)."""
-    angles = np.outer(phase_rad, np.arange(1, highest + 1))
-    return np.hstack([np.ones((len(phase_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
+    # Harmonic a + AT_ONCE b is the product of two of few waves: products are ten times as quick as cosines.
+    fine = np.exp(1j * np.outer(phase_rad, np.arange(1, AT_ONCE + 1)))
+    coarse = np.exp(1j * np.outer(phase_rad, AT_ONCE * np.arange(-(-highest // AT_ONCE))))
+    waves = (coarse[:, :, None] * fine[:, None, :]).reshape(len(phase_rad), -1)[:, :highest]
+    return np.hstack([np.ones((len(phase_rad), 1)), np.sqrt(2.0) * waves.real, np.sqrt(2.0) * waves.imag])
+
+
+AT_ONCE = 16
+"""Harmonics that are made from one of `basis`'s coarse waves: the root of the number that is usual."""
 
 
 def smooth(residual: NDArray[np.float64], phase_rad: NDArray[np.float64], highest: int = LOW) -> NDArray[np.float64]:
@@ -145,7 +152,7 @@ def misfit(
 def noise_left_by(
     residuals: Sequence[NDArray[np.float64]],
     phases_rad: Sequence[NDArray[np.float64]],
-    of_white: Sequence[Sequence[NDArray[np.float64]]],
+    of_white: Sequence[NDArray[np.float64]],
 ) -> Spectrum:
     """Noise from what a model of very many columns leaves, in the harmonics above the low ones.
 
@@ -155,13 +162,15 @@ def noise_left_by(
     Args:
         residuals: what it leaves of the measurement, one whole period per run.
         phases_rad: of the samples [rad].
-        of_white: what it leaves of white noise, the same for every draw.
+        of_white: what it leaves of draws of white noise, per run, shape (n, draws).
     """
     low, high = bands(min(len(residual) for residual in residuals))
-    _, squares = _squares(_all_coefficients(residuals, phases_rad, high), high)
-    kept = sum(_squares(_all_coefficients(draw, phases_rad, high), high)[1] for draw in of_white)
+    together = [np.column_stack([one, white]) for one, white in zip(residuals, of_white, strict=True)]
+    found = _all_coefficients(together, phases_rad, high)
+    _, squares = _squares(found[:, :, 0], high)
+    draws = [_squares(found[:, :, k], high)[1] for k in range(1, found.shape[2])]
     freedom = 2.0 * len(residuals)
-    share = np.asarray(kept) / (len(of_white) * freedom)
+    share = np.mean(draws, axis=0) / freedom
     # Few draws scatter from harmonic to harmonic; what a model takes out changes slowly with them.
     width = min(SMOOTHED, len(share))
     share = np.convolve(np.pad(share, width // 2, mode="edge"), np.full(width, 1.0 / width), mode="valid")[
@@ -188,7 +197,7 @@ LEAST_LEFT = 0.02
 def _all_coefficients(
     residuals: Sequence[NDArray[np.float64]], phases_rad: Sequence[NDArray[np.float64]], high: int
 ) -> NDArray[np.float64]:
-    """Coefficients of all runs, shape (runs, 2 high + 1)."""
+    """Coefficients of all runs, shape (runs, 2 high + 1) or (runs, 2 high + 1, m)."""
     return np.array([coefficients(r, phase, high) for r, phase in zip(residuals, phases_rad, strict=True)])
 
 

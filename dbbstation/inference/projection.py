@@ -1,7 +1,8 @@
 """Columns of causes beside a base that is fitted anew with every combination of them.
 
-The base's columns are made orthonormal, with one more row for each prior. What causes have of them is taken out by
-projection, which does not square the condition number of the base.
+The base's columns are made orthonormal once; then, for each level of noise, what lies along them is made orthonormal again
+with one more row for each prior. What causes have of them is taken out by projection, which does not square the condition
+number of the base.
 """
 
 from __future__ import annotations
@@ -23,29 +24,51 @@ MARGIN = 512
 
 
 class CauseColumns:
-    """Columns of causes over all samples of a channel; they may become more.
+    """Columns of causes over all samples of a channel, beside those of a base; they may become more.
 
     Args:
-        samples: of the channel.
+        base: columns of the base, shape (n, k).
 
     Attributes:
-        count: number of columns.
+        base: the same.
+        count: number of columns of causes.
+        axes: orthonormal, of all that the base can do, shape (n, k).
+        on_axes: columns of the base along these, shape (k, k).
     """
 
-    def __init__(self, samples: int) -> None:
-        self._buffer = np.empty((samples, MARGIN), order="F")
-        self._products = np.empty((MARGIN, MARGIN))
+    def __init__(self, base: NDArray[np.float64]) -> None:
+        self.base = base
+        self.axes, self.on_axes = np.linalg.qr(base)
+        self._buffer = np.empty((len(base), MARGIN), order="F")
+        self._products = np.zeros((0, 0))
+        self._along = np.zeros((self.axes.shape[1], 0))
         self.count = 0
-
-    @property
-    def gram(self) -> NDArray[np.float64]:
-        """Products of all columns, shape (p, p)."""
-        return self._products[: self.count, : self.count]
 
     @property
     def samples(self) -> NDArray[np.float64]:
         """All columns, shape (n, p)."""
         return self._buffer[:, : self.count]
+
+    @property
+    def gram(self) -> NDArray[np.float64]:
+        """Products of all columns, shape (p, p)."""
+        known = len(self._products)
+        if known < self.count:
+            # Many columns at once take a fraction of the time that they take one after the other.
+            products = np.empty((self.count, self.count))
+            products[:known, :known] = self._products
+            products[:, known:] = self.samples.T @ self._buffer[:, known : self.count]
+            products[known:, :known] = products[:known, known:].T
+            self._products = products
+        return self._products
+
+    @property
+    def along(self) -> NDArray[np.float64]:
+        """What the columns have of the axes of the base, shape (k, p)."""
+        known = self._along.shape[1]
+        if known < self.count:
+            self._along = np.hstack([self._along, self.axes.T @ self._buffer[:, known : self.count]])
+        return self._along
 
     def add(self, columns: NDArray[np.float64]) -> NDArray[np.int64]:
         """Take in columns, shape (n, q), and return their numbers."""
@@ -53,13 +76,8 @@ class CauseColumns:
         if last > self._buffer.shape[1]:
             wider = np.empty((len(self._buffer), 2 * last), order="F")
             wider[:, :first] = self._buffer[:, :first]
-            products = np.empty((2 * last, 2 * last))
-            products[:first, :first] = self.gram
-            self._buffer, self._products = wider, products
+            self._buffer = wider
         self._buffer[:, first:last] = columns
-        across = self._buffer[:, :last].T @ self._buffer[:, first:last]
-        self._products[:last, first:last] = across
-        self._products[first:last, :first] = across[:first].T
         self.count = last
         return np.arange(first, last)
 
@@ -68,51 +86,36 @@ class BesideBase:
     """Causes beside a base.
 
     Args:
-        causes: their columns.
-        base: columns of the base, shape (n, k).
-        known: priors and scales of these.
+        causes: their columns, and those of the base.
+        known: priors and scales of the base.
         held: orthonormal rows of fitted directions that the base fit kept at zero, in units of the scales. They have
             their usual size here: where they are seen at all, as the curvature of a model lets them be beside very
             little noise, that is no sign of a cause.
         noise: standard deviation of one sample.
     """
 
-    def __init__(
-        self,
-        causes: CauseColumns,
-        base: NDArray[np.float64],
-        known: Columns,
-        held: NDArray[np.float64],
-        noise: float,
-    ) -> None:
+    def __init__(self, causes: CauseColumns, known: Columns, held: NDArray[np.float64], noise: float) -> None:
         random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
         free = free_directions(known, fitted, held)
-        along = known.scale[fitted][:, None] * held.T
-        columns = np.hstack([base[:, random] * known.prior[random], base[:, fitted] @ along, base[:, fitted] @ free])
+        usual = known.scale[fitted][:, None] * held.T
+        base = causes.on_axes
+        columns = np.hstack([base[:, random] * known.prior[random], base[:, fitted] @ usual, base[:, fitted] @ free])
         sized = len(random) + len(held)
         bounded = np.isfinite(known.prior[fitted])
         priors = np.zeros((sized + int(bounded.sum()), columns.shape[1]))
         np.fill_diagonal(priors[:sized], noise)
         # A tolerance bounds a parameter, which free and held directions move together.
-        moved = np.hstack([np.zeros((len(fitted), len(random))), along, free])[bounded]
+        moved = np.hstack([np.zeros((len(fitted), len(random))), usual, free])[bounded]
         priors[sized:] = noise * moved / known.prior[fitted][bounded][:, None]
         self._causes, self._noise = causes, noise
-        self._axes = np.linalg.qr(np.vstack([columns, priors]))[0][: len(base)]
-        self._projections = np.zeros((columns.shape[1], 0))
-
-    @property
-    def _of_base(self) -> NDArray[np.float64]:
-        """What the columns of the causes have of the base, shape (k, p)."""
-        known = self._projections.shape[1]
-        if known < self._causes.count:
-            more = self._axes.T @ self._causes.samples[:, known:]
-            self._projections = np.hstack([self._projections, more])
-        return self._projections
+        # Of what lies along the axes of the base, how much its fit takes, given its priors.
+        self._taken = np.linalg.qr(np.vstack([columns, priors]))[0][: len(base)].T
 
     def comparison(self, target: NDArray[np.float64]) -> ModelComparison:
         """Compare causes on a target, shape (n,)."""
-        gram = self._causes.gram - self._of_base.T @ self._of_base
-        towards = self._causes.samples.T @ target - self._of_base.T @ (self._axes.T @ target)
+        of_base = self._taken @ self._causes.along
+        gram = self._causes.gram - of_base.T @ of_base
+        towards = self._causes.samples.T @ target - of_base.T @ (self._taken @ (self._causes.axes.T @ target))
         return ModelComparison(gram / self._noise**2, towards / self._noise**2)
 
     def left(self, targets: NDArray[np.float64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -122,13 +125,14 @@ class BesideBase:
             targets: shape (n, m).
             sd: prior standard deviations of all columns, shape (p,); zero for a column that does not take part.
         """
+        causes, axes = self._causes, self._causes.axes
         used = np.flatnonzero(sd > 0.0)
         size = sd[used] / self._noise
-        of_base = self._of_base[:, used] * size
-        gram = size[:, None] * self._causes.gram[np.ix_(used, used)] * size - of_base.T @ of_base
-        towards = size[:, None] * (self._causes.samples.T @ targets)[used] - of_base.T @ (self._axes.T @ targets)
+        of_base = self._taken @ (causes.along[:, used] * size)
+        gram = size[:, None] * causes.gram[np.ix_(used, used)] * size - of_base.T @ of_base
+        towards = size[:, None] * (causes.samples.T @ targets)[used] - of_base.T @ (self._taken @ (axes.T @ targets))
         values = np.linalg.solve(gram + np.eye(len(used)), towards)
         every = np.zeros((len(sd), targets.shape[1]))
         every[used] = size[:, None] * values
-        explained = self._causes.samples @ every
-        return targets - explained - self._axes @ (self._axes.T @ (targets - explained))
+        left = np.asarray(targets - causes.samples @ every, dtype=np.float64)
+        return left - axes @ (self._taken.T @ (self._taken @ (axes.T @ left)))

@@ -28,8 +28,7 @@ def wide_model(rng, smooth, waves, highest):
 
 def measured(model, noise, rng):
     left = model(np.column_stack([noise, rng.normal(size=(RUNS * SAMPLES, DRAWS))])).reshape(RUNS, SAMPLES, -1)
-    of_white = [[run[:, 1 + draw] for run in left] for draw in range(DRAWS)]
-    return noise_left_by([run[:, 0] for run in left], [PHASE] * RUNS, of_white)
+    return noise_left_by([run[:, 0] for run in left], [PHASE] * RUNS, [run[:, 1:] for run in left])
 
 
 def correlated(rng, correlation):

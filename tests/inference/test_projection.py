@@ -59,9 +59,9 @@ def left_by_base(base, held, columns):
 
 def compared(base, causes, target, known, held):
     """Products of columns and target that the comparison was given."""
-    columns = CauseColumns(len(target))
+    columns = CauseColumns(base)
     columns.add(causes)
-    return products(BesideBase(columns, base, known, held, NOISE).comparison(target), causes.shape[1])
+    return products(BesideBase(columns, known, held, NOISE).comparison(target), causes.shape[1])
 
 
 def products(comparison, count):
@@ -101,9 +101,9 @@ def test_the_evidence_beside_random_effects_is_the_dense_integral(samples):
     """All columns of the base are random: the covariance of the target is noise, base and cause."""
     base, causes, target = samples
     known = Columns(np.full(len(PRIOR), 0.3), SCALE, np.ones(len(PRIOR), dtype=bool))
-    columns = CauseColumns(SAMPLES)
+    columns = CauseColumns(base)
     numbers = columns.add(causes)
-    comparison = BesideBase(columns, base, known, np.zeros((0, 0)), NOISE).comparison(target)
+    comparison = BesideBase(columns, known, np.zeros((0, 0)), NOISE).comparison(target)
     one = cause("one", variant(*numbers[:2]))
 
     def log_marginal(size):
@@ -119,11 +119,11 @@ def test_the_evidence_beside_random_effects_is_the_dense_integral(samples):
 def test_what_base_and_causes_leave_is_what_a_ridge_fit_leaves(samples, rng, directions):
     base, causes, target = samples
     held = held_rows(rng, directions)
-    columns = CauseColumns(SAMPLES)
+    columns = CauseColumns(base)
     columns.add(causes)
     targets = np.column_stack([target, rng.normal(size=SAMPLES)])
     sd = np.array([0.5, 0.0, 2.0, 0.1, 0.0])
-    found = BesideBase(columns, base, KNOWN, held, NOISE).left(targets, sd)
+    found = BesideBase(columns, KNOWN, held, NOISE).left(targets, sd)
     own = sd > 0.0
     every = np.hstack([base, causes[:, own]])
     penalty = penalties(held)
@@ -139,9 +139,9 @@ def test_columns_that_come_later_count_as_those_that_were_there(samples, rng):
     """Also beyond the room that is made at first, and where a comparison was made in between."""
     base, _, target = samples
     causes = rng.normal(size=(SAMPLES, MARGIN + 60))
-    columns = CauseColumns(SAMPLES)
+    columns = CauseColumns(base)
     first = columns.add(causes[:, :3])
-    beside = BesideBase(columns, base, KNOWN, np.zeros((0, len(FITTED))), NOISE)
+    beside = BesideBase(columns, KNOWN, np.zeros((0, len(FITTED))), NOISE)
     early, _ = products(beside.comparison(target), 3)
     later = [columns.add(causes[:, a:b]) for a, b in ((3, 40), (40, 40), (40, MARGIN + 60))]
     assert np.array_equal(np.concatenate([first, *later]), np.arange(MARGIN + 60))

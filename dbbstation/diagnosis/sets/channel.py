@@ -76,8 +76,7 @@ class Channel:
         self.readings = [calibration.model.bar(motion) for motion in self.motions]
         ends = np.cumsum([0, *(len(reading.length_mm) for reading in self.readings)])
         self.runs = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-        self.base_samples = self._base()
-        self.columns = CauseColumns(int(ends[-1]))
+        self.columns = CauseColumns(self._base())
         self.sources = {(source.name, source.varies_with): source for source in sources}
         self.set_up = self._outsize()
         self._laid: dict[tuple[str, str], tuple[Variant, ...]] = {}
@@ -127,9 +126,7 @@ class Channel:
 
     def beside_base(self, noise_mm: float, scatter: float = 1.0) -> BesideBase:
         """Causes beside the base at a noise of one sample [mm], balls scattering `scatter` times as stated."""
-        return BesideBase(
-            self.columns, self.base_samples, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM)
-        )
+        return BesideBase(self.columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
 
     def target(self, fit: Calibration) -> NDArray[np.float64]:
         """What readings say of base and causes, about a fit of the base and of causes laid out at its values, (n,).
@@ -141,7 +138,7 @@ class Channel:
         known = fit.x[:base] - fit.layout.nominal[:base]
         # What the fitted columns make of the target is projected out; leaving it out keeps digits.
         known = np.where(self.base.random, known, 0.0)
-        target = np.concatenate(fit.residual_mm) + self.base_samples @ known
+        target = np.concatenate(fit.residual_mm) + self.columns.base @ known
         for key, variants in self._refined.items():
             amplitudes = self._amplitudes_in(fit, key)
             if amplitudes is not None:
@@ -165,14 +162,11 @@ class Channel:
         white = rng.standard_normal((len(target), DRAWS))
         left = self.beside_base(noise_mm).left(np.column_stack([target, white]), sd)
         phases = [np.radians(o.raw.theta_deg) for o in self.observations]
-        by_run = [left[rows] for rows in self.runs]
-        return noise_left_by(
-            [one[:, 0] for one in by_run], phases, [[one[:, 1 + k] for one in by_run] for k in range(DRAWS)]
-        )
+        return noise_left_by([left[rows, 0] for rows in self.runs], phases, [left[rows, 1:] for rows in self.runs])
 
     def blocks(self, columns: NDArray[np.int64], target: NDArray[np.float64]) -> list[Block]:
         """Compressed runs of base columns, then of those of some causes, one block per run."""
-        samples = np.hstack([self.base_samples, self.columns.samples[:, columns]])
+        samples = np.hstack([self.columns.base, self.columns.samples[:, columns]])
         every = np.arange(samples.shape[1])
         found = []
         for rows in self.runs:
@@ -271,7 +265,7 @@ class Channel:
             if name in SET_UP and not once and np.all(stated < LEAST_STATED_MM):
                 seen = min(len(stated), 3 if mountings & raised else 2)
                 own = np.arange(term.columns.start, term.columns.start + seen)
-                columns = self.columns.add(self.base_samples[:, own])
+                columns = self.columns.add(self.columns.base[:, own])
                 found.setdefault(name, []).append(Variant(columns, OUTSIZE * stated[:seen], label=term.shared))
         return tuple(
             Cause(

@@ -58,7 +58,7 @@ class Unmodelled:
             noise_mm: of one sample [mm].
         """
         channel = self.channel
-        samples, known = channel.base_samples, channel.base
+        samples, known = channel.columns.base, channel.base
         if members:
             columns = np.concatenate([member.columns for member in members])
             sd = np.concatenate([member.sd for member in members])

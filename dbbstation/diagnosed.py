@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from dbbstation.calibration.fit import default_sources
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
-from dbbstation.diagnosis.sets.diagnose import diagnose_by_sets
 from dbbstation.diagnosis.summary import diagnosis_summary
 from dbbstation.errors import ModelError
 from dbbstation.recorded import Recorded, load_sessions
@@ -53,8 +52,6 @@ def diagnose_sessions(
     say: Callable[[str], None],
     known: Mapping[str, ErrorSource] | None = None,
     progress: Callable[[str], None] = lambda _: None,
-    *,
-    by_sets: bool = False,
 ) -> Diagnosed:
     """Read sessions of one machine and find what a kinematic calibration of them leaves out.
 
@@ -65,7 +62,6 @@ def diagnose_sessions(
         say: told what was noticed in the files.
         known: every error source by name; those of the package if None.
         progress: told each stage of the work as it begins.
-        by_sets: compare sets of causes, with the probability of each, in place of naming one after the other.
 
     Raises:
         InputError: faults of files and traces.
@@ -82,6 +78,5 @@ def diagnose_sessions(
     for warning in recorded.warnings:
         say(f"note: {warning}")
     usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
-    judge = diagnose_by_sets if by_sets else diagnose
-    found = judge(recorded.machine, recorded.observations, usable, progress)
+    found = diagnose(recorded.machine, recorded.observations, usable, progress)
     return Diagnosed(recorded, found, lacking)

@@ -33,11 +33,6 @@ STAGES = {
 @click.option("--sources", metavar="A,B,...", help="Sources to look for, in place of all that are known.")
 @source_file_option
 @exclude_option
-@click.option(
-    "--by-sets",
-    is_flag=True,
-    help="Compare sets of causes and print the probability of each: sure of several causes at once. On trial.",
-)
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
 @click.option(
     "--keep-unexplained",
@@ -53,7 +48,6 @@ def diagnose(
     sources: str | None,
     source_files: tuple[Path, ...],
     exclude: tuple[str, ...],
-    by_sets: bool,
     out: Path | None,
     keep_unexplained: bool,
     figure: Path | None,
@@ -72,7 +66,6 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7 --out joint.yaml --figure diagnosis.svg
       dbbstation diagnose 2026-11-20-hexapod-7 --sources gravity,backlash --json
       dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
-      dbbstation diagnose 2026-11-20-hexapod-7 --by-sets
       dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
     """
     from dbbstation.calibration.evaluation import evaluate
@@ -93,7 +86,7 @@ def diagnose(
     candidates = [name.strip() for name in sources.split(",")] if sources else None
     known = every_source(source_files)
     with stage_bar("diagnosis", STAGES, plain=as_json) as progress:
-        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress, by_sets=by_sets)
+        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress)
     found, summary = diagnosed.diagnosis, diagnosed.summary()
     if out is not None:
         unnamed = _kept(found) if keep_unexplained else None
@@ -230,22 +223,23 @@ def _print_gain(summary: Mapping[str, Any]) -> None:
 def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
     from dbbstation.cli.output import print_table
 
-    by_sets = any("probability" in source for source in sources)
     rows = []
     for source in sources:
         hidden = "" if source["concealed"] is None else f"{100 * source['concealed']:.0f} %"
-        gain = "" if source["gain"] is None else f"{source['gain']:.0f}"
-        last = (
-            _probable(source)
-            if by_sets
-            else ""
-            if source["stability"] is None
-            else f"{100 * source['stability']:.0f} %"
-        )
-        alike = ", ".join(source["ambiguous_with"] or source.get("class", ())[1:])
-        rows.append([source["name"], source["verdict"], gain, hidden, last, alike])
-    titles = ["log Bayes factor", "concealed", "probability"] if by_sets else ["log evidence", "concealed", "again"]
-    print_table(["source", "verdict", *titles, "not told from"], rows)
+        gain = "" if source["gain"] is None else str(round(source["gain"]))
+        again = "" if source["stability"] is None else f"{100 * source['stability']:.0f} %"
+        alike = ", ".join(source["ambiguous_with"] or source["class"][1:])
+        rows.append([source["name"], source["verdict"], _probable(source), gain, hidden, again, alike])
+    titles = [
+        "cause",
+        "verdict",
+        "probability",
+        "log Bayes factor",
+        "concealed",
+        "selection frequency",
+        "not told from",
+    ]
+    print_table(titles, rows)
     for source in sources:
         if source["verdict"] in {"identified", "ambiguous"}:
             click.echo()
@@ -257,6 +251,7 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
 
 def _probable(source: Mapping[str, Any]) -> str:
     """Probability as printed: no figure is closer to one or nought than the catalogue of causes is complete."""
-    if "probability" not in source:
+    if source["probability"] is None:
         return ""
-    return "> 0.999" if source["probability"] > 0.999 else f"{source['probability']:.3f}"  # noqa: PLR2004 - as printed
+    surest = 0.999
+    return f"> {surest}" if source["probability"] > surest else f"{source['probability']:.3f}"

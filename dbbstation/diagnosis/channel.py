@@ -1,39 +1,43 @@
-"""The channel of bar readings as the inference sees it: blocks of columns for base and named sources."""
+"""The channel of bar readings as the inference sees it: base columns, columns of causes, and a target.
+
+Columns are laid out once about the base fit. A cause that a joint fit has taken in, or that competes with one, is laid out
+anew at its fitted values: exact columns, tangents of its nonlinear parameters, and what its formula may be off by.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import product
+from dataclasses import replace
+from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.calibration.fit import SMALLEST_NOISE_MM
 from dbbstation.calibration.scatter import LEAST_STATED_MM
-from dbbstation.inference.race import Candidate, Race, Variant, race_on
-from dbbstation.inference.square_root import Block, Columns, compress, joined
+from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
+from dbbstation.inference.harmonics import noise_left_by
+from dbbstation.inference.model_comparison import Cause, Variant
+from dbbstation.inference.projection import BesideBase, CauseColumns
+from dbbstation.inference.square_root import Block, compress, with_random
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.trace.average import averaged, means, sector_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
-    from dbbstation.calibration.layout import Layout, Term
+    from dbbstation.inference.harmonics import Spectrum
+    from dbbstation.inference.square_root import Columns
     from dbbstation.machine.geometry import Machine
-    from dbbstation.model.machine_model import BarReading
     from dbbstation.model.observation import Observation
-    from dbbstation.sources.contract import ErrorSource, Motion, Parameter
+    from dbbstation.sources.contract import ErrorSource, Parameter
 
-SECTORS = 720
-"""Samples per turn that a diagnosis works on, at the most: every half degree."""
+NAMED_ODDS = float(np.log(0.05 / 0.95))
+"""Log prior odds of a named cause: one machine in twenty has any one of them so that it matters."""
 
-SIZES = (1.0, 0.3, 0.1, 0.03)
-"""Sizes at which a source is looked for, in units of the plausible one: a thirtieth of it may be seen clearly, and the plausible
-size alone would count it as a miracle that several amplitudes are all small."""
+SETUP_ODDS = float(np.log(0.01 / 0.99))
+"""Log prior odds that a ball, a row of the CMM sheet or a bar is far off: one session in a hundred, each."""
 
 SET_UP = ("mounting", "ball-coordinate", "bar-offset")
 """Random effects of the base that may be far larger than stated."""
@@ -41,248 +45,320 @@ SET_UP = ("mounting", "ball-coordinate", "bar-offset")
 OUTSIZE = 20.0
 """Size of such an effect in units of the stated one, one standard deviation."""
 
-FEWEST_PER_SECTOR = 2
-"""Samples per sector below which sectors are made wider."""
+DRAWS = 4
+"""Draws of white noise from which it is seen how much of the noise a model takes out."""
 
 
-@dataclass(frozen=True, eq=False)
 class Channel:
     """Everything that a diagnosis compares.
 
+    Args:
+        calibration: the base model, fitted; its runs as thinned.
+        sources: named candidates, several laws of one cause under one name; each must be given what it needs by every
+            run.
+
     Attributes:
-        observations: runs, averaged over sectors.
-        blocks: compressed runs: columns of the base, then of all candidates; targets about the base fit.
-        layout: terms of the base columns.
-        held: base directions at nominal.
-        columns: number of all columns.
-        named: sources that have a name, as candidates.
-        set_up: balls and bars that are off by far more than stated, as candidates: a variant for each of them.
-        residual_mm: per run, what the base fit leaves, measurement's effects included [mm].
+        calibration: the base fit.
+        motions: of the runs.
+        readings: as the base fit predicts them.
+        columns: of all causes.
+        named: causes that have a name.
+        set_up: balls and bars that are off by far more than stated, a variant for each of them.
         sources: by name and law.
     """
 
-    observations: tuple[Observation, ...]
-    blocks: tuple[Block, ...]
-    layout: Layout
-    held: NDArray[np.float64]
-    columns: int
-    named: tuple[Candidate, ...]
-    set_up: tuple[Candidate, ...]
-    residual_mm: tuple[NDArray[np.float64], ...]
-    sources: dict[tuple[str, str], ErrorSource]
+    def __init__(self, calibration: Calibration, sources: Sequence[ErrorSource]) -> None:
+        self.calibration = calibration
+        self.machine: Machine = calibration.layout.machine
+        self.motions = [observation.motion() for observation in calibration.observations]
+        self.readings = [calibration.model.bar(motion) for motion in self.motions]
+        ends = np.cumsum([0, *(len(reading.length_mm) for reading in self.readings)])
+        self.runs = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        self.columns = CauseColumns(self._base())
+        self.sources = {(source.name, source.varies_with): source for source in sources}
+        self.set_up = self._outsize()
+        self._laid: dict[tuple[str, str], tuple[Variant, ...]] = {}
+        for key, source in self.sources.items():
+            self._laid[key] = self._on_a_grid(source)
+        self._refined: dict[tuple[str, str], tuple[Variant, ...]] = {}
 
-    @cached_property
-    def joined(self) -> Block:
-        """All runs as one block."""
-        return joined(self.blocks, self.columns)
-
-    def race(self, noise_mm: float) -> Race:
-        """Candidates on what the base leaves, at a noise of one sample [mm]."""
-        return race_on([self.joined], self.base, self.held, self.columns, max(noise_mm, SMALLEST_NOISE_MM))
+    @property
+    def observations(self) -> tuple[Observation, ...]:
+        """Runs, averaged over sectors."""
+        return self.calibration.observations
 
     @property
     def base(self) -> Columns:
         """Priors and scales of the base columns."""
-        return self.layout.known
+        return self.calibration.layout.known
+
+    @property
+    def held(self) -> NDArray[np.float64]:
+        """Base directions at nominal."""
+        return self.calibration.solution.held
+
+    @property
+    def named(self) -> tuple[Cause, ...]:
+        """Causes with a name; laws and forms of one are equally likely."""
+        found = []
+        for name in dict.fromkeys(name for name, _ in self.sources):
+            laws = [key for key in self.sources if key[0] == name]
+            variants = [
+                replace(variant, log_weight=variant.log_weight - float(np.log(len(laws))))
+                for key in laws
+                for variant in self._refined.get(key, self._laid[key])
+            ]
+            found.append(Cause(name, tuple(variants), NAMED_ODDS))
+        return tuple(found)
+
+    def columns_of(self, variants: Sequence[Variant]) -> NDArray[np.int64]:
+        """Columns of the amplitudes of several forms, one after the other."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *(variant.columns for variant in variants)])
+
+    def known_with(self, variants: Sequence[Variant]) -> Columns:
+        """Priors and scales of the base columns, then of the amplitudes of several forms, at their plausible sizes."""
+        return with_random(self.base, np.concatenate([np.zeros(0), *(variant.plausible for variant in variants)]))
+
+    def whole(self, name: str, variant: Variant) -> Variant:
+        """The form of a cause that has all its amplitudes, at the same point and without slack."""
+        if not len(variant.whole):
+            return replace(variant, slack=variant.slack[:0], slack_sd=variant.slack_sd[:0])
+        sizes = [p.plausible for p in self.source_of(name, variant).parameters(self.machine) if not p.shape]
+        plausible = np.tile(sizes, len(variant.whole) // len(sizes))
+        return Variant(variant.whole, plausible, variant.nonlinear, law=variant.law)
 
     def source_of(self, name: str, variant: Variant) -> ErrorSource:
-        """Source that a form of a candidate is of: a cause may have one form over time, and one by thermometers."""
+        """Source that a form of a cause is of: a cause may have one form over time, and one by thermometers."""
         return self.sources[name, variant.law]
 
-    @property
-    def machine(self) -> Machine:
-        """Nominal machine."""
-        return self.layout.machine
+    def to_whole(self, variant: Variant) -> NDArray[np.float64]:
+        """Amplitudes of a form to all amplitudes of its cause: some of these, or one for all of them, shape (p, q)."""
+        if not len(variant.whole):
+            return np.eye(len(variant.columns))
+        same = (variant.whole[:, None] == variant.columns).astype(np.float64)
+        return same if same.any() else np.ones((len(variant.whole), 1))
 
-    @property
-    def known(self) -> Columns:
-        """Priors and scales of all columns; amplitudes of candidates are random with their plausible sizes."""
-        prior = np.concatenate([self.base.prior, np.full(self.columns - len(self.base.prior), np.inf)])
-        for candidate in (*self.named, *self.set_up):
-            for variant in candidate.variants:
-                prior[variant.columns] = variant.plausible
-        more = self.columns - len(self.base.prior)
-        scale = np.concatenate([self.base.scale, prior[len(self.base.prior) :]])
-        return Columns(prior, scale, np.concatenate([self.base.random, np.ones(more, dtype=bool)]))
+    def beside_base(self, noise_mm: float, scatter: float = 1.0) -> BesideBase:
+        """Causes beside the base at a noise of one sample [mm], balls scattering `scatter` times as stated."""
+        return BesideBase(self.columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
 
+    def target(self, fit: Calibration) -> NDArray[np.float64]:
+        """What readings say of base and causes, about a fit of the base and of causes laid out at its values, (n,).
 
-def thinned(observation: Observation) -> Observation:
-    """Return the run averaged over sectors, with what was commanded averaged alike; as it is where it is short."""
-    raw = observation.raw
-    if len(raw) <= SECTORS:
-        return observation
-    sectors = min(SECTORS, max(len(raw) // FEWEST_PER_SECTOR, 1))
-    commanded = observation.commanded
-    if commanded is not None:
-        before = len(observation.lead_in_deg)
-        commanded = np.vstack([commanded[:before], means(commanded[before:], sector_of(raw, sectors))])
-    return replace(observation, raw=averaged(raw, sectors), commanded=commanded)
+        Args:
+            fit: the base fit, or a joint one, which has the base's columns where they were and others behind.
+        """
+        base = len(self.base.prior)
+        known = fit.x[:base] - fit.layout.nominal[:base]
+        # What the fitted columns make of the target is projected out; leaving it out keeps digits.
+        known = np.where(self.base.random, known, 0.0)
+        target = np.concatenate(fit.residual_mm) + self.columns.base @ known
+        for key, variants in self._refined.items():
+            amplitudes = self._amplitudes_in(fit, key)
+            if amplitudes is not None:
+                target = target + self.columns.samples[:, variants[0].columns] @ amplitudes
+        return np.asarray(target, dtype=np.float64)
 
+    def noise(self, target: NDArray[np.float64], others: Sequence[Cause], noise_mm: float) -> Spectrum:
+        """Noise from what base and all causes together leave of a target.
 
-def channel_of(calibration: Calibration, sources: Sequence[ErrorSource]) -> Channel:
-    """Lay out base and sources over a calibrated set of runs.
+        Args:
+            target: shape (n,) [mm].
+            others: causes beside the named ones.
+            noise_mm: of one sample, about [mm].
+        """
+        sd = np.zeros(self.columns.count)
+        for cause in (*self.named, *self.set_up, *others):
+            for variant in cause.variants:
+                sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
+        rng = np.random.default_rng(self.columns.count)
+        noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
+        white = rng.standard_normal((len(target), DRAWS))
+        left = self.beside_base(noise_mm).left(np.column_stack([target, white]), sd)
+        phases = [np.radians(o.raw.theta_deg) for o in self.observations]
+        return noise_left_by([left[rows, 0] for rows in self.runs], phases, [left[rows, 1:] for rows in self.runs])
 
-    Args:
-        calibration: the base model, fitted; its runs as thinned.
-        sources: named candidates; each must be given what it needs by every run.
-    """
-    machine, model = calibration.layout.machine, calibration.model
-    motions = [observation.motion() for observation in calibration.observations]
-    book = _Book(len(calibration.layout.known.prior))
-    readings = [model.bar(motion) for motion in motions]
-    outsize = _outsize(calibration.layout, calibration.observations)
-    left, blocks = [], []
-    for observation, motion, reading in zip(calibration.observations, motions, readings, strict=True):
-        numbers, jacobian = base_columns(calibration, motion, reading)
-        left.append(observation.raw.length_mm - reading.length_mm)
-        columns, pieces = [numbers], [jacobian]
-        for term, seen in outsize:
-            if term.acts_on(motion):
+    def blocks(self, columns: NDArray[np.int64], target: NDArray[np.float64]) -> list[Block]:
+        """Compressed runs of base columns, then of those of some causes, one block per run."""
+        samples = np.hstack([self.columns.base, self.columns.samples[:, columns]])
+        every = np.arange(samples.shape[1])
+        found = []
+        for rows in self.runs:
+            touched = np.flatnonzero(samples[rows].any(axis=0))
+            found.append(compress(every[touched], samples[rows][:, touched], target[rows]))
+        return found
+
+    def refine(self, name: str, law: str, values: Mapping[str, NDArray[np.float64]], fit: Calibration) -> None:
+        """Lay out a cause at values of all its parameters, with tangents and slack.
+
+        Args:
+            name: of the cause.
+            law: which one it follows.
+            values: by set, shape (p,).
+            fit: about which.
+        """
+        source = self.sources[name, law]
+        readings = self.readings if fit is self.calibration else [fit.model.bar(motion) for motion in self.motions]
+        parameters = source.parameters(self.machine)
+        shaped = [k for k, p in enumerate(parameters) if p.shape]
+        amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
+        shared = [source.shared_by(motion) for motion in self.motions]
+        derivatives = [
+            reading.by_source(source, self.machine, values[own]) for reading, own in zip(readings, shared, strict=True)
+        ]
+        first = next(iter(values.values()))
+        variants = self._variants(
+            source, [d[:, amplitudes] for d in derivatives], shared, tuple(first[shaped].tolist())
+        )
+        tangents = np.vstack([d[:, shaped] for d in derivatives])
+        tangent_sd = np.array([_spacing(parameters[k], float(first[k])) for k in shaped])
+        effects = [
+            Effects(motion, reading, values[own], derivative)
+            for motion, reading, own, derivative in zip(self.motions, readings, shared, derivatives, strict=True)
+        ]
+        discrepancy = discrepancy_of(source, self.machine, effects)
+        slack = self.columns.add(np.hstack([tangents, discrepancy]))
+        sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1], source.form_uncertainty)])
+        size = [values[own][amplitudes] / np.array([parameters[k].plausible for k in amplitudes]) for own in values]
+        at = max(float(np.sqrt(np.mean(np.square(size)))), 1e-12)
+        grid = np.prod([max(len(parameters[k].shape), 1) for k in shaped]) if shaped else 1.0
+        # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
+        weight = -float(np.log(max(grid / 2.5 ** len(shaped), 1.0)))
+        self._refined[name, law] = tuple(
+            replace(
+                variant,
+                slack=slack,
+                slack_sd=sd,
+                slack_at=at / np.sqrt(np.mean(np.square(self.to_whole(variant).sum(axis=1)))),
+                log_weight=variant.log_weight + weight,
+            )
+            for variant in variants
+        )
+
+    def _amplitudes_in(self, fit: Calibration, key: tuple[str, str]) -> NDArray[np.float64] | None:
+        """Amplitudes of a cause in a fit; None where that fit is without it."""
+        terms = [t for t in fit.layout.terms if (t.source.name, t.source.varies_with) == key]
+        base = {term.source.name for term in self.calibration.layout.terms}
+        if not terms or key[0] in base:
+            return None
+        return fit.x[fit.layout.columns_of(key[0])[0]]
+
+    def _base(self) -> NDArray[np.float64]:
+        """Columns of the base over all samples."""
+        layout = self.calibration.layout
+        samples = np.zeros((self.runs[-1].stop, len(layout.known.prior)))
+        for rows, motion, reading in zip(self.runs, self.motions, self.readings, strict=True):
+            for term in layout.terms:
+                if term.acts_on(motion):
+                    samples[rows, term.columns] = reading.by_source(
+                        term.source, self.machine, self.calibration.x[term.columns]
+                    )
+        return samples
+
+    def _scattering(self, times: float) -> Columns:
+        """What is known of the base where balls scatter so many times as stated."""
+        if times == 1.0:
+            return self.base
+        prior = self.base.prior.copy()
+        for term in self.calibration.layout.terms:
+            if term.source.name in {"mounting", "ball-coordinate"}:
+                own = prior[term.columns]
+                prior[term.columns] = np.where(own < LEAST_STATED_MM, times * own, own)
+        return replace(self.base, prior=prior)
+
+    def _outsize(self) -> tuple[Cause, ...]:
+        """Random effects that may be larger than stated; the parameters of each that runs see.
+
+        A level bar does not see the height of its ball. A ball that was put up once only is no other matter than its
+        mounting, and one that was set free may stand anywhere as it is.
+        """
+        setups = [observation.setup for observation in self.observations]
+        put_up = {ball: {s.mounting for s in setups if s.ball == ball} for ball in {s.ball for s in setups}}
+        raised = {o.setup.mounting for o in self.observations if o.raw.circle.elevation_deg != 0.0}
+        found: dict[str, list[Variant]] = {}
+        for term in self.calibration.layout.terms:
+            name, stated = term.source.name, self.base.prior[term.columns]
+            mountings = put_up.get(term.shared, set()) if name == "ball-coordinate" else {term.shared}
+            once = name == "ball-coordinate" and len(mountings) == 1
+            if name in SET_UP and not once and np.all(stated < LEAST_STATED_MM):
+                seen = min(len(stated), 3 if mountings & raised else 2)
                 own = np.arange(term.columns.start, term.columns.start + seen)
-                columns.append(book.set_up(term, OUTSIZE * calibration.layout.known.prior[own]))
-                pieces.append(jacobian[:, np.searchsorted(numbers, own)])
-        for source in sources:
-            for own, piece in _source_columns(source, motion, machine, reading, book):
-                columns.append(own)
-                pieces.append(piece)
-        target = left[-1] + jacobian @ (calibration.x - calibration.layout.nominal)[numbers]
-        blocks.append(compress(np.concatenate(columns), np.hstack(pieces), target))
-    return Channel(
-        observations=calibration.observations,
-        blocks=tuple(blocks),
-        layout=calibration.layout,
-        held=calibration.solution.held,
-        columns=book.count,
-        named=book.candidates(),
-        set_up=book.of_the_set_up(),
-        sources=book.sources,
-        residual_mm=tuple(left),
-    )
+                columns = self.columns.add(self.columns.base[:, own])
+                found.setdefault(name, []).append(Variant(columns, OUTSIZE * stated[:seen], label=term.shared))
+        return tuple(
+            Cause(
+                name,
+                tuple(replace(v, log_weight=-float(np.log(len(every)))) for v in every),
+                SETUP_ODDS,
+                setup=True,
+                named=False,
+            )
+            for name, every in found.items()
+        )
+
+    def _on_a_grid(self, source: ErrorSource) -> tuple[Variant, ...]:
+        """Variants of a source at all points of the grid of its nonlinear parameters."""
+        parameters = source.parameters(self.machine)
+        amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
+        shaped = [k for k, p in enumerate(parameters) if p.shape]
+        shared = [source.shared_by(motion) for motion in self.motions]
+        points = list(product(*(parameters[k].shape for k in shaped)))
+        found: list[Variant] = []
+        for point in points:
+            values = np.zeros(len(parameters))
+            values[shaped] = point
+            derivatives = [reading.by_source(source, self.machine, values)[:, amplitudes] for reading in self.readings]
+            found += self._variants(source, derivatives, shared, point)
+        return tuple(replace(v, log_weight=v.log_weight - float(np.log(len(points)))) for v in found)
+
+    def _variants(
+        self,
+        source: ErrorSource,
+        derivatives: Sequence[NDArray[np.float64]],
+        shared: Sequence[str],
+        nonlinear: tuple[float, ...],
+    ) -> list[Variant]:
+        """Forms of a source at one point: all amplitudes, those of each part (a strut) alone, one for all struts.
+
+        What wears or was made badly is often one strut, or all alike; all others free beside it would hide what is faint.
+
+        Args:
+            source: the cause.
+            derivatives: of the readings by its amplitudes, per run, shape (n, p).
+            shared: set of each run.
+            nonlinear: the point.
+        """
+        amplitudes = [p for p in source.parameters(self.machine) if not p.shape]
+        sets = list(dict.fromkeys(shared))
+        count = len(amplitudes)
+        samples = np.zeros((self.runs[-1].stop, count * len(sets)))
+        for rows, derivative, own in zip(self.runs, derivatives, shared, strict=True):
+            place = count * sets.index(own)
+            samples[rows, place : place + count] = derivative
+        columns = self.columns.add(samples)
+        plausible = np.tile([p.plausible for p in amplitudes], len(sets))
+        parts = np.array([p.alone_with for p in amplitudes] * len(sets))
+        whole = Variant(columns, plausible, nonlinear, law=source.varies_with)
+        kinds = [[whole]]
+        if len(set(parts.tolist())) > 1:
+            kinds.append(
+                [
+                    replace(whole, columns=columns[own], plausible=plausible[own], label=part, whole=columns)
+                    for part, own in ((part, parts == part) for part in sorted(set(parts.tolist())))
+                ]
+            )
+        if len(sets) == 1 and [p.strut for p in amplitudes] == list(range(1, STRUTS + 1)):
+            alike = self.columns.add(samples.sum(axis=1, keepdims=True))
+            kinds.append(
+                [replace(whole, columns=alike, plausible=plausible[:1], label="all struts alike", whole=columns)]
+            )
+        return [replace(one, log_weight=-float(np.log(len(kinds) * len(kind)))) for kind in kinds for one in kind]
 
 
-def _outsize(layout: Layout, observations: Sequence[Observation]) -> list[tuple[Term, int]]:
-    """Random effects that may be larger than stated, as terms, and how many of their parameters runs see.
-
-    A level bar does not see the height of its ball. A ball that was put up once only is no other matter than its
-    mounting, and one that was set free may stand anywhere as it is.
-    """
-    setups = [observation.setup for observation in observations]
-    put_up = {ball: {s.mounting for s in setups if s.ball == ball} for ball in {s.ball for s in setups}}
-    raised = {o.setup.mounting for o in observations if o.raw.circle.elevation_deg != 0.0}
-    found = []
-    for term in layout.terms:
-        name, stated = term.source.name, layout.known.prior[term.columns]
-        mountings = put_up.get(term.shared, set()) if name == "ball-coordinate" else {term.shared}
-        once = name == "ball-coordinate" and len(mountings) == 1
-        if name in SET_UP and not once and np.all(stated < LEAST_STATED_MM):
-            found.append((term, min(len(stated), 3 if mountings & raised else 2)))
-    return found
-
-
-def base_columns(
-    calibration: Calibration, motion: Motion, reading: BarReading
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Numbers and values of the columns of a fit that act on one run, shapes (k,) and (n, k)."""
-    machine = calibration.layout.machine
-    terms = [term for term in calibration.layout.terms if term.acts_on(motion)]
-    pieces = [reading.by_source(term.source, machine, calibration.x[term.columns]) for term in terms]
-    return np.concatenate([np.r_[term.columns] for term in terms]), np.hstack(pieces)
-
-
-def _source_columns(
-    source: ErrorSource, motion: Motion, machine: Machine, reading: BarReading, book: _Book
-) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
-    """Columns of every variant of a source for one run: amplitudes only, shape parameters at their values."""
-    parameters = source.parameters(machine)
-    amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
-    shaped = [k for k, p in enumerate(parameters) if p.shape]
-    found = []
-    for shape in product(*(parameters[k].shape for k in shaped)):
-        values = np.zeros(len(parameters))
-        values[shaped] = shape
-        derivative = reading.by_source(source, machine, values)[:, amplitudes]
-        numbers = book.source(source, source.shared_by(motion), shape, [parameters[k] for k in amplitudes])
-        if len(numbers) > len(amplitudes):
-            derivative = np.column_stack([derivative, derivative.sum(axis=1)])
-        found.append((numbers, derivative))
-    return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Set:
-    """Columns of one variant of a source for one set that shares its values.
-
-    Attributes:
-        columns: of its amplitudes, shape (p,).
-        prior: plausible sizes, shape (p,).
-        struts: that each amplitude is of, 0 for none, shape (p,).
-        common: column of one amplitude that all struts share; none where they have several each, or none.
-    """
-
-    columns: NDArray[np.int64]
-    prior: NDArray[np.float64]
-    struts: NDArray[np.int64]
-    common: NDArray[np.int64]
-
-
-def _forms(sets: Sequence[_Set], law: str, shape: tuple[float, ...]) -> list[Variant]:
-    """Forms in which a source is looked for: all amplitudes, those of each strut alone, one for all struts.
-
-    What wears or was made badly is often one strut, or all alike; all others free beside it would hide what is faint.
-    """
-    columns, prior, struts = (
-        np.concatenate([getattr(s, name) for s in sets]) for name in ("columns", "prior", "struts")
-    )
-    whole = Variant(columns, prior, shape, law=law)
-    forms = [whole]
-    single = np.unique(struts)
-    if len(single) > 1:
-        of = [struts == strut for strut in single]
-        forms += [replace(whole, columns=columns[own], prior=prior[own]) for own in of]
-    if len(sets) == 1 and len(sets[0].common):
-        forms.append(replace(whole, columns=sets[0].common, prior=prior[:1]))
-    return forms
-
-
-class _Book:
-    """Gives columns their numbers, the same in every run."""
-
-    def __init__(self, first: int) -> None:
-        self.count = first
-        self.sources: dict[tuple[str, str], ErrorSource] = {}
-        self._sets: dict[tuple[str, str, tuple[float, ...]], dict[str, _Set]] = {}
-        self._set_up: dict[str, dict[str, Variant]] = {}
-
-    def source(
-        self, source: ErrorSource, shared: str, shape: tuple[float, ...], amplitudes: Sequence[Parameter]
-    ) -> NDArray[np.int64]:
-        """Columns of one variant of a source for one set that shares its values; that of all struts alike comes last."""
-        self.sources[source.name, source.varies_with] = source
-        sets = self._sets.setdefault((source.name, source.varies_with, shape), {})
-        if shared not in sets:
-            prior, struts = np.array([p.plausible for p in amplitudes]), np.array([p.strut or 0 for p in amplitudes])
-            each = sorted(struts.tolist()) == list(range(1, STRUTS + 1))
-            sets[shared] = _Set(self._new(len(prior)), prior, struts, self._new(1 if each else 0))
-        return np.concatenate([sets[shared].columns, sets[shared].common])
-
-    def set_up(self, term: Term, prior: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Columns of a ball or bar that is off by far more than stated."""
-        sets = self._set_up.setdefault(term.source.name, {})
-        if term.shared not in sets:
-            sets[term.shared] = Variant(self._new(len(prior)), prior, of=term.shared)
-        return sets[term.shared].columns
-
-    def of_the_set_up(self) -> tuple[Candidate, ...]:
-        """Return balls and bars as candidates."""
-        return tuple(Candidate(name, tuple(sets.values())) for name, sets in self._set_up.items())
-
-    def candidates(self) -> tuple[Candidate, ...]:
-        """Return the candidates with their variants."""
-        variants: dict[str, list[Variant]] = {}
-        for (name, law, shape), sets in self._sets.items():
-            variants.setdefault(name, []).extend(_forms(list(sets.values()), law, shape))
-        return tuple(Candidate(name, tuple(forms), SIZES) for name, forms in variants.items())
-
-    def _new(self, size: int) -> NDArray[np.int64]:
-        self.count += size
-        return np.arange(self.count - size, self.count)
+def _spacing(parameter: Parameter, value: float) -> float:
+    """Spacing of the grid of a nonlinear parameter about a value."""
+    grid = np.sort(np.array(parameter.shape))
+    if len(grid) == 1:
+        return parameter.plausible
+    k = int(np.clip(np.searchsorted(grid, value), 1, len(grid) - 1))
+    return float(grid[k] - grid[k - 1])

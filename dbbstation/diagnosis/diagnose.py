@@ -5,45 +5,34 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-from scipy.stats import chi2
-
-from dbbstation.calibration.fit import SMALLEST_NOISE_MM, Calibration
-from dbbstation.calibration.missing_physics import SIGNIFICANT
-from dbbstation.calibration.noise_level import fine_noise_mm
+from dbbstation.calibration.missing_physics import is_missing_physics
 from dbbstation.calibration.stray_balls import beside
-from dbbstation.diagnosis.channel import Channel, channel_of, thinned
-from dbbstation.diagnosis.findings import Diagnosis, Location, Shift
-from dbbstation.diagnosis.held import held_beside, uncertainties
-from dbbstation.diagnosis.locate import locate, strut_contributions
-from dbbstation.diagnosis.naming import MOST_SOURCES, THRESHOLD, Round, best_look
-from dbbstation.diagnosis.next_test import propose
-from dbbstation.diagnosis.unexplained import unexplained
+from dbbstation.diagnosis.explain import SURE, explain
+from dbbstation.diagnosis.findings import Diagnosis, Unexplained
+from dbbstation.diagnosis.left_out import found_again, predicted
+from dbbstation.diagnosis.locate import locations_of
+from dbbstation.diagnosis.next_test import next_tests
+from dbbstation.diagnosis.shifts import shifts_between
+from dbbstation.diagnosis.thinned import thinned
+from dbbstation.diagnosis.unexplained_curve import curve_of
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
-from dbbstation.diagnosis.verdicts import beside_outliers, crowded, doubted, judge, testable
-from dbbstation.diagnosis.workspace import WorkspaceError, workspace_error
+from dbbstation.diagnosis.verdicts import judge
+from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
-from dbbstation.inference.harmonics import LOW
-from dbbstation.inference.held_out import HeldOut, held_out
-from dbbstation.inference.stability import stability
 from dbbstation.sources.by_temperature import not_given
-from dbbstation.sources.contract import Need, Owner
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.diagnosis.findings import NextTest, SourceFinding
+    from dbbstation.diagnosis.explain import Explained, Settled
     from dbbstation.inference.harmonics import Misfit
-    from dbbstation.inference.race import Choice
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource, Motion
 
-RIVALS, DRAWS = 6, 20
-"""Best sources that compete in each draw of a part of the tests, and draws."""
 
-FOLDS = 5
-"""Groups of tests that are left out in turn."""
+RIVALS = 6
+"""Named causes of the greatest evidence that compete in each draw of a part of the tests."""
 
 
 def diagnose(
@@ -52,7 +41,7 @@ def diagnose(
     sources: Sequence[ErrorSource],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
-    """Find what a kinematic calibration leaves out.
+    """Find what a kinematic calibration leaves out, by the probabilities of sets of causes; see docs/decisions/0019.
 
     Args:
         machine: nominal machine.
@@ -65,45 +54,77 @@ def diagnose(
         CalibrationError: the base model cannot be fitted.
         ModelError: a source needs what the runs or the machine file do not give.
     """
-    by_name = {source.name: source for source in reversed(sources)}
     runs = [thinned(observation) for observation in observations]
-    look = best_look(machine, runs, sources, progress)
-    before, outliers, channel, first, settled = look.before, look.outliers, look.channel, look.first, look.settled
-    chosen, after = settled.chosen, settled.after
+    explained = explain(machine, runs, sources, progress)
+    settled, before, outliers = explained.settled, explained.before, explained.outliers
+    after, members = settled.after, settled.members
     progress("verdicts")
-    joint = channel_of(after, sources) if chosen else channel
-    findings = judge(channel, settled.race, joint, settled.left.noise, chosen, by_name, after)
-    rest = unexplained(before, after, settled.race, first, settled.left, chosen, significant=SIGNIFICANT)
+    findings = judge(explained)
+    again = found_again(explained, [f.name for f in sorted(findings, key=lambda f: -f.gain)[:RIVALS]])
+    findings = tuple(replace(f, stability=again.get(f.name)) for f in findings)
+    rest = _unexplained(explained, settled.left)
+    found = [explained.channel.source_of(m.cause.name, m.variant) for m in members]
+    mismatch = is_missing_physics(explained.first) or bool(members) or bool(outliers) or rest.variable is not None
     progress("held-out tests")
-    if rest.overrules:
-        # Nothing has a name then: what is left, and what could be asked next, is that of the base model.
-        chosen, after = (), before
-        settled = Round((), before, first, settled.race)
-        findings = tuple(rest.demoted(findings))
-    findings = beside_outliers(findings, outliers)
-    found = {c.candidate.name: channel.source_of(c.candidate.name, c.variant) for c in chosen}
-    findings = crowded(doubted(findings, rest.finding, {**by_name, **found}), chosen, settled.race)
-    predicted = _held_out(channel, chosen, settled.left.noise, fine_noise_mm(after))
-    steady = _stability(channel, findings, settled)
-    findings = tuple(replace(f, stability=steady.get(f.name)) for f in findings)
-    elsewhere = workspace_error(before, after) if chosen else None
+    held_out = predicted(explained)
+    elsewhere = workspace_error(before, after) if members else None
     progress("next test")
-    mismatch = first.probability < SIGNIFICANT or bool(chosen) or bool(outliers) or rest.found
     return Diagnosis(
         mismatch=mismatch,
-        misfit=replace(first, probability=min(first.probability, _by_chance(channel, settled))),
+        misfit=explained.first,
         left=settled.left,
         before=before,
         after=after,
-        held_out=predicted,
+        held_out=held_out,
         outliers=tuple(beside(outlier, after) for outlier in outliers),
         workspace=elsewhere,
-        locations=locations_of(before, after, [*found.values()], first, rest.finding.variable) if mismatch else (),
+        locations=locations_of(before, after, found, explained.first, rest.variable) if mismatch else (),
         sources=findings,
-        unexplained=with_exact_wave(rest.finding, after),
+        unexplained=with_exact_wave(rest, after),
         shifts=shifts_between(before, after),
-        next_tests=_next_tests(channel, settled, findings, known=_known_elsewhere(elsewhere)),
+        next_tests=next_tests(explained, findings, elsewhere),
     )
+
+
+def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
+    """What no named cause explains: the unmodelled effect that brings most, where one is there for sure."""
+    settled = explained.settled
+    posterior, shapes = settled.posterior, settled.unmodelled.shapes
+    effects = [m for m in settled.best.members if m.cause.name in shapes]
+    sure = posterior.probability(shapes) >= SURE
+    if not effects or not sure:
+        if not is_missing_physics(left):
+            return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")
+        rough = rough_formulas(settled)
+        text = "Something is left beyond noise, and no variable organises it clearly."
+        if rough:
+            text = (
+                f"What is left is what the formula of {', '.join(rough)} may be off by: the machine follows it roughly."
+            )
+        return Unexplained(1e3 * left.rms, None, None, 0.0, text)
+    member = max(effects, key=lambda m: settled.best.log_factor(m.cause.name))
+    shape = shapes[member.cause.name]
+    curve = curve_of(explained.channel, settled, member)
+    where = f"strut {shape.strut}" if shape.strut else "no single strut"
+    text = f"An unmodelled effect, organised by {shape.name}, {where}."
+    rms_um = 1e3 * left.rms if is_missing_physics(left) else curve.unconcealed_um
+    gain = settled.best.log_factor(member.cause.name)
+    return Unexplained(rms_um, shape.strut, shape.name, gain, text, curve)
+
+
+def rough_formulas(settled: Settled) -> list[str]:
+    """Named causes whose slack the recordings call for: the joint fit, which has none, leaves it."""
+    evidence = settled.comparison.log_evidence(settled.best.members)
+    found = []
+    for member in settled.members:
+        firm = [replace(m, slack_scale=0.0) if m is member else m for m in settled.best.members]
+        if len(member.variant.slack) and evidence - settled.comparison.log_evidence(firm) > CLEAR:
+            found.append(member.cause.name)
+    return found
+
+
+CLEAR = 3.0
+"""Log Bayes factor from which on one thing is clearly more probable than another: odds of 20 to 1."""
 
 
 def usable_sources(
@@ -133,149 +154,3 @@ def _missing(source: ErrorSource, machine: Machine, motions: Sequence[Motion]) -
         f"{source.name} shows in motor currents only: fit it with `calibrate --sources`" if source.of_currents else ""
     )
     return not_given(source, motions) or only
-
-
-def _by_chance(channel: Channel, settled: Round) -> float:
-    """Probability that noise alone lets any candidate explain as much as the best chosen one does; 1 where none is.
-
-    An effect in few of the low harmonics, such as the mean of every run, stands out of them less than by its name.
-    """
-    tried = sum(len(candidate.variants) for candidate in channel.named)
-    found = [(settled.race.explained([c.variant]), len(c.variant.columns)) for c in settled.chosen]
-    return min((min(1.0, tried * float(chi2.sf(square, freedom))) for square, freedom in found), default=1.0)
-
-
-def tests_of(observations: Sequence[Observation]) -> list[int]:
-    """Number of the test of each run, counted in the order of recording."""
-    order = {name: k for k, name in enumerate(dict.fromkeys(o.test for o in observations))}
-    return [order[o.test] for o in observations]
-
-
-def _stability(channel: Channel, findings: Sequence[SourceFinding], settled: Round) -> dict[str, float]:
-    """How often each of the best sources is chosen again from part of the tests; nothing where none was chosen."""
-    if not settled.chosen:
-        return {}
-    best = {finding.name for finding in sorted(findings, key=lambda f: -f.gain)[:RIVALS]}
-    best |= {choice.candidate.name for choice in settled.chosen}
-    rivals = [candidate for candidate in channel.named if candidate.name in best]
-    return stability(
-        channel.blocks,
-        tests_of(channel.observations),
-        channel.base,
-        channel.held,
-        rivals,
-        max(settled.left.noise, SMALLEST_NOISE_MM),
-        THRESHOLD,
-        MOST_SOURCES,
-        DRAWS,
-        np.random.default_rng(len(channel.observations)),
-    )
-
-
-def _held_out(channel: Channel, chosen: Sequence[Choice], noise_mm: float, fine_mm: float) -> tuple[HeldOut, HeldOut]:
-    """Predictions of left-out tests without and with the chosen sources [mm].
-
-    Where neighbouring samples resemble each other the low harmonics, few of all, have more noise than the fine ones.
-    """
-    single = single_noise_mm(channel.observations, noise_mm, fine_mm)
-    tests = tests_of(channel.observations)
-    folds = min(FOLDS, max(tests) + 1)
-    groups = [test % folds for test in tests]
-    base = np.arange(len(channel.base.prior))
-    joint = np.concatenate([base, *(choice.variant.columns for choice in chosen)])
-    without, having = (
-        held_out(
-            channel.blocks,
-            groups,
-            channel.known,
-            active,
-            max(noise_mm, SMALLEST_NOISE_MM),
-            channel.held,
-            max(single, SMALLEST_NOISE_MM),
-        )
-        for active in (base, joint)
-    )
-    return without, having
-
-
-def single_noise_mm(observations: Sequence[Observation], noise_mm: float, fine_mm: float) -> float:
-    """Noise of a single sample, where the low harmonics, few of all, feel more of it than the fine ones [mm]."""
-    samples = float(np.mean([len(o.raw) for o in observations]))
-    low = min((2 * LOW + 1) / samples, 1.0)
-    return float(np.sqrt(low * noise_mm**2 + (1.0 - low) * min(fine_mm, noise_mm) ** 2))
-
-
-def locations_of(
-    before: Calibration, after: Calibration, found: Sequence[ErrorSource], first: Misfit, unnamed: str | None
-) -> tuple[Location, ...]:
-    """Where what the base model leaves is largest, and which strut the found sources say most of it comes from.
-
-    Args:
-        before: the base fit.
-        after: the joint fit.
-        found: sources that were named.
-        first: misfit of the base fit.
-        unnamed: variable of what has no name; None where nothing organises it.
-    """
-    fitted = [f for f in after.model.sources if f.source in found]
-    variable = next((source.varies_with for source in found if source.varies_with), unnamed or "")
-    struts = strut_contributions(before, fitted) if fitted else [None] * len(before.observations)
-    return locate(before.observations, before.residual_mm, first.noise, struts, variable)
-
-
-def shifts_between(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
-    """How far machine parameters had been pulled, largest first; nothing where nothing was found."""
-    if after is before:
-        return ()
-    row_of = {name: k for k, name in enumerate(after.layout.names)}
-    sigma = uncertainties(after, held_beside(before, after))
-    shifts = []
-    for term in before.layout.terms:
-        if term.source.belongs_to is not Owner.MACHINE:
-            continue
-        for k, parameter in enumerate(term.parameters):
-            row = row_of[term.source.name, term.shared, parameter.name]
-            old, new = before.x[term.columns.start + k], after.x[row]
-            name = f"{term.source.name} {parameter.name.removesuffix('_mm')}"
-            shifts.append(Shift(name, 1e3 * float(old), 1e3 * float(new), 1e3 * float(sigma[row])))
-    return tuple(sorted(shifts, key=lambda shift: -abs(shift.shift_um)))
-
-
-def _known_elsewhere(found: WorkspaceError | None) -> bool:
-    """Whether the joint model knows the workspace better than what it corrects there."""
-    return found is None or found.uncertainty_um < found.rms_um
-
-
-def _next_tests(
-    channel: Channel,
-    settled: Round,
-    findings: Sequence[SourceFinding],
-    *,
-    known: bool,
-) -> tuple[NextTest, ...]:
-    """Return the tests that tell most about the first source that is still open, told apart from its likenesses.
-
-    A source that was named is open too, where the joint model is not `known` well enough to be of use elsewhere.
-    """
-    variants = {c.name: c.whole(settled.race.best_variant(c, [])[0]) for c in channel.named}
-    chosen = {choice.candidate.name: choice.candidate.whole(choice.variant) for choice in settled.chosen}
-    for finding in findings:
-        likes = [name for name in finding.ambiguous_with if name in variants]
-        settled_name = finding.name in chosen and (known or len(chosen[finding.name].columns) == 1)
-        if not likes and (
-            settled_name
-            or (finding.name not in chosen and testable(settled.race, variants[finding.name], [*chosen.values()]))
-        ):
-            continue
-        beside = {**{name: variants[name] for name in likes}, **chosen}
-        beside.pop(finding.name, None)
-        asked = {finding.name: variants[finding.name], **beside}
-        # Nobody knows what a thermometer would show in a test to come: what follows one is taken as known.
-        forms = [(channel.source_of(name, variant), variant) for name, variant in asked.items()]
-        foreseen = [(source, variant) for source, variant in forms if Need.TEMPERATURE not in source.needs]
-        if not foreseen or foreseen[0][0].name != finding.name:
-            continue
-        found = propose(channel, foreseen, settled.left.noise)
-        if found:
-            return found
-    return ()

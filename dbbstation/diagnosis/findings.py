@@ -47,9 +47,9 @@ class SourceFinding:
         parameters: values with their uncertainty as fitted; for a source that was not, the best amplitudes beside those
             that were, whose uncertainty says how much could hide.
         text: one sentence for people.
-        stability: share of draws of seven tenths of the tests in which it is chosen again; None where it was not tried.
-        probability: that it is there, given the recordings and the catalogue of causes; of its class where it has one. None
-            where sets of causes were not compared.
+        probability: that it is there, given the recordings and the catalogue of causes; of its class where it has one.
+        stability: selection frequency: share of draws of seven tenths of the tests in which it is found again; None where
+            it was not tried.
         equivalent: causes that are observationally equivalent to it, itself among them; empty where there are none.
     """
 
@@ -62,8 +62,8 @@ class SourceFinding:
     rest_um: float
     parameters: dict[str, Value]
     text: str
+    probability: float
     stability: float | None = None
-    probability: float | None = None
     equivalent: tuple[str, ...] = ()
 
 
@@ -208,8 +208,7 @@ class Diagnosis:
         sources: best first.
         unexplained: what is left.
         shifts: largest first.
-        next_tests: best first, each beside those before it; empty where nothing is to be asked; None where it was not
-            looked for.
+        next_tests: best first, each beside those before it; empty where nothing is to be asked.
     """
 
     mismatch: bool
@@ -224,4 +223,4 @@ class Diagnosis:
     sources: tuple[SourceFinding, ...]
     unexplained: Unexplained
     shifts: tuple[Shift, ...]
-    next_tests: tuple[NextTest, ...] | None
+    next_tests: tuple[NextTest, ...]

@@ -16,12 +16,31 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit import Calibration
+    from dbbstation.inference.harmonics import Misfit
     from dbbstation.model.observation import Observation
-    from dbbstation.sources.contract import Effect, Fitted
+    from dbbstation.sources.contract import Effect, ErrorSource, Fitted
 
 MOST_LOCATIONS = 12
 COUNTS_SIGMA = 4.0
 """A smoothed deviation counts as misfit above this many of its standard deviations."""
+
+
+def locations_of(
+    before: Calibration, after: Calibration, found: Sequence[ErrorSource], first: Misfit, unnamed: str | None
+) -> tuple[Location, ...]:
+    """Where what the base model leaves is largest, and which strut the found sources say most of it comes from.
+
+    Args:
+        before: the base fit.
+        after: the joint fit.
+        found: sources that were named.
+        first: misfit of the base fit.
+        unnamed: variable of what has no name; None where nothing organises it.
+    """
+    fitted = [f for f in after.model.sources if f.source in found]
+    variable = next((source.varies_with for source in found if source.varies_with), unnamed or "")
+    struts = strut_contributions(before, fitted) if fitted else [None] * len(before.observations)
+    return locate(before.observations, before.residual_mm, first.noise, struts, variable)
 
 
 def locate(

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.findings import NextTest
+from dbbstation.calibration.fit import SMALLEST_NOISE_MM
+from dbbstation.diagnosis.findings import NextTest, Verdict
 from dbbstation.diagnosis.verdicts import TESTABLE_SHARE, TESTABLE_SIGMA
 from dbbstation.errors import MachineError
-from dbbstation.inference.square_root import Columns, solve
+from dbbstation.inference.square_root import solve
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Circle, Direction
@@ -22,8 +23,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.channel import Channel
-    from dbbstation.inference.race import Variant
-    from dbbstation.inference.square_root import Block
+    from dbbstation.diagnosis.explain import Explained
+    from dbbstation.diagnosis.findings import SourceFinding
+    from dbbstation.diagnosis.workspace import WorkspaceError
+    from dbbstation.inference.model_comparison import Variant
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
@@ -73,6 +76,42 @@ class Proposal:
         return ", ".join(parts)
 
 
+def next_tests(
+    explained: Explained, findings: Sequence[SourceFinding], elsewhere: WorkspaceError | None
+) -> tuple[NextTest, ...]:
+    """Return the tests that tell most about the first cause that is still open, told apart from its likenesses.
+
+    A cause that was identified is open too, where the joint model does not know the rest of the workspace better than what
+    it corrects there.
+
+    Args:
+        explained: what the comparison came to.
+        findings: one per named cause, most probable first.
+        elsewhere: what the causes change over the workspace; None where none was found.
+    """
+    channel, settled = explained.channel, explained.settled
+    known = elsewhere is None or elsewhere.uncertainty_um < elsewhere.rms_um
+    causes = {cause.name: cause for cause in settled.causes if cause.named}
+    found = {m.cause.name: channel.whole(m.cause.name, m.variant) for m in settled.members}
+    for finding in findings:
+        one_number = finding.name in found and len(found[finding.name].columns) == 1
+        if finding.verdict is Verdict.RULED_OUT or (finding.verdict is Verdict.IDENTIFIED and (known or one_number)):
+            continue
+        asked = [finding.name, *(name for name in (*finding.ambiguous_with, *found) if name in causes)]
+        others = [causes[name] for name in dict.fromkeys(asked) if name not in found]
+        scan = settled.comparison.scan(settled.best.members, others)
+        forms = found | {m.cause.name: channel.whole(m.cause.name, m.variant) for m in scan.best}
+        # Nobody knows what a thermometer would show in a test to come: what follows one is taken as known.
+        beside = [(channel.source_of(name, forms[name]), forms[name]) for name in dict.fromkeys(asked)]
+        foreseen = [(source, variant) for source, variant in beside if Need.TEMPERATURE not in source.needs]
+        if not foreseen or foreseen[0][0].name != finding.name:
+            continue
+        proposed = propose(channel, foreseen, settled.noise_mm)
+        if proposed:
+            return proposed
+    return ()
+
+
 def propose(
     channel: Channel, asked: Sequence[tuple[ErrorSource, Variant]], noise_mm: float, most: int = MOST_PROPOSED
 ) -> tuple[NextTest, ...]:
@@ -95,17 +134,18 @@ def propose(
     if not all(source.needs <= PROPOSED for source, _ in asked):
         return ()
     source, variant = asked[0]
-    known = channel.known
     first = len(channel.base.prior)
-    wanted = np.concatenate([np.arange(first), *(v.columns for _, v in asked)])
-    used = Columns(known.prior[wanted], known.scale[wanted], known.random[wanted])
-    covariance = solve(_thin([channel.joined], wanted), used, noise_mm, channel.held).covariance
+    variants = [variant for _, variant in asked]
+    known = channel.known_with(variants)
+    blocks = channel.blocks(channel.columns_of(variants), np.zeros(channel.runs[-1].stop))
+    noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
+    covariance = solve(blocks, known, noise_mm, channel.held).covariance
     ends_s = _ends_s(channel)
     own = slice(first, first + len(variant.columns))
 
     def seen(proposal: Proposal, runs: slice) -> NDArray[np.float64]:
         motions = _motions(proposal, ends_s)[runs]
-        return np.vstack([_rows(channel, asked, motion, len(wanted)) for motion in motions])
+        return np.vstack([_rows(channel, asked, motion, len(known.prior)) for motion in motions])
 
     def left(rows: NDArray[np.float64]) -> float:
         return _size(_told(covariance, rows, noise_mm, own), variant)
@@ -256,14 +296,14 @@ def _rows(
         parameters = source.parameters(channel.machine)
         amplitudes = [k for k, p in enumerate(parameters) if not p.shape]
         values = np.zeros(len(parameters))
-        values[[k for k, p in enumerate(parameters) if p.shape]] = variant.shape
+        values[[k for k, p in enumerate(parameters) if p.shape]] = variant.nonlinear
         derivative = reading.by_source(source, channel.machine, values)
         # A source of the measurement has further sets, of other sessions and mountings, which this run does not touch.
         rows[:, place : place + len(amplitudes)] = derivative[:, amplitudes]
         place += len(variant.columns)
-    for term in channel.layout.terms:
+    for term in channel.calibration.layout.terms:
         if term.acts_on(motion):
-            zero = channel.layout.nominal[term.columns]
+            zero = channel.calibration.layout.nominal[term.columns]
             rows[:, term.columns] = reading.by_source(term.source, channel.machine, zero)
     ball, _ = np.linalg.qr(reading.sensitivity.direction[motion.kept])
     rows -= ball @ (ball.T @ rows)
@@ -274,14 +314,3 @@ def _rows(
     compressed = np.zeros((len(triangle), columns))
     compressed[:, touched] = triangle
     return compressed
-
-
-def _thin(blocks: Sequence[Block], wanted: NDArray[np.int64]) -> list[Block]:
-    """Blocks with the wanted columns only, numbered by their place among them."""
-    place = {int(column): k for k, column in enumerate(wanted)}
-    thin = []
-    for block in blocks:
-        inside = np.array([int(c) in place for c in block.columns], dtype=bool)
-        columns = np.array([place[int(c)] for c in block.columns[inside]], dtype=np.int64)
-        thin.append(replace(block, columns=columns, triangle=block.triangle[:, inside]))
-    return thin

@@ -63,7 +63,7 @@ def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[
             for shift in diagnosis.shifts
         ],
         "next_test": _next_test(diagnosis.next_tests[0]) if diagnosis.next_tests else None,
-        "further_tests": None if diagnosis.next_tests is None else [_next_test(t) for t in diagnosis.next_tests[1:]],
+        "further_tests": [_next_test(t) for t in diagnosis.next_tests[1:]],
     }
 
 
@@ -161,20 +161,15 @@ def _source(source: SourceFinding) -> dict[str, Any]:
         "unconcealed_rms_um": source.rest_um,
         "gain": source.gain,
         "stability": source.stability,
-        **_probability(source),
+        "probability": source.probability,
+        "class": list(source.equivalent),
+        "log_evidence": source.gain,
         "parameters": {
             name: {"value": v.value, "uncertainty": v.uncertainty, "unit": v.unit}
             for name, v in source.parameters.items()
         },
         "text": source.text,
     }
-
-
-def _probability(source: SourceFinding) -> dict[str, Any]:
-    """Keys of a source that sets of causes were compared for."""
-    if source.probability is None:
-        return {}
-    return {"probability": source.probability, "class": list(source.equivalent), "log_evidence": source.gain}
 
 
 def _lacking(name: str, why: str) -> dict[str, Any]:
@@ -185,6 +180,9 @@ def _lacking(name: str, why: str) -> dict[str, Any]:
         "concealed": None,
         "gain": None,
         "stability": None,
+        "probability": None,
+        "class": [],
+        "log_evidence": None,
         "parameters": {},
         "text": why,
     }

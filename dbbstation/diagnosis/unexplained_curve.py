@@ -1,6 +1,6 @@
 """The curve of an error without a name: its values along the variable that organises it, with their uncertainty.
 
-Amplitudes are those of the race, with the kinematic parameters, mountings, balls and bar fitted anew beside them. What
+Amplitudes are those of the most probable set of causes, with the kinematic parameters, mountings, balls and bar fitted anew beside them. What
 these can make of a curve cannot be told from them, so it is taken out by convention: a constant of everything, which is
 a strut's reference length or the bar's offset, and of a curve over strut length also a slope, which joints can do almost
 whole. What is printed is the curve less the straight line (or constant) that fits it best over all readings.
@@ -20,14 +20,17 @@ from dbbstation.diagnosis.findings import Curve, CurvePoint
 from dbbstation.diagnosis.forms import HATS, Hats, Plane, PlaneStep
 from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, READING, TABLE, TOOL, UNITS
 from dbbstation.inference.concealment import concealment
+from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
+    from dbbstation.diagnosis.channel import Channel
+    from dbbstation.diagnosis.explain import Settled
     from dbbstation.diagnosis.shapes import Samples, Shape
-    from dbbstation.diagnosis.unnamed import Best, Unnamed
-    from dbbstation.inference.race import Amplitudes
 
 LINE_OUT = "less the straight line that fits it best over the readings: joints and reference length make that"
 MEAN_OUT = {
@@ -51,24 +54,29 @@ AXES = {
 """How a direction is told, by what moves."""
 
 
-def curve_of(of: Unnamed, best: Best) -> Curve:
-    """Return the curve of the shape that was found.
+def curve_of(channel: Channel, settled: Settled, member: Member) -> Curve:
+    """Return the curve of an unmodelled effect.
 
     Args:
-        of: all shapes about the fit that it was found on.
-        best: the shape.
+        channel: of all columns.
+        settled: what the comparison came to.
+        member: of its most probable hypothesis, the effect.
     """
-    shape, variant = best.shape, best.variant
+    shape, runs, comparison = settled.unmodelled.shapes[member.cause.name], settled.unmodelled.runs, settled.comparison
+    others, columns = settled.best.without(member.cause.name), member.variant.columns
     sized = max(
-        (replace(variant, prior=size * variant.prior) for size in SIZES), key=lambda one: of.race.evidence([one])
+        (replace(member, scale=size * member.scale) for size in SIZES),
+        key=lambda one: comparison.log_evidence([one, *others]),
     )
-    found = of.race.amplitudes([sized])
-    amplitudes, to_points, at, words = _along(of, shape, found)
-    values, covariance = to_points @ amplitudes, to_points @ found.covariance @ to_points.T
-    covariance = covariance + np.eye(len(at)) * _not_followed(of, best) * np.mean(values**2)
-    machine = np.flatnonzero(~of.base.random)
-    free = free_directions(of.base, machine, of.held)
-    signature = concealment([of.block], machine, variant.columns, amplitudes, free)
+    found = comparison.estimates([sized, *others])
+    amplitudes, to_points, at, words = _along(runs, shape, found.values[: len(columns)])
+    spread = found.covariance[: len(columns), : len(columns)]
+    values, covariance = to_points @ amplitudes, to_points @ spread @ to_points.T
+    covariance = covariance + np.eye(len(at)) * _not_followed(settled, member) * np.mean(values**2)
+    known, machine = channel.base, np.flatnonzero(~channel.base.random)
+    free = free_directions(known, machine, channel.held)
+    blocks = channel.blocks(columns, np.zeros(channel.runs[-1].stop))
+    signature = concealment(blocks, machine, len(known.prior) + np.arange(len(columns)), amplitudes, free)
     return Curve(
         variable=shape.name,
         unit=UNITS[shape.variable],
@@ -85,28 +93,35 @@ def curve_of(of: Unnamed, best: Best) -> Curve:
     )
 
 
-def _not_followed(of: Unnamed, best: Best) -> float:
+def _not_followed(settled: Settled, member: Member) -> float:
     """Structured sum of squares that the curve leaves to all other curves together, over what it explains itself.
 
     A curve with a kink between two points, or another error beside this one, spoils the values more than noise does:
     each point is then uncertain by that share of the curve's own size.
     """
     # Those picked from many forms would find something in noise as well: more than one for each amplitude.
-    every = [variant for shape, variant in of.shapes if shape.tried == 1.0 or shape is best.shape]
-    own = of.race.explained([best.variant])
-    more = of.race.explained(every) - sum(len(other.columns) for other in every) - own
+    unmodelled, comparison = settled.unmodelled, settled.comparison
+    others = settled.best.without(member.cause.name)
+    every = [
+        Member(cause, cause.variants[0], member.scale)
+        for cause in unmodelled.causes
+        if unmodelled.shapes[cause.name].tried == 1.0 or cause is member.cause
+    ]
+    without = comparison.explained(others)
+    own = comparison.explained([member, *others]) - without
+    more = comparison.explained([*every, *others]) - without - sum(len(one.variant.columns) for one in every) - own
     return max(more, 0.0) / max(own, 1e-300)
 
 
 def _along(
-    of: Unnamed, shape: Shape, found: Amplitudes
+    runs: Sequence[Samples], shape: Shape, found: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], str]:
     """Amplitudes less what is conventional, matrix from them to the points, places of the points, and words."""
-    keep, convention = _convention(of, shape)
-    directions = len(found.values) // shape.form.count
-    amplitudes = np.kron(np.eye(directions), keep) @ found.values
+    keep, convention = _convention(runs, shape)
+    directions = len(found) // shape.form.count
+    amplitudes = np.kron(np.eye(directions), keep) @ found
     left, _, right = np.linalg.svd(amplitudes.reshape(directions, -1))
-    at, curve, over = _over(of, shape, right[0])
+    at, curve, over = _over(runs, shape, right[0])
     way, towards = np.ones(1), ""
     if shape.moves in AXES:
         # Signs so that the greatest part of the direction is positive.
@@ -116,21 +131,23 @@ def _along(
     return amplitudes, np.asarray(np.kron(way, curve @ keep), dtype=np.float64), at, words
 
 
-def _convention(of: Unnamed, shape: Shape) -> tuple[NDArray[np.float64], str]:
+def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float64], str]:
     """Matrix that takes what is conventional out of the amplitudes of a curve, and what that is."""
     count = shape.form.count
     if not isinstance(shape.form, Hats) or shape.moves not in MEAN_OUT:
         return np.eye(count), ""
     straight = shape.variable == "strut-length"
-    line = _line(np.linspace(-1.0, 1.0, count), _weights(of, shape), int(straight))
+    line = _line(np.linspace(-1.0, 1.0, count), _weights(runs, shape), int(straight))
     return np.eye(count) - line, LINE_OUT if straight else MEAN_OUT[shape.moves]
 
 
-def _over(of: Unnamed, shape: Shape, line: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
+def _over(
+    runs: Sequence[Samples], shape: Shape, line: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
     """Points of the variable, matrix from amplitudes of one direction to them, and along what they lie.
 
     Args:
-        of: all shapes about the fit.
+        runs: as shapes see them.
         shape: whose curve it is.
         line: amplitudes of the direction that moves most, shape (p,).
     """
@@ -138,10 +155,10 @@ def _over(of: Unnamed, shape: Shape, line: NDArray[np.float64]) -> tuple[NDArray
     if isinstance(form, Plane | PlaneStep):
         flat = form.across if isinstance(form, PlaneStep) else line[: form.coordinates]
         flat = flat / max(float(np.linalg.norm(flat)), 1e-12)
-        at = form.points(*_extent(of, shape, flat))
+        at = form.points(*_extent(runs, shape, flat))
         towards = np.degrees(np.arctan2(flat[1], flat[0]))
         return at, form.columns(at[:, None] * flat), f"over the line at {towards:.0f} deg to {_AXIS[shape.variable]}"
-    at = form.points(*_extent(of, shape, None))
+    at = form.points(*_extent(runs, shape, None))
     words = "negative angles are those of clockwise runs" if shape.variable == "angle since the start" else ""
     return at, form.columns(at), words
 
@@ -162,13 +179,13 @@ def _values(shape: Shape, run: Samples) -> NDArray[np.float64]:
     return values[:, shape.strut - 1] if shape.variable in OF_STRUTS and shape.strut else values
 
 
-def _weights(of: Unnamed, shape: Shape) -> NDArray[np.float64]:
+def _weights(runs: Sequence[Samples], shape: Shape) -> NDArray[np.float64]:
     """How many readings lie about each point of a piecewise linear curve, shape (7,)."""
-    return np.asarray(sum(shape.form.columns(_values(shape, run)).reshape(-1, HATS).sum(axis=0) for run in of.runs))
+    return np.asarray(sum(shape.form.columns(_values(shape, run)).reshape(-1, HATS).sum(axis=0) for run in runs))
 
 
-def _extent(of: Unnamed, shape: Shape, flat: NDArray[np.float64] | None) -> tuple[float, float]:
+def _extent(runs: Sequence[Samples], shape: Shape, flat: NDArray[np.float64] | None) -> tuple[float, float]:
     """Least and greatest value of the variable over all runs, of a place along one direction in its plane."""
-    values = [_values(shape, run) for run in of.runs]
+    values = [_values(shape, run) for run in runs]
     along = values if flat is None else [value @ flat for value in values]
     return float(min(one.min() for one in along)), float(max(one.max() for one in along))

@@ -1,276 +1,257 @@
-"""Verdicts on sources."""
+"""Verdicts read off the probabilities of sets of causes. Nothing rewrites them afterwards."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.outlier import SOURCE_OF
-from dbbstation.diagnosis.findings import SourceFinding, Unexplained, Value, Verdict
+from dbbstation.diagnosis.explain import SURE
+from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties
-from dbbstation.diagnosis.shapes import variable_of
 from dbbstation.inference.concealment import concealment
-from dbbstation.inference.race import AS_GOOD, Race, as_good, contained, worth_of
 from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.fit import Calibration
-    from dbbstation.calibration.outlier import Outlier
-    from dbbstation.diagnosis.channel import Channel
-    from dbbstation.inference.race import Choice, Variant
-    from dbbstation.machine.geometry import Machine
-    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.diagnosis.explain import Explained, Settled
+    from dbbstation.inference.model_comparison import Cause, Member
 
 TESTABLE_SIGMA = 5.0
-"""An amplitude of the plausible size must stand so far out of its standard deviation for a source to be testable."""
+"""An amplitude of the plausible size must stand so far out of its standard deviation for a cause to be testable."""
 
 TESTABLE_SHARE = 0.5
-"""Share of the combinations of a source's amplitudes that must be seen for the source to be ruled out."""
+"""Share of the combinations of a cause's amplitudes that must be seen for the cause to be ruled out."""
 
-FEW = 8
-"""Amplitudes of a source, as those of one strut, up to which explaining the same makes it as likely as another."""
+EQUIVALENT = 0.999
+"""Cosine between the effects of two causes, beside base and other causes, from which on no test of these tells one from the
+other: what is left of one beside the other is 4.5 % of it, about what real machines depart from a formula."""
 
-OWN_LAW = 0.02
-"""Share of its log evidence by which one source that grows with time must be better than another."""
+EVEN = 0.5
+"""Probability from which on a cause that is not certain is rather there than not."""
 
-MAKES_UP = 0.2
-"""Share of another's evidence below which a source that grows with time may only make up for its law: a warm-up in two stages
-calls for a second source with a seventh of what the first brings."""
-
-ROUGHLY = 0.025
-"""Share of the evidence of a source of a rough law below which any other may only make up for it: beside single causes, ten times
-as large as what is just seen, up to 0.022."""
-
-CROWD = 3
-"""Causes at once that are more than happens."""
-
-OUTWEIGHS = 10.0
-"""By how much a first cause must outweigh what all others bring, to stand beside them."""
+MOST_ALTERNATIVES = 6
+"""Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
 
 
-def testable(race: Race, variant: Variant, others: Sequence[Variant]) -> bool:
-    """Whether plausible amplitudes of a source would be seen beside the base and others.
-
-    A source with many amplitudes may be seen along some of their combinations only: half of them have to be.
-    """
-    seen = race.visible(variant, others) >= TESTABLE_SIGMA
-    return bool(np.mean(seen) >= TESTABLE_SHARE)
+NOT_SURE = "It may be there; these tests are not sure of it."
 
 
-def judge(
-    channel: Channel,
-    race: Race,
-    joint: Channel,
-    noise_mm: float,
-    chosen: Sequence[Choice],
-    sources: dict[str, ErrorSource],
-    after: Calibration,
-) -> tuple[SourceFinding, ...]:
-    """One finding per named source, best first.
+def judge(explained: Explained) -> tuple[SourceFinding, ...]:
+    """One finding per named cause, most probable first."""
+    return _Judge(explained).findings()
 
-    Args:
-        channel: about the base fit.
-        race: of that channel, with the noise that is left in the end.
-        joint: the channel about the joint fit; what was not chosen is judged there, beside exact values of what was.
-        noise_mm: of one sample, in the end [mm].
-        chosen: sources that were found.
-        sources: by name.
-        after: joint fit.
-    """
-    # The joint fit keeps the base's columns where they were and adds those of the chosen behind.
-    machine_columns = np.flatnonzero(~channel.base.random)
-    free = free_directions(channel.base, machine_columns, channel.held)
-    names = [choice.candidate.name for choice in chosen]
-    likes = _likenesses(race, chosen, channel, sources)
-    rest = joint.race(noise_mm)
-    on_joint = {candidate.name: candidate for candidate in joint.named}
-    findings = []
-    for candidate in channel.named:
-        source = sources[candidate.name]
-        alike = likes.get(candidate.name, ())
-        if candidate.name in names:
-            others = [c.variant for c in chosen if c.candidate.name != candidate.name]
-            _, together = race.best_variant(candidate, others)
-            gain = together - race.evidence(others)
-            signature = concealment([joint.joined], machine_columns, *_fitted_amplitudes(after, candidate.name), free)
-            values = _fitted_values(after, candidate.name)
-            verdict = Verdict.AMBIGUOUS if alike else Verdict.IDENTIFIED
+
+class _Judge:
+    def __init__(self, explained: Explained) -> None:
+        self._explained = explained
+        self._channel = explained.channel
+        self._settled: Settled = explained.settled
+        self._best = explained.settled.best
+        self._named = {cause.name: cause for cause in explained.settled.causes if cause.named}
+        self._classes = {m.cause.name: self._class(m) for m in self._settled.members}
+        self._ambiguities = {
+            name: self._ambiguity(name) for name, equal in self._classes.items() if self._probability(equal) < SURE
+        }
+        self._rivals = {name: self._beside(c) for name, c in self._named.items() if name not in self._classes}
+        self._effects = {name: self._effect(name) for name in self._named}
+        # One compression of all runs serves the signatures of all causes.
+        self._columns = np.unique(np.concatenate([columns for columns, _ in self._effects.values()]))
+        self._blocks = self._channel.blocks(self._columns, np.zeros(self._channel.runs[-1].stop))
+
+    def findings(self) -> tuple[SourceFinding, ...]:
+        """All of them."""
+        found = [self._finding(cause) for cause in self._named.values()]
+        order = [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT]
+        return tuple(sorted(found, key=lambda f: (order.index(f.verdict), -f.gain)))
+
+    def _finding(self, cause: Cause) -> SourceFinding:
+        name = cause.name
+        member = next((m for m in self._settled.members if m.cause.name == name), None)
+        verdict, alike, equal, text = self._verdict(name)
+        probability = self._probability(equal or (name,))
+        source = self._channel.sources[name, member.variant.law if member else cause.variants[0].law]
+        if member is None:
+            rival = self._rivals[name]
+            gain, values = rival[0], self._would_be(rival[1])
         else:
-            beside = on_joint[candidate.name]
-            variant, gain = rest.best_variant(beside, [])
-            variant = beside.whole(variant)
-            values = _best_values(joint.source_of(source.name, variant), channel.machine, rest, variant)
-            seen = testable(rest, variant, [])
-            verdict = Verdict.RULED_OUT if seen else Verdict.NOT_TESTABLE
-            verdict = Verdict.AMBIGUOUS if alike else verdict
-            variant = candidate.whole(race.best_variant(candidate, [])[0])
-            signature = concealment([channel.joined], machine_columns, variant.columns, variant.plausible, free)
-        findings.append(
-            SourceFinding(
-                name=candidate.name,
-                verdict=verdict,
-                ambiguous_with=alike,
-                gain=gain,
-                concealed=signature.share,
-                whole_um=1e3 * signature.whole_rms,
-                rest_um=1e3 * signature.rest_rms,
-                parameters=values,
-                text=_text(source, verdict, alike),
-            )
+            gain, values = self._best.log_factor(name), self._fitted(name)
+        signature = self._signature(name)
+        if verdict is Verdict.IDENTIFIED:
+            text = f"{source.texts.what} {source.texts.confirm}"
+        elif verdict is Verdict.AMBIGUOUS:
+            text = f"{text} {source.texts.confirm}"
+        return SourceFinding(
+            name=name,
+            verdict=verdict,
+            ambiguous_with=alike,
+            gain=gain,
+            concealed=signature[0],
+            whole_um=signature[1],
+            rest_um=signature[2],
+            parameters=values,
+            text=text,
+            probability=probability,
+            equivalent=equal,
         )
-    order = [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT]
-    return tuple(sorted(findings, key=lambda f: (order.index(f.verdict), -f.gain)))
 
+    def _verdict(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
+        """Verdict, with whom it is ambiguous, its class, and why."""
+        if name in self._classes:
+            return self._verdict_of_member(name)
+        for own, equal in self._classes.items():
+            if name in equal:
+                text = f"It is observationally equivalent to {own}: no test of this plan tells one from the other."
+                return Verdict.AMBIGUOUS, tuple(n for n in equal if n != name), equal, text
+        for ambiguity in self._ambiguities.values():
+            if name in ambiguity:
+                others = tuple(other for other in ambiguity if other != name)
+                return Verdict.AMBIGUOUS, others, (), f"These tests cannot tell it from {', '.join(others)}."
+        if self._probability((name,)) >= EVEN:
+            return Verdict.AMBIGUOUS, (), (), NOT_SURE
+        if self._testable(name):
+            return Verdict.RULED_OUT, (), (), "It would have been seen at its usual size and was not needed."
+        return Verdict.NOT_TESTABLE, (), (), self._why_not_testable(name)
 
-def _likenesses(
-    race: Race, chosen: Sequence[Choice], channel: Channel, sources: Mapping[str, ErrorSource]
-) -> dict[str, tuple[str, ...]]:
-    """Sources that would do about as well in the place of a chosen one, both ways round.
+    def _verdict_of_member(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
+        """The same of a cause of the most probable hypothesis."""
+        equal = self._classes[name]
+        shown = equal if len(equal) > 1 else ()
+        if self._probability(equal) >= SURE:
+            return Verdict.IDENTIFIED, (), shown, ""
+        others = tuple(other for other in self._ambiguities[name] if other != name)
+        text = f"These tests cannot tell it from {', '.join(others)}." if others else NOT_SURE
+        return Verdict.AMBIGUOUS, others, shown, text
 
-    What grows with time follows a law of its own in every machine; how exactly one of the laws that are tried fits
-    does not tell one such source from another.
-    """
-    likes: dict[str, list[str]] = {}
-    for choice in chosen:
-        own = choice.candidate.name
-        follows = channel.source_of(own, choice.variant).varies_with
-        lawful = [c for c in channel.named if {follows, sources[c.name].varies_with} == {"time"}]
-        others = [c for c in channel.named if c not in lawful]
-        alike = as_good(race, chosen, choice, others, AS_GOOD)
-        if lawful:
-            alike += as_good(race, chosen, choice, lawful, max(AS_GOOD, OWN_LAW * worth_of(race, chosen, choice)))
-        if any(v.columns.size < choice.candidate.whole(v).columns.size for v in choice.candidate.variants):
-            # A source of struts: what others do to the same struts may look the same.
-            alike = tuple(dict.fromkeys((*alike, *contained(race, chosen, choice, channel.named, FEW))))
-        for rival in alike:
-            likes.setdefault(own, []).append(rival)
-            likes.setdefault(rival, []).append(own)
-    return {name: tuple(sorted(alike)) for name, alike in likes.items()}
+    def _probability(self, names: Iterable[str]) -> float:
+        return self._settled.posterior.probability(names)
 
+    def _ambiguity(self, name: str) -> tuple[str, ...]:
+        """Causes of which one is there for sure, if not this one; itself alone where there are none such."""
+        posterior = self._settled.posterior
+        alone: dict[str, float] = {}
+        for cause in self._settled.causes:
+            if cause.name not in self._best.names:
+                own = cause.name
+                alone[own] = posterior.probability_of(lambda key, own=own: own in key and name not in key)  # type: ignore[misc]
+        chosen = list(self._classes[name])
+        for other in sorted(alone, key=lambda n: -alone[n]):
+            if self._probability(chosen) >= SURE or len(chosen) > MOST_ALTERNATIVES:
+                break
+            chosen.append(other)
+        if self._probability(chosen) < SURE:
+            return (name,)
+        return tuple(self._in_words(one) for one in chosen)
 
-def _fitted_values(after: Calibration, name: str) -> dict[str, Value]:
-    sigma = uncertainties(after, after.solution.held)
-    values: dict[str, Value] = {}
-    for term in after.layout.terms:
-        if term.source.name == name:
+    def _in_words(self, name: str) -> str:
+        """Name of a cause; of an unmodelled effect the variable that it follows."""
+        shape = self._settled.unmodelled.shapes.get(name)
+        return name if shape is None else f"an unmodelled effect over {shape.name}"
+
+    def _class(self, member: Member) -> tuple[str, ...]:
+        """Causes whose effects no test of these tells from those of a member, itself first."""
+        others = self._best.without(member.cause.name)
+        scan = self._settled.comparison.scan(
+            others, [c for name, c in self._named.items() if name not in self._best.names]
+        )
+        size = len(member.variant.columns)
+        rivals = [r for r in scan.best if len(r.variant.columns) == size and self._same(member, r, others)]
+        return (member.cause.name, *(rival.cause.name for rival in rivals))
+
+    def _same(self, one: Member, other: Member, others: tuple[Member, ...]) -> bool:
+        """Whether two causes of as many amplitudes span the same effects beside base and others."""
+        columns = np.concatenate([one.variant.columns, other.variant.columns])
+        products = self._settled.comparison.beside(others, columns)
+        size = len(one.variant.columns)
+        a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
+        half_a, half_b = _inverse_root(a), _inverse_root(b)
+        cosines = np.linalg.svd(half_a @ across @ half_b, compute_uv=False)
+        return bool(cosines.min(initial=1.0) > EQUIVALENT)
+
+    def _testable(self, name: str) -> bool:
+        """Whether plausible amplitudes would be seen beside base and causes; half of their combinations at least."""
+        others = self._best.without(name)
+        whole = max(self._named[name].variants, key=lambda v: len(v.columns))
+        products = self._settled.comparison.beside(others, whole.columns)
+        scaled = whole.plausible[:, None] * products * whole.plausible
+        seen = np.sqrt(np.maximum(np.linalg.eigvalsh(scaled), 0.0)) >= TESTABLE_SIGMA
+        return bool(np.mean(seen) >= TESTABLE_SHARE)
+
+    def _why_not_testable(self, name: str) -> str:
+        for member in self._settled.members:
+            products = self._settled.comparison.beside(
+                self._best.without(member.cause.name), self._named[name].variants[0].columns
+            )
+            plausible = self._named[name].variants[0].plausible
+            scaled = plausible[:, None] * products * plausible
+            if np.sqrt(max(float(np.linalg.eigvalsh(scaled)[-1]), 0.0)) >= TESTABLE_SIGMA:
+                return f"Beside {member.cause.name}, and what its formula may be off by, these tests would not see it."
+        return "These tests would not see it at its usual size: the fitted parameters conceal it."
+
+    def _beside(self, cause: Cause) -> tuple[float, Member]:
+        """Log Bayes factor of a cause beside the most probable hypothesis, and the form that suits it best there."""
+        scan = self._settled.comparison.scan(self._best.members, [cause])
+        return float(scan.log_factor[0]), scan.best[0]
+
+    def _effect(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Columns of a cause and its amplitudes: as found, or as plausible where it is not one of the hypothesis."""
+        if name in self._rivals:
+            variant = self._rivals[name][1].variant
+            return variant.columns, variant.plausible
+        member = next(m for m in self._settled.members if m.cause.name == name)
+        columns = member.variant.columns
+        found = self._settled.comparison.estimates([member, *self._best.without(name)])
+        return columns, found.values[: len(columns)]
+
+    def _signature(self, name: str) -> tuple[float, float, float]:
+        """Concealed share of an effect, its root mean square, and that of what is not concealed [µm]."""
+        base, (columns, amplitudes) = self._channel.base, self._effects[name]
+        machine = np.flatnonzero(~base.random)
+        free = free_directions(base, machine, self._channel.held)
+        own = len(base.prior) + np.searchsorted(self._columns, columns)
+        found = concealment(self._blocks, machine, own, amplitudes, free)
+        return found.share, 1e3 * found.whole_rms, 1e3 * found.rest_rms
+
+    def _fitted(self, name: str) -> dict[str, Value]:
+        """Values of a cause in the joint fit; what its formula may be off by is part of their uncertainty."""
+        after = self._settled.after
+        sigma = uncertainties(after, after.solution.held)
+        values: dict[str, Value] = {}
+        for term in after.layout.terms:
+            if term.source.name != name:
+                continue
             for k, parameter in enumerate(term.parameters):
                 column = term.columns.start + k
                 key = parameter.name if not values.get(parameter.name) else f"{parameter.name} ({term.shared})"
-                values[key] = Value(float(after.x[column]), float(sigma[column]), parameter.unit)
-    return values
+                found = float(after.x[column])
+                form = 0.0 if parameter.shape else term.source.form_uncertainty * abs(found)
+                values[key] = Value(found, float(np.hypot(sigma[column], form)), parameter.unit)
+        return values
+
+    def _would_be(self, member: Member) -> dict[str, Value]:
+        """Best amplitudes of a cause beside the others, with the uncertainty that says how much could hide."""
+        source = self._channel.source_of(member.cause.name, member.variant)
+        found = self._settled.comparison.estimates([member, *self._best.without(member.cause.name)])
+        own = len(member.variant.columns)
+        spread = self._channel.to_whole(member.variant)
+        values = spread @ found.values[:own]
+        covariance = spread @ found.covariance[:own, :own] @ spread.T
+        amplitudes = [p for p in source.parameters(self._channel.machine) if not p.shape]
+        return {
+            p.name: Value(float(values[k]), float(np.sqrt(max(covariance[k, k], 0.0))), p.unit)
+            for k, p in enumerate(amplitudes)
+        }
 
 
-def _fitted_amplitudes(after: Calibration, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Columns of a source's amplitudes in the joint fit and their values: its signature with its shape as fitted."""
-    columns, _ = after.layout.columns_of(name)
-    return columns, after.x[columns]
+def _inverse_root(products: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse square root of products of columns; directions that are nothing are left out."""
+    value, axes = np.linalg.eigh(products)
+    usable = value > RANK * max(float(value[-1]), 1e-300)
+    return np.asarray((axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T, dtype=np.float64)
 
 
-def _best_values(source: ErrorSource, machine: Machine, race: Race, variant: Variant) -> dict[str, Value]:
-    """Best amplitudes of a source that was not chosen, with the uncertainties that say how much could hide."""
-    found = race.amplitudes([variant])
-    amplitudes = [p for p in source.parameters(machine) if not p.shape]
-    sigma = np.sqrt(np.diag(found.covariance))
-    return {p.name: Value(float(found.values[k]), float(sigma[k]), p.unit) for k, p in enumerate(amplitudes)}
-
-
-def _text(source: ErrorSource, verdict: Verdict, alike: Sequence[str]) -> str:
-    if verdict is Verdict.IDENTIFIED:
-        return f"{source.texts.what} {source.texts.confirm}"
-    if verdict is Verdict.AMBIGUOUS:
-        return f"These tests cannot tell it from {', '.join(alike)}. {source.texts.confirm}"
-    if verdict is Verdict.NOT_TESTABLE:
-        return "These tests would not see it at its usual size: the fitted parameters swallow it."
-    return "It would have been seen at its usual size and was not needed."
-
-
-def doubted(
-    findings: Sequence[SourceFinding], rest: Unexplained, sources: Mapping[str, ErrorSource]
-) -> tuple[SourceFinding, ...]:
-    """Findings where several named sources may be one whose law is not quite what the machine does.
-
-    A warm-up in two stages, for instance: another source that follows the same variable is then called in to make up for
-    that. Where this variable still organises what is left, each of them stands, but not beside the others. Where all is
-    explained, but of what grows with time one source brings little beside another, that one is in doubt; and so is any that
-    brings very little beside a loud one whose law is rough.
-
-    Args:
-        findings: as judged.
-        rest: what is left.
-        sources: by name.
-    """
-    said = [f for f in findings if f.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}]
-    follows = {f.name: sources[f.name].varies_with for f in said}
-    grows = [f for f in said if follows[f.name] in {"time", "temperature"} and f.gain > AS_GOOD]
-    first = max(grows, key=lambda f: f.gain, default=None)
-    variable = variable_of(rest.variable) if rest.variable else ""
-    variable = "temperature" if variable.endswith("-temperature") else variable
-    of_it = {name for name, own in follows.items() if variable and own == variable}
-    # A law over time may be another one; thermometers are what they are, only coarse.
-    lawful = first is None or follows[first.name] == "time"
-    if lawful and len(of_it) > 1:
-        return _not_beside(findings, of_it, f"What is left follows {variable} too, so it")
-    little = {f.name for f in grows if first is not None and f.gain < MAKES_UP * first.gain}
-    if first is not None and little:
-        findings = _not_beside(findings, little, f"It brings little beside {first.name}, so it", (first.name,))
-    loud = max((f for f in said if sources[f.name].rough), key=lambda f: f.gain, default=None)
-    if loud is None:
-        return tuple(findings)
-    beside = [f for f in said if f.name not in {loud.name, *loud.ambiguous_with} and f.gain > AS_GOOD]
-    faint = {f.name for f in beside if f.gain < ROUGHLY * loud.gain}
-    return _not_beside(findings, faint, f"It brings very little beside {loud.name}, so it", (loud.name,))
-
-
-def _not_beside(
-    findings: Sequence[SourceFinding], names: set[str], why: str, sure: tuple[str, ...] = ()
-) -> tuple[SourceFinding, ...]:
-    """Findings of which those named are in doubt: beside those that are sure, or beside each other where none is."""
-    told = []
-    for finding in findings:
-        alike = tuple(sorted({*(sure or names), *finding.ambiguous_with} - {finding.name}))
-        text = f"{why} may only make up for another law of {', '.join(sure or alike)}."
-        doubtful = replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text)
-        told.append(doubtful if finding.name in names else finding)
-    return tuple(told)
-
-
-def beside_outliers(findings: Sequence[SourceFinding], outliers: Sequence[Outlier]) -> tuple[SourceFinding, ...]:
-    """Findings where a ball or bar that was set free might be one of the sources as well: neither is sure then."""
-    told = []
-    for finding in findings:
-        alike = tuple(SOURCE_OF[o.kind] for o in outliers if finding.name in o.alike)
-        if alike and finding.verdict in {Verdict.RULED_OUT, Verdict.NOT_TESTABLE}:
-            text = f"These tests cannot tell it from {', '.join(alike)}."
-            told.append(replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=alike, text=text))
-        else:
-            told.append(finding)
-    return tuple(told)
-
-
-def crowded(findings: Sequence[SourceFinding], chosen: Sequence[Choice], race: Race) -> tuple[SourceFinding, ...]:
-    """Findings where three causes or more were needed at once.
-
-    Two happen. Three that none of the others outweighs are more likely one that has no name, put together from what
-    has: each may be there, and none of them is sure. A first one that outweighs all others by far stands.
-    """
-    if len(chosen) < CROWD:
-        return tuple(findings)
-    variants = [choice.variant for choice in chosen]
-    sure = OUTWEIGHS * (race.evidence(variants) - race.evidence(variants[:1])) < race.evidence(variants[:1])
-    names = [choice.candidate.name for choice in chosen]
-    doubtful = set(names[1:] if sure else names)
-    told = []
-    for finding in findings:
-        if finding.name not in doubtful or finding.verdict is not Verdict.IDENTIFIED:
-            told.append(finding)
-            continue
-        others = tuple(sorted(doubtful - {finding.name}))
-        text = f"Several causes are needed together, with {', '.join(others)}: one without a name may be behind them."
-        told.append(replace(finding, verdict=Verdict.AMBIGUOUS, ambiguous_with=others, text=text))
-    return tuple(told)
+RANK = 1e-9
+"""Rank tolerance: share of the largest eigenvalue below which a direction says nothing."""

@@ -23,7 +23,8 @@ from dbbstation.files.session_file import BarSchema, ProgramSchema, RunSchema, S
 from dbbstation.files.session_set_up import SetUpReadings, check_set_up_errors, mounted_name, set_up_readings
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
-from dbbstation.trace.loss import AFTER_LOSS, lost_samples, too_many_lost
+from dbbstation.trace.cut import lost_on_turn
+from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -235,7 +236,7 @@ class SessionFolder:
 
     def loss(self, run: RunEntry, recording: Recording) -> list[Problem]:
         """Return what is to be said of samples that a run lost, where they are more than the plan allows."""
-        lost, kept = lost_samples(recording.t_s), len(recording)
+        lost, kept = lost_on_turn(recording, self.circle(run))
         what = too_many_lost(lost, kept, self.plan.largest_loss_percent)
         return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
 

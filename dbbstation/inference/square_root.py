@@ -109,6 +109,15 @@ class Columns:
     random: NDArray[np.bool_]
 
 
+def with_random(known: Columns, sd: NDArray[np.float64]) -> Columns:
+    """What is known of columns and of random effects behind them, with these standard deviations."""
+    return Columns(
+        np.concatenate([known.prior, sd]),
+        np.concatenate([known.scale, sd]),
+        np.concatenate([known.random, np.ones(len(sd), dtype=bool)]),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Directions:
     """Directions of the fitted columns, in units of their scales, from best seen to worst.

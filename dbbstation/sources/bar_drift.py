@@ -29,7 +29,6 @@ class BarDrift(ErrorSource):
     belongs_to = Owner.INSTRUMENT
     needs = frozenset({Need.TIME})
     varies_with = "time"
-    rough = True
     form_uncertainty = 0.2  # a warm-up has its own law, in stages
     texts = Texts(
         what="The bar itself changes its length while it warms up or cools down after having been handled. The drift "

@@ -40,7 +40,6 @@ class FollowsTemperature(LinearSource):
 
     needs = frozenset({Need.POSE, Need.TIME, Need.TEMPERATURE})
     varies_with = "temperature"
-    rough = True  # as its thermometer is
     form_uncertainty = 0.1  # a thermometer shows one place of a body
     growth: ClassVar[Parameter]
     """What it grows by for one kelvin."""

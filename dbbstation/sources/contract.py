@@ -286,9 +286,6 @@ class ErrorSource(ABC):
     needs: ClassVar[frozenset[Need]] = frozenset({Need.POSE})
     varies_with: ClassVar[str] = ""
     """Variable that organises its misfit, as printed beside a place; empty where there is no single one."""
-    rough: ClassVar[bool] = False
-    """True for a law that machines follow only roughly, as friction and warm-ups are: what little others bring beside it may
-    only make up for that."""
     form_uncertainty: ClassVar[float] = 0.05
     """Standard deviation, as a share of the effect, by which real machines depart from the formula: what is smaller beside this
     cause may be a matter of its formula. Few hundredths for geometry and springs, a tenth to three tenths for friction, play

@@ -49,7 +49,6 @@ class JointFriction(LinearSource):
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "joint-angle-speed-sign"
-    rough = True
     form_uncertainty = 0.3  # friction of joints differs with load and angle
     texts = Texts(
         what="The joints at the base turn heavily. Friction drags at the platform against its movement, and the struts "

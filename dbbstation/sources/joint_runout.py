@@ -52,7 +52,6 @@ class JointRunout(LinearSource):
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
     varies_with = "joint-angle"
-    rough = True
     form_uncertainty = 0.2  # a joint out of true has more than one harmonic
     texts = Texts(
         what="A joint is not a point: the two axes of a universal joint do not meet, or the ball of a ball joint is oval.",

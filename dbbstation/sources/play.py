@@ -45,7 +45,6 @@ class Play(ErrorSource):
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-force"
-    rough = True
     form_uncertainty = 0.2  # play differs with load and place
     texts = Texts(
         what="Nut, bearing or joint of a strut has play that the platform's weight keeps closed. Where the force in the "

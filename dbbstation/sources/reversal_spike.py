@@ -47,7 +47,6 @@ class ReversalSpike(ErrorSource):
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-speed-sign"
-    rough = True
     form_uncertainty = 0.3  # sticking differs from reversal to reversal
     texts = Texts(
         what="A strut sticks for a moment when it turns from growing to shrinking or back, until the position loop has "

@@ -39,7 +39,6 @@ class SpindleGrowth(ErrorSource):
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.TIME})
     varies_with = "time"
-    rough = True
     form_uncertainty = 0.2  # a warm-up has its own law, in stages
     texts = Texts(
         what="The spindle and its nose warm up and push the tool out of the platform. The growth given is counted from "

@@ -32,7 +32,6 @@ class ThermalFrame(ErrorSource):
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.TIME})
     varies_with = "time"
-    rough = True
     form_uncertainty = 0.2  # a warm-up has its own law, in stages
     texts = Texts(
         what="The base plate that carries the struts warms up while the machine works, or with the shop, and grows. The "

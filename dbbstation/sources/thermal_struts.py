@@ -36,7 +36,6 @@ class ThermalStruts(ErrorSource):
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.TIME})
     varies_with = "time"
-    rough = True
     form_uncertainty = 0.2  # a warm-up has its own law, in stages
     texts = Texts(
         what="The struts' screws warm up while the machine works and grow, quickly at first and then ever more slowly. "

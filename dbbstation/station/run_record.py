@@ -11,8 +11,8 @@ from dbbstation.errors import TraceError
 from dbbstation.station.detector import DWELL_BEHIND_S, live_phi_deg
 from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
-from dbbstation.trace.cut import cut
-from dbbstation.trace.loss import AFTER_LOSS, lost_samples, too_many_lost
+from dbbstation.trace.cut import cut, lost_on_turn
+from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 from dbbstation.trace.recording import Recording
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ class RunRecord:
         started_s: time of the first sample on the driver's clock [s].
         fed_in_s: of the feed-in edge, since the first sample [s]; None before.
         fed_out_s: of the feed-out edge, likewise.
-        lost: samples that the line lost.
     """
 
     run: RunId
@@ -42,7 +41,7 @@ class RunRecord:
     started_s: float
     fed_in_s: float | None = None
     fed_out_s: float | None = None
-    lost: int = 0
+    _lost: list[int] = field(default_factory=list)
     _t_s: list[float] = field(default_factory=list)
     _length_mm: list[float] = field(default_factory=list)
     _usable: list[bool] = field(default_factory=list)
@@ -65,11 +64,16 @@ class RunRecord:
         self._t_s.append(t_s)
         self._length_mm.append(length_mm)
         self._usable.append(reading.status == "ok")
-        self.lost += reading.lost
+        self._lost.append(reading.lost)
         phi = None
         if self.fed_in_s is not None and self.fed_out_s is None:
             phi = live_phi_deg(self.circle, t_s - self.fed_in_s)
         return Sample(t_s, length_mm, reading.status, reading.said, reading.lost, phi)
+
+    @property
+    def lost(self) -> int:
+        """Samples that the line counted as lost, wherever in the run."""
+        return sum(self._lost)
 
     def swept_deg(self) -> float:
         """Travelled since the feed-in, as far as it can be told live [deg]."""
@@ -88,19 +92,25 @@ class RunRecord:
         Args:
             largest_loss_percent: share of the samples that may be lost [%].
         """
-        lost = max(self.lost, lost_samples(np.array(self._t_s)))
-        if problem := too_many_lost(lost, len(self), largest_loss_percent):
-            return None, f"{problem}; {AFTER_LOSS}"
         recording = Recording(
             name=self.run.label,
             t_s=np.array(self._t_s),
             length_mm=np.array(self._length_mm),
             usable=np.array(self._usable, dtype=np.bool_),
         )
+        shown, kept = lost_on_turn(recording, self.circle)
+        if problem := too_many_lost(max(self._lost_between_edges(), shown), kept, largest_loss_percent):
+            return None, f"{problem}; {AFTER_LOSS}"
         try:
             return figures(cut(recording, self.circle)), ""
         except TraceError as error:
             return None, str(error)
+
+    def _lost_between_edges(self) -> int:
+        """Samples that the line counted as lost from feed-in to feed-out."""
+        begin = -np.inf if self.fed_in_s is None else self.fed_in_s
+        end = np.inf if self.fed_out_s is None else self.fed_out_s
+        return sum(lost for t, lost in zip(self._t_s, self._lost, strict=True) if begin < t <= end)
 
 
 def unrecorded(reading: Reading) -> Sample:

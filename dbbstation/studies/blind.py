@@ -26,9 +26,9 @@ ANSWERS = "answers.json"
 FORMAT = "blind-answers/1"
 
 
-def verdict_folder(folder: Path, candidates: Sequence[str], *, by_sets: bool = False) -> Path:
+def verdict_folder(folder: Path, candidates: Sequence[str]) -> Path:
     """Where the verdicts of a study with these candidates are kept."""
-    names = ",".join(sorted(candidates)) + (" by sets" if by_sets else "")
+    names = ",".join(sorted(candidates))
     return folder / "verdicts" / hashlib.sha256(names.encode()).hexdigest()[:12]
 
 
@@ -39,7 +39,6 @@ def judge_sessions(
     progress: Callable[[int, int], None],
     *,
     again: bool = False,
-    by_sets: bool = False,
 ) -> dict[str, dict[str, Any]]:
     """Diagnose every session of a folder; those that have a verdict already are not judged twice.
 
@@ -49,7 +48,6 @@ def judge_sessions(
         jobs: processes.
         progress: told how many of how many sessions are judged.
         again: judge all of them anew, for a diagnosis that has changed since.
-        by_sets: compare sets of causes.
 
     Returns:
         By session, `seconds` it took and `summary` of the diagnosis, or `error` where there was none.
@@ -61,12 +59,12 @@ def judge_sessions(
     if not sessions:
         what = "no session folders in here"
         raise InputError([Problem(str(folder), 0, 0, what, "make some: python -m tests.plant.blind FOLDER")])
-    kept = verdict_folder(folder, candidates, by_sets=by_sets)
+    kept = verdict_folder(folder, candidates)
     kept.mkdir(parents=True, exist_ok=True)
     waiting = [path for path in sessions if again or not (kept / f"{path.name}.json").exists()]
     done = len(sessions) - len(waiting)
     progress(done, len(sessions))
-    work = partial(_judge, candidates=tuple(candidates), kept=kept, by_sets=by_sets)
+    work = partial(_judge, candidates=tuple(candidates), kept=kept)
     if jobs == 1 or len(waiting) <= 1:
         for path in waiting:
             work(path)
@@ -104,11 +102,11 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
     return {answer["session"]: answer for answer in answers["sessions"]}
 
 
-def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path, by_sets: bool) -> None:
+def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path) -> None:
     begun = time.perf_counter()
     verdict: dict[str, Any] = {"session": path.name}
     try:
-        verdict["summary"] = diagnose_sessions([path], candidates, (), _quiet, by_sets=by_sets).summary()
+        verdict["summary"] = diagnose_sessions([path], candidates, (), _quiet).summary()
     except StationError as error:
         verdict["error"] = str(error)
     except Exception as error:  # noqa: BLE001 - a diagnosis that breaks is a result of the study, and the worst one

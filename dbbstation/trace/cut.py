@@ -90,6 +90,18 @@ def cut(recording: Recording, circle: Circle) -> RawCircle:
         ) from error
 
 
+def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
+    """Return how many samples of the turn were lost and how many were kept; of the whole recording where it has no turn.
+
+    What is missing before the feed-in or behind the feed-out harms nothing: a bar may be put up there while nothing comes.
+    """
+    try:
+        t_s = _cut(recording, circle).t_s
+    except TraceError:
+        t_s = recording.t_s
+    return lost_samples(t_s), len(t_s)
+
+
 def _cut(recording: Recording, circle: Circle) -> RawCircle:
     if recording.theta_deg is not None:
         phi = _along(circle.phi_deg(recording.theta_deg))

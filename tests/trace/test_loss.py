@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import TraceError
-from dbbstation.trace.cut import cut
+from dbbstation.trace.cut import cut, lost_on_turn
 from dbbstation.trace.loss import lost_samples, too_many_lost
 from dbbstation.trace.recording import Recording
 from tests.trace.test_cut import CIRCLE, trace
@@ -48,6 +48,18 @@ def test_the_limit_is_a_share_of_all_samples() -> None:
     assert too_many_lost(5, 995, 0.5) == ""
     assert too_many_lost(6, 994, 0.5) == "6 of 1000 samples were lost (0.6 %), more than the 0.5 % that the plan allows"
     assert too_many_lost(6, 994, 1.0) == ""
+
+
+def test_only_what_is_missing_on_the_turn_is_lost() -> None:
+    whole = trace(noise_mm=0.0003)
+    before = replace(whole, t_s=whole.t_s + 27.0 * (np.arange(len(whole)) > 3))
+    assert lost_samples(before.t_s) > 1000
+    assert lost_on_turn(before, CIRCLE)[0] == 0
+    middle = len(whole) // 2
+    kept = np.delete(np.arange(len(whole)), slice(middle, middle + 60))
+    holed = replace(whole, t_s=whole.t_s[kept], length_mm=whole.length_mm[kept])
+    assert lost_on_turn(holed, CIRCLE)[0] == 60
+    assert lost_on_turn(replace(holed, length_mm=holed.length_mm[0] + 0.0 * holed.length_mm), CIRCLE)[0] == 60
 
 
 def test_loss_is_suspected_before_the_feed() -> None:

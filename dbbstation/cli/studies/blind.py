@@ -17,7 +17,6 @@ import click
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes; all cores if left out.")
 @click.option("--again", is_flag=True, help="Judge sessions anew that have a verdict: the diagnosis has changed.")
 @click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Reliability diagram, as SVG.")
-@click.option("--by-sets", is_flag=True, help="Judge by comparing sets of causes, as `diagnose --by-sets` does.")
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def blind(
@@ -26,7 +25,6 @@ def blind(
     candidates: str | None,
     jobs: int | None,
     again: bool,
-    by_sets: bool,
     figure: Path | None,
     force: bool,
     as_json: bool,
@@ -42,7 +40,7 @@ def blind(
       python -m tests.plant.blind hidden --clean 100 --single 200 --pairs 40 --outside 40 --concealed 20 --seed 1
       dbbstation study blind hidden
       dbbstation study blind hidden --again --json > blind.json
-      dbbstation study blind hidden --by-sets --figure reliability.svg
+      dbbstation study blind hidden --figure reliability.svg
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import progress_bar
@@ -64,7 +62,6 @@ def blind(
             jobs or os.cpu_count() or 1,
             lambda done, _: advance(done),
             again=again,
-            by_sets=by_sets,
         )
     found: dict[str, Any] = {
         "candidates": list(names),

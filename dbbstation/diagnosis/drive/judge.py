@@ -10,9 +10,8 @@ from scipy.stats import f as f_distribution
 from dbbstation.diagnosis.drive.design import BASE
 from dbbstation.diagnosis.drive.findings import DriveFinding, Rest
 from dbbstation.diagnosis.drive.fit import fit, term_of
+from dbbstation.diagnosis.drive.limits import TESTABLE_SIGMA
 from dbbstation.diagnosis.findings import Value, Verdict
-from dbbstation.diagnosis.unexplained import NAMED_EXPLAINS
-from dbbstation.diagnosis.verdicts import testable
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.race import AS_GOOD, worth_of
 
@@ -33,6 +32,13 @@ SHAPE_THRESHOLD = 10.0
 METHOD_SHARE = 0.002
 """Of the force's root mean square: low-pass and differences leave up to this of a drive that follows its model exactly,
 mostly beside stops. Less than it is no misfit, however well it stands out of the noise."""
+
+NAMED_EXPLAINS = 0.9
+"""Share of what the best unnamed shape explains that names must explain to be believed: below it they are only the nearest
+names of something else."""
+
+TESTABLE_SHARE = 0.5
+"""Share of the combinations of a name's amplitudes that must be seen for the name to be ruled out."""
 
 OF_ITS_OWN = 0.5
 """Share that a name must explain beside an unnamed shape, of what it explains without it or of what the shape leaves."""
@@ -99,7 +105,8 @@ def judge(design: Design, race: Race, chosen: Sequence[Choice], after: DriveFit)
         else:
             best, gain = rest.best_variant(beside, [])
             values = _best_values(design, rest, beside, best)
-            verdict = Verdict.RULED_OUT if testable(rest, best, []) else Verdict.NOT_TESTABLE
+            seen = float(np.mean(rest.visible(best, []) >= TESTABLE_SIGMA))
+            verdict = Verdict.RULED_OUT if seen >= TESTABLE_SHARE else Verdict.NOT_TESTABLE
             verdict = Verdict.AMBIGUOUS if alike else verdict
             variant, _ = race.best_variant(candidate, [])
             size = variant.prior

@@ -9,7 +9,6 @@ import numpy as np
 
 from dbbstation.diagnosis.drive.design import BASE
 from dbbstation.diagnosis.drive.sources.coulomb_friction import COULOMB_SHARE
-from dbbstation.diagnosis.verdicts import TESTABLE_SIGMA
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.design import Design
@@ -17,6 +16,9 @@ if TYPE_CHECKING:
 
 ACCELERATES = 5.0
 """Root mean square of the acceleration, over its noise, from which the mass can be told."""
+
+TESTABLE_SIGMA = 5.0
+"""An amplitude of the usual size must stand so far out of its standard deviation for a cause to be testable."""
 
 VAGUE = 0.3
 """Relative standard uncertainty above which a mass is not known."""

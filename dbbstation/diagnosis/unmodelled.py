@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,13 +11,14 @@ from dbbstation.calibration.fit import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.shape_look import Look, looked_for
 from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Samples, Shape, ranges, samples_of, shapes
 from dbbstation.inference.model_comparison import Cause, Variant
+from dbbstation.inference.square_root import with_random
 from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.calibration.fit import Calibration
-    from dbbstation.diagnosis.sets.channel import Channel
+    from dbbstation.diagnosis.channel import Channel
     from dbbstation.inference.model_comparison import Member
 
 FAMILY_ODDS = float(np.log(0.1 / 0.9))
@@ -61,14 +62,8 @@ class Unmodelled:
         samples, known = channel.columns.base, channel.base
         if members:
             columns = np.concatenate([member.columns for member in members])
-            sd = np.concatenate([member.sd for member in members])
             samples = np.hstack([samples, channel.columns.samples[:, columns]])
-            known = replace(
-                known,
-                prior=np.concatenate([known.prior, sd]),
-                scale=np.concatenate([known.scale, sd]),
-                random=np.concatenate([known.random, np.ones(len(sd), dtype=bool)]),
-            )
+            known = with_random(known, np.concatenate([member.sd for member in members]))
         base = [samples[rows] for rows in channel.runs]
         noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
         look = Look(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm)

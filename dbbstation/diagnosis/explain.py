@@ -15,9 +15,8 @@ from dbbstation.calibration.outliers import MOST, calibrate_robust
 from dbbstation.calibration.scatter import seats_of
 from dbbstation.calibration.strange_runs import in_place_after_all
 from dbbstation.calibration.stray_balls import set_free
-from dbbstation.diagnosis.naming import GRID
-from dbbstation.diagnosis.sets.channel import Channel
-from dbbstation.diagnosis.sets.unmodelled import Unmodelled
+from dbbstation.diagnosis.channel import Channel
+from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
 
@@ -45,6 +44,9 @@ SEEDS = 3
 
 RIVALS = 3
 """Causes in the place of each member that are laid out at their own best values before they are compared."""
+
+GRID = 0.3
+"""Share to which nonlinear parameters are known from the grid of the comparison, about its spacing, in a second try."""
 
 STEPS = 2
 """Times that the nonlinear parameters of a rival are improved."""

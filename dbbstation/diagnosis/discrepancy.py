@@ -1,0 +1,184 @@
+"""What a machine may do that the formula of a cause does not say: its effect, modulated along what it depends on.
+
+A cause that acts on struts may be a little larger at one length than at another, or in one direction of travel than in
+the other; one that grows with time may follow another law. The effect as fitted times a few smooth functions of its
+variable stands for all of this [Kennedy and O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import comb
+
+from dbbstation.diagnosis.shapes import variables
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.contract import Fitted
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import BarReading
+    from dbbstation.sources.contract import ErrorSource, Motion
+
+DEGREE = 3
+"""Of the polynomials that modulate an effect: four functions over the range of a variable."""
+
+BY_DIRECTION = ("strut-speed-sign", "joint-angle-speed-sign")
+"""Variables of causes whose effect turns its sign with the direction: it may be another in each of them."""
+
+
+STAGES_APART = 2
+"""Points of the grid of time constants from one further stage of a warm-up to the next: a factor of two."""
+
+
+@dataclass(frozen=True, eq=False)
+class Effects:
+    """What a source does to one run.
+
+    Attributes:
+        motion: the run.
+        reading: what a model predicts for it.
+        values: of all parameters of the source, shape (p,).
+        derivative: of the reading by these, shape (n, p).
+    """
+
+    motion: Motion
+    reading: BarReading
+    values: NDArray[np.float64]
+    derivative: NDArray[np.float64]
+
+
+def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
+    """Columns of what the formula of a source may be off by, over all runs, shape (n, q)."""
+    if source.form_uncertainty == 0.0:
+        return np.zeros((sum(len(run.derivative) for run in runs), 0))
+    amplitude = np.array([not p.shape for p in source.parameters(machine)])
+    effects, along, signs = [], [], []
+    for run in runs:
+        motion = run.motion
+        by_strut = _strut_contributions(source, motion, machine, run.values, run.reading)
+        known = variables(motion, machine)
+        if by_strut is None:
+            followed = _followed(source, known, motion)[motion.kept]
+            total = run.derivative[:, amplitude] @ run.values[amplitude]
+            effects.append(np.repeat(total[:, None], followed.shape[1], axis=1))
+            along.append(followed)
+            continue
+        effects.append(by_strut)
+        followed = known["time" if source.varies_with in {"time", "temperature"} else "strut-length"]
+        wide = np.broadcast_to(followed[:, None], (len(motion), STRUTS)) if followed.ndim == 1 else followed
+        along.append(wide[motion.kept])
+        if source.varies_with in BY_DIRECTION:
+            signs.append(known["strut-speed-sign"][motion.kept])
+    columns = modulated(effects, along, signs or None)
+    return np.hstack([columns, _other_stages(source, machine, runs)])
+
+
+def _other_stages(source: ErrorSource, machine: Machine, runs: Sequence[Effects]) -> NDArray[np.float64]:
+    """What grows over time by one law may have further stages: its effect with other time constants, shape (n, q)."""
+    parameters = source.parameters(machine)
+    amplitude = np.array([not p.shape for p in parameters])
+    if source.varies_with != "time" or amplitude.all():
+        return np.zeros((sum(len(run.derivative) for run in runs), 0))
+    first = int(np.flatnonzero(~amplitude)[0])
+    found = []
+    for constant in parameters[first].shape[::STAGES_APART]:
+        pieces = []
+        for run in runs:
+            other = run.values.copy()
+            other[first] = constant
+            pieces.append(run.reading.by_source(source, machine, other)[:, amplitude] @ other[amplitude])
+        found.append(np.concatenate(pieces))
+    return np.column_stack(found)
+
+
+def _strut_contributions(
+    source: ErrorSource, motion: Motion, machine: Machine, values: NDArray[np.float64], reading: BarReading
+) -> NDArray[np.float64] | None:
+    """What a source adds to the reading through each strut, shape (n, 6) [mm]; None where it acts otherwise too."""
+    model = MachineModel(machine, (Fitted(source, values, source.shared_by(motion)),))
+    effect = model.effect(motion, reading.actual)
+    others = (
+        effect.base_joint_mm,
+        effect.platform_joint_mm,
+        effect.tool_tip_mm,
+        effect.fixed_ball_mm,
+        effect.reading_mm,
+    )
+    if effect.strut_mm is None or any(other is not None for other in others):
+        return None
+    lengths = np.broadcast_to(np.asarray(effect.strut_mm), (len(motion), STRUTS))
+    return np.asarray((reading.sensitivity.response.per_strut * lengths)[motion.kept], dtype=np.float64)
+
+
+def _followed(source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion) -> NDArray[np.float64]:
+    """Variables that the discrepancy of a source that acts on no single strut follows: its own, or the place, (n, q)."""
+    name = "time" if source.varies_with == "temperature" else source.varies_with
+    if name in known and known[name].ndim == 1:
+        return known[name][:, None]
+    if name == "reading" and motion.reading_mm is not None:
+        return motion.reading_mm[:, None]
+    return motion.poses[:, :2]
+
+
+def bernstein(values: NDArray[np.float64], low: float, high: float, degree: int = DEGREE) -> NDArray[np.float64]:
+    """Bernstein polynomials of a degree over a range, shape (..., degree + 1); they add up to one.
+
+    [Farin, Curves and Surfaces for CAGD, 5th ed., eq 5.1]
+    """
+    share = np.clip((values - low) / max(high - low, 1e-12), 0.0, 1.0)[..., None]
+    k = np.arange(degree + 1)
+    return np.asarray(comb(degree, k) * share**k * (1.0 - share) ** (degree - k), dtype=np.float64)
+
+
+def modulated(
+    effects: Sequence[NDArray[np.float64]],
+    along: Sequence[NDArray[np.float64]],
+    signs: Sequence[NDArray[np.float64]] | None,
+) -> NDArray[np.float64]:
+    """Effects of m movers times smooth functions of what each follows, over all runs, shape (n, q).
+
+    Args:
+        effects: per run, what each mover adds to the reading, shape (n, m).
+        along: per run, the variable of each, shape (n, m).
+        signs: per run, the direction of each, where effects may differ by it, shape (n, m); None where not.
+    """
+    effect, values = np.vstack(effects), np.vstack(along)
+    ways = [np.ones_like(effect)] if signs is None else [np.vstack(signs) > 0.0, np.vstack(signs) <= 0.0]
+    found = []
+    for mover in range(effect.shape[1]):
+        own, at = effect[:, mover], values[:, mover]
+        if not own.any():
+            continue
+        functions = bernstein(at, float(at.min()), float(at.max()))
+        found += [functions * (own * way[:, mover])[:, None] for way in ways]
+        if signs is not None:
+            found.append(_other_transits(effects, signs, mover))
+    return np.hstack(found) if found else np.zeros((len(effect), 0))
+
+
+def _other_transits(
+    effects: Sequence[NDArray[np.float64]], signs: Sequence[NDArray[np.float64]], mover: int
+) -> NDArray[np.float64]:
+    """What a quicker and a later transit after a reversal would change, shape (n, 2).
+
+    The formula says over which way an effect turns to its other side. One column turns it at once; the other one turns it
+    a little later.
+    """
+    found = []
+    for effect, sign in zip(effects, signs, strict=True):
+        own, way = effect[:, mover], np.sign(sign[:, mover])
+        level = float(own @ way) / max(float(way @ way), 1.0)
+        found.append(np.column_stack([level * way, np.gradient(own) * LATER]))
+    return np.vstack(found)
+
+
+LATER = 2.0
+"""Samples by which a transit may be later: a degree of the turn."""

@@ -1,0 +1,30 @@
+"""How far machine parameters had been pulled by physics that the earlier calibration lacked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.diagnosis.findings import Shift
+from dbbstation.diagnosis.held import held_beside, uncertainties
+from dbbstation.sources.contract import Owner
+
+if TYPE_CHECKING:
+    from dbbstation.calibration.fit import Calibration
+
+
+def shifts_between(before: Calibration, after: Calibration) -> tuple[Shift, ...]:
+    """How far machine parameters had been pulled, largest first; nothing where nothing was found."""
+    if after is before:
+        return ()
+    row_of = {name: k for k, name in enumerate(after.layout.names)}
+    sigma = uncertainties(after, held_beside(before, after))
+    shifts = []
+    for term in before.layout.terms:
+        if term.source.belongs_to is not Owner.MACHINE:
+            continue
+        for k, parameter in enumerate(term.parameters):
+            row = row_of[term.source.name, term.shared, parameter.name]
+            old, new = before.x[term.columns.start + k], after.x[row]
+            name = f"{term.source.name} {parameter.name.removesuffix('_mm')}"
+            shifts.append(Shift(name, 1e3 * float(old), 1e3 * float(new), 1e3 * float(sigma[row])))
+    return tuple(sorted(shifts, key=lambda shift: -abs(shift.shift_um)))

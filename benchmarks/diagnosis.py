@@ -3,8 +3,8 @@
     python benchmarks/diagnosis.py [--quick] [--json]
 
 The simulated machine of the tests records the fifteen circles of [CAL Table II] in both directions with gravity, which
-has to be found. The diagnosis looks at every source that is known: single ones, pairs of the best eight, unnamed curves,
-verdicts, left-out tests, draws, next tests. Its peer is the kinematic calibration of the runs as read, in the same
+has to be found. The diagnosis compares sets of all causes that are known and of unmodelled effects, fits the best set
+exactly, reads verdicts off, predicts left-out tests, draws parts of the tests, and asks for next tests. Its peer is the kinematic calibration of the runs as read, in the same
 process, minutes before. Growth: with the rate of recording, all sources; with the number of sources, at 50 Hz. Readings
 are averaged over half degrees first, so that the growth with samples ends at about 100 Hz. `--quick` is a tenth of it,
 once, to see that it works.

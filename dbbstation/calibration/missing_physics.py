@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.harmonics import Misfit, misfit
+from dbbstation.inference.remainder import Remainder, remainder
 from dbbstation.trace.average import means, sector_of
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from dbbstation.calibration.fit import Calibration
     from dbbstation.inference.harmonics import Spectrum
 
@@ -30,14 +33,26 @@ def misfit_of(calibration: Calibration, noise: Spectrum | None = None) -> Misfit
         noise: measured elsewhere; read from the high harmonics of what the fit leaves if None.
     """
     fitted = int(np.count_nonzero(~calibration.layout.known.random)) - len(calibration.solution.held)
+    residuals, phases, mountings = _by_sector(calibration)
+    return misfit(residuals, phases, mountings, fitted, noise)
+
+
+def remainder_of(calibration: Calibration, noise: Spectrum) -> Remainder:
+    """The harmonic, the run and the stretch of a turn that stand out most of what a fit leaves, beside noise measured elsewhere."""
+    return remainder(*_by_sector(calibration), noise)
+
+
+def _by_sector(
+    calibration: Calibration,
+) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]], list[str]]:
+    """What a fit leaves, averaged over sectors, with the angles [rad] and the mounting of each run."""
     residuals, phases = [], []
     for observation, residual in zip(calibration.observations, calibration.residual_mm, strict=True):
         sector = sector_of(observation.raw, min(SECTORS, len(residual)))
         residuals.append(means(residual, sector))
         # Angles from +X, so that both directions of a mounting have one first harmonic.
         phases.append(np.radians(observation.raw.circle.theta_deg(means(observation.raw.phi_deg, sector))))
-    groups = [observation.setup.mounting for observation in calibration.observations]
-    return misfit(residuals, phases, groups, fitted, noise)
+    return residuals, phases, [observation.setup.mounting for observation in calibration.observations]
 
 
 def is_missing_physics(found: Misfit) -> bool:

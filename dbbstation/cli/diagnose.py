@@ -145,8 +145,11 @@ def _print(summary: Mapping[str, Any]) -> None:
     click.echo(summary["unexplained"]["text"])
     if summary["unexplained"]["curve"]:
         _print_curve(summary["unexplained"]["curve"])
-    if summary["further_tests"] is not None:
-        _print_next_tests(summary)
+    if not summary["second_start_agrees"]:
+        click.echo(
+            "A second search came to another set of causes: several explain these recordings, take it with care."
+        )
+    _print_next_tests(summary)
 
 
 STILL_OPEN = frozenset({"ambiguous", "not-testable"})

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dbbstation.calibration.missing_physics import is_missing_physics
+import numpy as np
+
+from dbbstation.calibration.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
 from dbbstation.calibration.stray_balls import beside
 from dbbstation.diagnosis.explain import SURE, explain
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.explain import Explained, Settled
     from dbbstation.inference.harmonics import Misfit
+    from dbbstation.inference.remainder import Remainder
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource, Motion
@@ -82,6 +85,7 @@ def diagnose(
         sources=findings,
         unexplained=with_exact_wave(rest, after),
         shifts=shifts_between(before, after),
+        second_start_agrees=settled.second_start_agrees(),
         next_tests=next_tests(explained, findings, elsewhere),
     )
 
@@ -93,7 +97,8 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
     effects = [m for m in settled.best.members if m.cause.name in shapes]
     sure = posterior.probability(shapes) >= SURE
     if not effects or not sure:
-        if not is_missing_physics(left):
+        found = remainder_of(settled.after, settled.noise)
+        if not is_missing_physics(left) and found.probability >= SIGNIFICANT:
             return Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise.")
         rough = rough_formulas(settled)
         text = "Something is left beyond noise, and no variable organises it clearly."
@@ -101,7 +106,8 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
             text = (
                 f"What is left is what the formula of {', '.join(rough)} may be off by: the machine follows it roughly."
             )
-        return Unexplained(1e3 * left.rms, None, None, 0.0, text)
+        rms_um, where = _where(settled.after.observations, found)
+        return Unexplained(max(1e3 * left.rms, rms_um), None, None, 0.0, f"{text} {where}")
     member = max(effects, key=lambda m: settled.best.log_factor(m.cause.name))
     shape = shapes[member.cause.name]
     curve = curve_of(explained.channel, settled, member)
@@ -110,6 +116,18 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
     rms_um = 1e3 * left.rms if is_missing_physics(left) else curve.unconcealed_um
     gain = settled.best.log_factor(member.cause.name)
     return Unexplained(rms_um, shape.strut, shape.name, gain, text, curve)
+
+
+def _where(observations: Sequence[Observation], found: Remainder) -> tuple[float, str]:
+    """Size [µm] and place, in a sentence, of what stands out most of what is left."""
+    worst = min((found.harmonic, found.run, found.pulse), key=lambda one: one.probability)
+    size_um = 1e3 * worst.rms
+    if worst is found.harmonic:
+        return size_um, f"Most of it comes {worst.place} times per turn, {size_um:.2g} µm rms over all runs."
+    run = f"test {observations[worst.place].test} {observations[worst.place].raw.circle.direction}"
+    if worst is found.run:
+        return size_um, f"Most of it is in {run}, {size_um:.2g} µm rms."
+    return size_um, f"Most of it is in {run} about {np.degrees(found.pulse_phase_rad):.0f} degrees, {size_um:.2g} µm."
 
 
 def rough_formulas(settled: Settled) -> list[str]:

@@ -16,7 +16,7 @@ from scipy.special import comb
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.sources.contract import Fitted
+from dbbstation.sources.contract import Fitted, Owner
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -63,7 +63,9 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
     effects, along, signs = [], [], []
     for run in runs:
         motion = run.motion
-        by_strut = _strut_contributions(source, motion, machine, run.values, run.reading)
+        # What an instrument does wrong it does to the whole reading, though a model may write it as errors of struts.
+        of_struts = source.belongs_to is not Owner.INSTRUMENT
+        by_strut = _strut_contributions(source, motion, machine, run.values, run.reading) if of_struts else None
         known = variables(motion, machine)
         if by_strut is None:
             followed = _followed(source, known, motion)[motion.kept]
@@ -120,7 +122,7 @@ def _strut_contributions(
 
 def _followed(source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion) -> NDArray[np.float64]:
     """Variables that the discrepancy of a source that acts on no single strut follows: its own, or the place, (n, q)."""
-    name = "time" if source.varies_with == "temperature" else source.varies_with
+    name = "time" if source.varies_with in {"temperature", "speed"} else source.varies_with
     if name in known and known[name].ndim == 1:
         return known[name][:, None]
     if name == "reading" and motion.reading_mm is not None:

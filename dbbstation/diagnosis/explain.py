@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -65,6 +65,7 @@ class Settled:
         unmodelled: effects without a name among them.
         noise: measured on what all causes together leave.
         left: misfit of the joint fit.
+        refused: causes that cannot be what these recordings show, and why.
     """
 
     after: Calibration
@@ -75,6 +76,11 @@ class Settled:
     unmodelled: Unmodelled
     noise: Spectrum
     left: Misfit
+    refused: Mapping[str, str] = field(default_factory=dict)
+
+    def second_start_agrees(self) -> bool:
+        """Whether a search that begins with nothing, about the same fit, comes to the same most probable set of causes."""
+        return search(self.comparison, self.causes).best.names == self.posterior.best.names
 
     @property
     def members(self) -> tuple[Member, ...]:
@@ -164,7 +170,7 @@ def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
     laid_out: set[tuple[str, str]] = set()
     tried: set[frozenset[tuple[str, str]]] = set()
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
-    impossible: set[str] = set()
+    refused: dict[str, str] = {}
     looked = False
     for _ in range(MOST_ROUNDS):
         target = channel.target(fit)
@@ -172,11 +178,11 @@ def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
         noise_mm = float(np.sqrt(noise.power[0]))
         beside = channel.beside_base(noise_mm, scatter)
         comparison = beside.comparison(target)
-        causes = (*(c for c in channel.named if c.name not in impossible), *channel.set_up, *unmodelled.causes)
+        causes = (*(c for c in channel.named if c.name not in refused), *channel.set_up, *unmodelled.causes)
         posterior = search(comparison, causes, seeds.values())
         best = _steady(posterior, fitted)
         seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
-        settled = Settled(fit, posterior, best, comparison, causes, unmodelled, noise, misfit_of(fit, noise))
+        settled = Settled(fit, posterior, best, comparison, causes, unmodelled, noise, misfit_of(fit, noise), refused)
         usual = _usual_scatter(fit) if any(m.cause.setup for m in best.members) else scatter
         rough = [
             (m, r)
@@ -199,7 +205,10 @@ def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
             # An amplitude of next to nothing leaves a nonlinear parameter beside it without a hold, or a step leaves what
             # the machine can reach: that cause cannot be modelled here.
             weakest = min((m for m in best.members if m.cause.named), key=lambda m: best.log_factor(m.cause.name))
-            impossible.add(weakest.cause.name)
+            refused[weakest.cause.name] = "No machine with it explains these recordings: the joint fit does not settle."
+            continue
+        if negative := _negative(joint, channel):
+            refused |= negative
             continue
         fit, fitted = joint, named
         for name, law in sorted(named):
@@ -208,6 +217,29 @@ def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
             unmodelled.look(fit, [m for m in best.members if m.cause.named], noise_mm)
             looked = True
     return _fitted_as_named(channel, settled)
+
+
+def _negative(fit: Calibration, channel: Channel) -> dict[str, str]:
+    """Causes of a joint fit whose values are negative beyond their uncertainty though they cannot be, and what to say of it."""
+    base = {term.source.name for term in channel.calibration.layout.terms}
+    found = {}
+    for term in fit.layout.terms:
+        if term.source.name in base:
+            continue
+        for k, parameter in enumerate(term.parameters):
+            column = term.columns.start + k
+            value, variance = float(fit.x[column]), float(fit.solution.covariance[column, column])
+            sigma = float(np.sqrt(max(variance, 0.0) + (term.source.form_uncertainty * value) ** 2))
+            if parameter.positive and value < -NEGATIVE_SIGMA * sigma:
+                found[term.source.name] = (
+                    f"It would have to be negative, {parameter.name} {value:.3g} ± {sigma:.2g} {parameter.unit}, which it "
+                    "cannot be: something else that does the opposite is at work."
+                )
+    return found
+
+
+NEGATIVE_SIGMA = 3.0
+"""Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
 
 
 def _fitted_as_named(channel: Channel, settled: Settled) -> Settled:

@@ -208,6 +208,7 @@ class Diagnosis:
         sources: best first.
         unexplained: what is left.
         shifts: largest first.
+        second_start_agrees: a second search came to the same set of causes.
         next_tests: best first, each beside those before it; empty where nothing is to be asked.
     """
 
@@ -223,4 +224,5 @@ class Diagnosis:
     sources: tuple[SourceFinding, ...]
     unexplained: Unexplained
     shifts: tuple[Shift, ...]
+    second_start_agrees: bool
     next_tests: tuple[NextTest, ...]

@@ -62,6 +62,7 @@ def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[
             }
             for shift in diagnosis.shifts
         ],
+        "second_start_agrees": diagnosis.second_start_agrees,
         "next_test": _next_test(diagnosis.next_tests[0]) if diagnosis.next_tests else None,
         "further_tests": [_next_test(t) for t in diagnosis.next_tests[1:]],
     }

@@ -65,6 +65,7 @@ class _Judge:
     def findings(self) -> tuple[SourceFinding, ...]:
         """All of them."""
         found = [self._finding(cause) for cause in self._named.values()]
+        found += [_refused(name, why) for name, why in self._settled.refused.items()]
         order = [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT]
         return tuple(sorted(found, key=lambda f: (order.index(f.verdict), -f.gain)))
 
@@ -244,6 +245,11 @@ class _Judge:
             p.name: Value(float(values[k]), float(np.sqrt(max(covariance[k, k], 0.0))), p.unit)
             for k, p in enumerate(amplitudes)
         }
+
+
+def _refused(name: str, why: str) -> SourceFinding:
+    """Finding of a cause that cannot be what the recordings show."""
+    return SourceFinding(name, Verdict.RULED_OUT, (), 0.0, 0.0, 0.0, 0.0, {}, why, probability=0.0)
 
 
 def _inverse_root(products: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -38,7 +38,7 @@ class Backlash(ErrorSource):
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH})
     varies_with = "strut-speed-sign"
-    form_uncertainty = 0.1  # friction and wear differ along the screw and between directions
+    form_uncertainty = 0.2  # friction and wear differ along the screw and between directions, as play does
     texts = Texts(
         what="A strut's drive has play, or winds up against friction, each time the strut turns from growing to "
         "shrinking.",

@@ -49,7 +49,7 @@ class BaseCompliance(LinearSource):
         """
         platform_masses(self.name, machine)
         return tuple(
-            Parameter(f"{way}_um_kn", "µm/kN", 3.0, f"{way} shift of a base joint per {way} force on it, positive")
+            Parameter(f"{way}_um_kn", "µm/kN", 3.0, f"{way} shift of a base joint per {way} force on it", positive=True)
             for way in ("horizontal", "vertical")
         )
 

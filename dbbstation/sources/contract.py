@@ -192,6 +192,8 @@ class Parameter:
         tolerance: standard deviation that the machine file states, in that unit: a fit takes it for known; None where
             nothing is stated.
         newer: True for one that the source had not always: models written before lack it, and it is zero there.
+        positive: True for what cannot be negative, such as a compliance or a friction: where a fit says so beyond its
+            uncertainty, something else is at work.
         part: amplitudes with one label may be wrong alone, such as those of one order of a ball's form; empty for those of a
             strut, which its name says, and for a source that has no parts.
     """
@@ -203,6 +205,7 @@ class Parameter:
     shape: tuple[float, ...] = ()
     tolerance: float | None = None
     newer: bool = False
+    positive: bool = False
     part: str = ""
 
     @property

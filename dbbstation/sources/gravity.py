@@ -57,7 +57,7 @@ class Gravity(LinearSource):
         platform_masses(self.name, machine)
         usual = strut_compliance(machine).at_1000mm_mm_per_n / MM_PER_N
         meaning = "elongation of a strut of 1000 mm per force that pulls it, positive"
-        return (Parameter("strut_compliance_um_kn", "µm/kN", usual, meaning),)
+        return (Parameter("strut_compliance_um_kn", "µm/kN", usual, meaning, positive=True),)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Elongation of each strut per compliance.

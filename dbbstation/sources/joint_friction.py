@@ -69,7 +69,11 @@ class JointFriction(LinearSource):
         counted = for_such_struts(machine)
         return tuple(
             Parameter(
-                f"strut_{i + 1}_n", "N", 10.0, f"force that swings strut {i + 1}, 1 m from its base joint; {counted}"
+                f"strut_{i + 1}_n",
+                "N",
+                10.0,
+                f"force that swings strut {i + 1}, 1 m from its base joint; {counted}",
+                positive=True,
             )
             for i in range(STRUTS)
         )

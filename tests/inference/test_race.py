@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from dbbstation.inference.stability import stability
 from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
@@ -12,7 +13,6 @@ from dbbstation.inference.harmonics import bands, coefficients, misfit, smooth
 from dbbstation.inference.held_out import held_out
 from dbbstation.inference.race import Candidate, Variant, as_good, contained, race_on, select
 from dbbstation.inference.square_root import Columns, compress, joined, solve
-from dbbstation.inference.stability import stability
 
 NOISE = 0.5
 T = np.linspace(0, 1, 60, endpoint=False)

@@ -1,0 +1,129 @@
+"""What a model leaves, tested against noise in more ways than by its sum of squares: where it is, and how large.
+
+A sum of squares over all low harmonics of all runs hides a single fine wave, one bad run, or a pulse of a few samples.
+Each of these is asked for by itself. The probability of the largest of many is that of one, times their number
+[Bonferroni; Miller, Simultaneous Statistical Inference, 2nd ed., sec. 1.3].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from dbbstation.inference.harmonics import bands, coefficients
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.harmonics import Spectrum
+
+
+@dataclass(frozen=True)
+class Largest:
+    """The largest of many things that a model leaves.
+
+    Attributes:
+        probability: that noise alone has one as large among all of them.
+        place: number of it: of the harmonic, or of the run, counted from 0.
+        rms: of it, beyond noise, in the unit of the channel.
+    """
+
+    probability: float
+    place: int
+    rms: float
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What a model leaves, by its harmonics, by its runs and by its samples.
+
+    Attributes:
+        harmonic: the one that stands out most over all runs.
+        run: the one that stands out most over all low harmonics.
+        pulse: run with the stretch of `PULSE_DEG` that stands out most.
+        pulse_phase_rad: where that is.
+    """
+
+    harmonic: Largest
+    run: Largest
+    pulse: Largest
+    pulse_phase_rad: float
+
+    @property
+    def probability(self) -> float:
+        """That noise alone leaves as much in any of these ways."""
+        return min(1.0, 3.0 * min(one.probability for one in (self.harmonic, self.run, self.pulse)))
+
+
+PULSES = 120
+"""Stretches of a turn that a pulse is looked for in: three degrees each."""
+
+
+def remainder(
+    residuals: Sequence[NDArray[np.float64]],
+    phases_rad: Sequence[NDArray[np.float64]],
+    groups: Sequence[object],
+    noise: Spectrum,
+) -> Remainder:
+    """Look for the harmonic, the run and the stretch that stand out most.
+
+    Args:
+        residuals: what the model leaves of whole periods, one per run.
+        phases_rad: of the samples [rad].
+        groups: what each run shares its first harmonic with; a common shift there counts as nothing.
+        noise: measured elsewhere.
+    """
+    low, _ = bands(min(len(residual) for residual in residuals))
+    found = np.array([coefficients(r, phase, low) for r, phase in zip(residuals, phases_rad, strict=True)])
+    first = [1, low + 1]
+    for group in set(groups):
+        rows = [k for k, g in enumerate(groups) if g == group]
+        found[np.ix_(rows, first)] -= found[np.ix_(rows, first)].mean(axis=0)
+    samples = float(np.mean([len(residual) for residual in residuals]))
+    power = np.r_[noise.power[: low + 1], noise.power[1 : low + 1]]
+    squares = found**2
+    order = np.r_[np.arange(low + 1), np.arange(1, low + 1)]
+    by_harmonic = [squares[:, order == k] / power[order == k] for k in range(low + 1)]
+    in_harmonics = [(float(one.sum()), one.size) for one in by_harmonic]
+    in_runs = [(float(one.sum()), one.size) for one in squares / power]
+    beyond = [float((squares[:, order == k] - power[order == k]).sum()) for k in range(low + 1)]
+    beyond_run = (squares - power).sum(axis=1)
+    pulses = [_stretches(r, phase) for r, phase in zip(residuals, phases_rad, strict=True)]
+    white = float(noise.power.max())
+    in_pulses = [(float(means[at] ** 2 * counts[at] / white), 1) for means, counts, at in pulses]
+    run, tried = _largest(in_pulses, noise.freedom)
+    means, _, at = pulses[run]
+    harmonic, chance = _largest(in_harmonics, noise.freedom)
+    worst, by_run = _largest(in_runs, noise.freedom)
+    return Remainder(
+        Largest(min(1.0, chance * (low + 1)), harmonic, _rms(beyond[harmonic] / len(residuals) / samples)),
+        Largest(min(1.0, by_run * len(residuals)), worst, _rms(float(beyond_run[worst]) / samples)),
+        Largest(min(1.0, tried * PULSES * len(residuals)), run, abs(float(means[at]))),
+        (at + 0.5) * 2.0 * np.pi / PULSES,
+    )
+
+
+def _largest(squares: Sequence[tuple[float, int]], freedom: float) -> tuple[int, float]:
+    """Number of the sum of squares that is least probable by chance, and that probability."""
+    chances = [float(f_distribution.sf(square / count, count, freedom)) for square, count in squares]
+    at = int(np.argmin(chances))
+    return at, chances[at]
+
+
+def _stretches(
+    residual: NDArray[np.float64], phase_rad: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64], int]:
+    """Means and numbers of samples of narrow stretches of a turn, and the stretch that stands out most."""
+    place = np.floor(np.mod(phase_rad, 2.0 * np.pi) / (2.0 * np.pi) * PULSES).astype(np.int64) % PULSES
+    counts = np.bincount(place, minlength=PULSES)
+    means = np.bincount(place, residual, minlength=PULSES) / np.maximum(counts, 1)
+    return means, counts, int(np.argmax(means**2 * counts))
+
+
+def _rms(square: float) -> float:
+    return float(np.sqrt(max(square, 0.0)))

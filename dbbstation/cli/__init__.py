@@ -38,6 +38,7 @@ COMMANDS = {
     "program": "NC programs of a plan's circles, nominal or compensated.",
     "replay": "Send a byte log through an instrument's driver.",
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",
+    "sources": "The causes of error that are known, and how to confirm them.",
     "study": "Reproducible experiments.",
     "station": "Measure a plan on a terminal screen.",
 }

@@ -1,0 +1,145 @@
+"""`dbbstation sources`: the causes that are known, and what each says of itself."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dbbstation.cli.source_files import source_file_option
+
+if TYPE_CHECKING:
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import ErrorSource
+
+WIDTH = 110
+
+
+@click.command()
+@click.argument("name", required=False)
+@click.option(
+    "--machine",
+    "machine_file",
+    type=click.Path(path_type=Path),
+    help="Machine file or session folder: also print the parameters that the cause has there, with their usual sizes.",
+)
+@source_file_option
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[Path, ...], as_json: bool) -> None:
+    r"""List the causes of error that are known, or show one: NAME.
+
+    Each says what it is, how it shows in the recordings, how to confirm and to cure it, its equation and where that
+    comes from, what it needs, and how exactly real machines follow its formula.
+
+    \b
+    Examples:
+      dbbstation sources
+      dbbstation sources backlash
+      dbbstation sources gravity --machine machine.yaml
+      dbbstation sources scale-bow --source-file scale_bow.py --json
+    """
+    from dbbstation.cli.output import print_json, print_table
+    from dbbstation.errors import ModelError
+    from dbbstation.files.machine_file import read_machine
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.sources.registry import sources_named
+
+    known = every_source(source_files)
+    machine = None
+    if machine_file is not None:
+        machine = read_machine(machine_file / "machine.yaml" if machine_file.is_dir() else machine_file)
+    if name is not None:
+        (source,) = sources_named([name], known)
+        if machine is not None:
+            try:
+                source.parameters(machine)
+            except ModelError as error:
+                raise ModelError(error.what, where=str(machine_file), remedy=error.remedy) from error
+        told = _told(source, machine)
+        if as_json:
+            print_json(told)
+        else:
+            click.echo("\n".join(_details(told)))
+        return
+    if as_json:
+        print_json({"sources": [_told(source, None) for source in known.values()]})
+        return
+    rows = [
+        [source.name, source.belongs_to.value, _role(source), _first(source.texts.what)] for source in known.values()
+    ]
+    print_table(["cause", "belongs to", "role", "what it is"], rows)
+
+
+def _told(source: ErrorSource, machine: Machine | None) -> dict[str, Any]:
+    """Everything that a cause says of itself."""
+    texts = source.texts
+    told: dict[str, Any] = {
+        "name": source.name,
+        "belongs_to": source.belongs_to.value,
+        "role": _role(source),
+        "what": texts.what,
+        "shows": texts.shows,
+        "confirm": texts.confirm,
+        "cure": texts.cure,
+        "equation": texts.equation,
+        "origin": texts.origin,
+        "needs": sorted(need.value for need in source.needs),
+        "varies_with": source.varies_with or None,
+        "form_uncertainty": source.form_uncertainty,
+    }
+    if machine is not None:
+        told["parameters"] = [
+            {"name": p.name, "unit": p.unit, "usual_size": p.plausible, "meaning": p.meaning}
+            for p in source.parameters(machine)
+        ]
+    return told
+
+
+def _role(source: ErrorSource) -> str:
+    """What becomes of it: fitted in every calibration, a candidate of the diagnosis, or the keeper of a curve."""
+    from dbbstation.calibration.fit import default_sources
+
+    if source.name in {fitted.name for fitted in default_sources()}:
+        return "fitted always"
+    return "candidate" if source.candidate else "keeps what has no name"
+
+
+def _details(told: dict[str, Any]) -> list[str]:
+    """The same as lines."""
+    titles = {
+        "what": "What it is",
+        "shows": "How it shows",
+        "confirm": "How to confirm it",
+        "cure": "How to cure it",
+        "equation": "Equation",
+        "origin": "From",
+    }
+    lines = [told["name"]]
+    for key, title in titles.items():
+        lines += ["", f"{title}:", *_wrapped(told[key])]
+    varies = f"its error follows the {told['varies_with']}" if told["varies_with"] else "its error follows the pose"
+    exact = told["form_uncertainty"]
+    lines += [
+        "",
+        "In a model:",
+        f"  {told['role']}; belongs to the {told['belongs_to']}; {varies}; needs {', '.join(told['needs'])}",
+        f"  real machines follow the formula to {100 * exact:.0f} % of the effect, one standard deviation"
+        if exact
+        else "  the formula is exact",
+    ]
+    if "parameters" in told:
+        lines += ["", "Parameters:"]
+        for p in told["parameters"]:
+            lines += _wrapped(f"{p['name']}, usually {p['usual_size']:g} {p['unit']}: {p['meaning']}", hanging="  ")
+    return lines
+
+
+def _wrapped(text: str, hanging: str = "") -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="  " + hanging)
+
+
+def _first(text: str) -> str:
+    """First sentence, or the part of it before a colon."""
+    return text.split(": ", maxsplit=1)[0].split(". ", maxsplit=1)[0].rstrip(".")

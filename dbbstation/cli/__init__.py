@@ -37,6 +37,7 @@ COMMANDS = {
     "predict": "Actual poses for commanded ones, under a model.",
     "program": "NC programs of a plan's circles, nominal or compensated.",
     "replay": "Send a byte log through an instrument's driver.",
+    "session": "Runs of a session afterwards: list, accept, reject, seal.",
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",
     "sources": "The causes of error that are known, and how to confirm them.",
     "study": "Reproducible experiments.",

@@ -11,12 +11,15 @@ import click
 import pytest
 
 from dbbstation.cli import COMMANDS, DONE, cli
+from dbbstation.cli.session import session
 from dbbstation.cli.study import STUDIES
 
 HEAVY = ("numba", "scipy", "textual", "matplotlib", "pydantic", "numpy")
 
 
-LINES = [name for name in sorted(COMMANDS) if name != "study"] + [f"study {name}" for name in sorted(STUDIES)]
+GROUPS = {"study": STUDIES, "session": session.commands}
+LINES = [name for name in sorted(COMMANDS) if name not in GROUPS]
+LINES += [f"{group} {name}" for group, names in GROUPS.items() for name in sorted(names)]
 """Everything that can be called."""
 
 

@@ -1,0 +1,135 @@
+"""`dbbstation session`: runs are judged afterwards, and recordings made elsewhere get their hashes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from dbbstation.cli import main
+from dbbstation.errors import InputError
+from dbbstation.files.sealing import sealing
+from dbbstation.files.session import RunState, read_session
+from tests.plant.session import record
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("session") / "elsewhere"
+    record(folder, seed=3, rate_hz=4.0)
+    return folder
+
+
+@pytest.fixture
+def folder(recorded, tmp_path):
+    return Path(shutil.copytree(recorded, tmp_path / "elsewhere"))
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as left:
+        main(["session", *map(str, arguments)])
+    out, err = capsys.readouterr()
+    return left.value.code, out, err
+
+
+def test_a_rejected_run_is_kept_with_its_reason_and_can_be_taken_back(capsys, folder):
+    before = read_session(folder)
+    recording = before.runs[1].path.read_bytes()
+    name = f"{before.runs[1].test}-{before.runs[1].direction}-1"
+    assert run(capsys, "reject", folder, name, "--reason", " chip under the holder ")[0] == 0
+    after = read_session(folder)
+    assert (after.runs[1].state, after.runs[1].reason) == (RunState.REJECTED, "chip under the holder")
+    assert after.runs[1].path.read_bytes() == recording
+    assert [r for k, r in enumerate(after.runs) if k != 1] == [r for k, r in enumerate(before.runs) if k != 1]
+    listed = run(capsys, "list", folder)[1]
+    assert re.search(rf"^{name} .*rejected +chip under the holder$", listed, re.MULTILINE)
+    assert listed.rstrip().endswith(f"no accepted run: {before.runs[1].test} {before.runs[1].direction}")
+    assert run(capsys, "accept", folder, name)[0] == 0
+    assert read_session(folder).runs == before.runs
+
+
+def test_the_list_as_json_has_every_run(capsys, folder):
+    told = json.loads(run(capsys, "list", folder, "--json")[1])
+    session = read_session(folder)
+    assert [entry["run"] for entry in told["runs"]] == [f"{r.test}-{r.direction}-{r.repeat}" for r in session.runs]
+    assert {entry["state"] for entry in told["runs"]} == {"accepted"}
+    assert told["missing"] == []
+
+
+def test_no_run_of_that_name(capsys, folder):
+    before = (folder / "session.yaml").read_bytes()
+    code, _, err = run(capsys, "accept", folder, "a-cw-11")
+    assert code == 1
+    assert "did you mean a-cw-1?" in err
+    code, _, err = run(capsys, "reject", folder, "a-cw-1", "--reason", "  ")
+    assert code == 2
+    assert "say why" in err
+    assert (folder / "session.yaml").read_bytes() == before
+
+
+def test_sealing_puts_back_every_hash_and_nothing_else(capsys, folder):
+    file = folder / "session.yaml"
+    sealed = file.read_text(encoding="utf-8")
+    assert run(capsys, "seal", folder)[1] == "every run has a hash already\n"
+    bare = re.sub(r", sha256: [0-9a-f]{64}", "", sealed)
+    file.write_text(bare, encoding="utf-8")
+    with pytest.raises(InputError, match="no sha256"):
+        read_session(folder)
+    code, out, _ = run(capsys, "seal", folder, "--dry-run")
+    assert code == 0
+    assert out.count("would be sealed") == bare.count("file: runs/")
+    assert file.read_text(encoding="utf-8") == bare
+    assert run(capsys, "seal", folder)[0] == 0
+    assert [r.sha256 for r in read_session(folder).runs] == [
+        hashlib.sha256(r.path.read_bytes()).hexdigest() for r in read_session(folder).runs
+    ]
+    assert re.sub(r", sha256: [0-9a-f]{64}", "", file.read_text(encoding="utf-8")) == bare
+
+
+def test_a_file_written_by_hand_keeps_its_comments(folder):
+    """Runs in several lines, a comment behind the file, one run that is still being recorded."""
+    names = sorted(path.name for path in (folder / "runs").iterdir())[:2]
+    text = f"""# made with the old program
+format: dbb-session/1
+machine: machine.yaml
+plan: plan.yaml
+runs:
+  - test: a
+    direction: ccw
+    repeat: 1
+    file: runs/{names[0]}  # the first one
+    state: accepted
+  - {{test: a, direction: cw, repeat: 1, file: runs/{names[1]}, state: accepted}}
+  - {{test: b, direction: cw, repeat: 1, file: runs/none.csv.part, state: recording}}
+"""
+    (folder / "session.yaml").write_text(text, encoding="utf-8")
+    found = sealing(folder)
+    digests = [hashlib.sha256((folder / "runs" / name).read_bytes()).hexdigest() for name in names]
+    assert found.files == (f"runs/{names[0]}", f"runs/{names[1]}")
+    assert f"  # the first one\n    sha256: {digests[0]}\n    state: accepted" in found.text
+    assert f"file: runs/{names[1]}, sha256: {digests[1]}, state: accepted}}" in found.text
+    assert found.text.count("sha256") == 2
+    assert found.text.startswith("# made with the old program\n")
+
+
+def test_a_recording_that_is_missing_is_named_with_its_line(capsys, folder):
+    file = folder / "session.yaml"
+    file.write_text(re.sub(r", sha256: [0-9a-f]{64}", "", file.read_text(encoding="utf-8")), encoding="utf-8")
+    gone = next((folder / "runs").iterdir())
+    gone.unlink()
+    before = file.read_bytes()
+    code, _, err = run(capsys, "seal", folder)
+    assert code == 1
+    assert re.search(rf"session\.yaml:\d+:\d+: the run file runs/{re.escape(gone.name)} is missing", err)
+    assert file.read_bytes() == before
+
+
+def test_no_session_there(capsys, tmp_path):
+    code, _, err = run(capsys, "seal", tmp_path)
+    assert code == 1
+    assert "session.yaml" in err
+    assert "Traceback" not in err

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 
@@ -102,6 +101,8 @@ def _without_noise(motion: Motion) -> NDArray[np.float64]:
     own = reading[motion.kept]
     window = 2 * (len(own) // (2 * WINDOWS)) + 1
     if motion.reading_is_measured and window > CUBIC:
+        from scipy.signal import savgol_filter  # noqa: PLC0415 - takes half a second; every command knows all sources
+
         reading[motion.kept] = savgol_filter(own, window, CUBIC)
     return reading
 

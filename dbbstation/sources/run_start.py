@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
@@ -13,6 +12,7 @@ from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from scipy.interpolate import CubicSpline
 
     from dbbstation.machine.geometry import Machine
 
@@ -76,6 +76,8 @@ class RunStart(ErrorSource):
         """Angle travelled at each row, shape (n,) [deg], and commanded strut lengths over it [mm]."""
         self.require(motion)
         length = strut_lengths(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+        from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes a third of a second; every command knows all sources
+
         standing = np.zeros(len(motion)), CubicSpline([0.0, 1.0], np.tile(length[:1], (2, 1)))
         if motion.setup is None:
             return standing

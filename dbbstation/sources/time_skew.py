@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
@@ -95,6 +94,8 @@ class TimeSkew(ErrorSource):
         if len(time_s) == 1:
             nothing = np.zeros((len(motion), STRUTS))
             return nothing, nothing
+        from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes a third of a second; every command knows all sources
+
         spline = CubicSpline(time_s, length)
         gone: NDArray[np.float64] = spline(time_s + late_s) - spline(time_s)
         speed: NDArray[np.float64] = spline(time_s + late_s, 1)

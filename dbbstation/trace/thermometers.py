@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,6 +40,8 @@ def logged_curve(
     slope = np.diff(np.eye(len(time_s)), axis=0) / gaps[:, None]
     bending = np.diff(slope, axis=0) / np.sqrt(0.5 * (gaps[1:] + gaps[:-1]))[:, None]
     # In units of half a step about what was shown, so that bounds are plus and minus one.
+    from scipy.optimize import lsq_linear  # noqa: PLC0415 - takes a fifth of a second; few sessions need it
+
     found = lsq_linear(bending * half_step, -bending @ shown, bounds=(-1.0, 1.0))
     return time_s, shown + half_step * np.asarray(found.x, dtype=np.float64)
 

@@ -13,7 +13,7 @@ from dbbstation.files.models import parse_model
 from dbbstation.files.plan_file import parse_plan
 from dbbstation.files.run_csv import PART, read_run
 from dbbstation.files.schema import FORMATS
-from dbbstation.files.session import SESSION_FILE, RunState, SessionFolder, parse_session
+from dbbstation.files.session import SESSION_FILE, RunState, SessionFolder, no_session, parse_session
 from dbbstation.files.yaml_text import load_yaml
 from dbbstation.trace.loss import lost_samples
 
@@ -51,8 +51,7 @@ def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
             checked.kind = "dbb-session/1"
             _session(checked)
         else:
-            what = f"this folder is no session: there is no {SESSION_FILE} in it"
-            checked.problems.append(Problem(str(path), 0, 0, what, "name a session folder or a file"))
+            checked.problems.append(no_session(path))
     elif path.suffixes[-1:] == [".csv"] or path.suffixes[-2:] == [".csv", PART]:
         checked.kind = "drive" if looks_like_drive(path) else "run"
         if checked.kind == "drive":

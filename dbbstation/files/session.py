@@ -282,8 +282,25 @@ def read_session(path: Path) -> SessionFolder:
     return session
 
 
+def no_session(folder: Path) -> Problem:
+    """What is wrong with a folder that is no session, with the sessions that stand in it, around it or beside it."""
+    inside = sorted(file.parent for file in folder.glob(f"*/{SESSION_FILE}"))
+    around = [folder.parent] if (folder.parent / SESSION_FILE).is_file() else []
+    beside = sorted(file.parent for file in folder.parent.glob(f"*/{SESSION_FILE}"))
+    near = ", ".join(str(session) for session in (inside or around or beside)[:MOST_NAMED])
+    what = f"this folder is no session: there is no {SESSION_FILE} in it"
+    return Problem(str(folder), 0, 0, what, f"did you mean {near}?" if near else "name a session folder")
+
+
+MOST_NAMED = 4
+"""Sessions that are named beside a folder that is none."""
+
+
 def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
     """Read a session; None with every fault added to `faults`."""
+    if path.is_dir() and not (path / SESSION_FILE).exists():
+        faults.append(no_session(path))
+        return None
     file = path / SESSION_FILE if path.is_dir() else path
     folder = file.parent
     document = read_document(file, SessionFile, faults)

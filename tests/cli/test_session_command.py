@@ -128,6 +128,17 @@ def test_a_recording_that_is_missing_is_named_with_its_line(capsys, folder):
     assert file.read_bytes() == before
 
 
+def test_a_folder_of_sessions_is_answered_with_their_names(folder):
+    with pytest.raises(InputError, match=r"no session\.yaml in it; did you mean .*elsewhere\?"):
+        read_session(folder.parent)
+    with pytest.raises(InputError, match=r"did you mean .*elsewhere\?"):
+        read_session(folder / "runs")
+    empty = folder.parent / "more" / "empty"
+    empty.mkdir(parents=True)
+    with pytest.raises(InputError, match="name a session folder"):
+        read_session(empty)
+
+
 def test_no_session_there(capsys, tmp_path):
     code, _, err = run(capsys, "seal", tmp_path)
     assert code == 1

@@ -257,8 +257,10 @@ def test_half_recorded_runs_are_found_though_nobody_noted_them(session: Path) ->
 
 
 def test_no_session_there(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="there is no such file"):
+    with pytest.raises(InputError, match=r"this folder is no session: there is no session\.yaml in it"):
         read_session(tmp_path)
+    with pytest.raises(InputError, match="there is no such file"):
+        read_session(tmp_path / "nowhere")
 
 
 @pytest.mark.parametrize(("name", "runs", "tests"), [("first-light", 30, 15), ("first-light-check", 16, 8)])

@@ -56,20 +56,22 @@ def _unused(folder: Path) -> Path:
     return next(name for name in names if not name.exists())
 
 
-FIGURES = ("centre_deviation_um", "mean_radial_error_um", "circularity_um")
+FIGURES = ("centre_deviation_um", "mean_radial_error_um", "circularity_30_upr_um")
 
 
 def _print(result: DemoResult) -> None:
+    from dbbstation.cli.figures import G_LOW_PASSED
     from dbbstation.cli.output import print_table
 
     click.echo()
-    click.echo("      centre deviation  mean radial error        circularity   [µm, measured]")
+    click.echo("      centre deviation  mean radial error  circular deviation G   [µm, measured]")
     rows: list[list[object]] = [
         [run["test"], *(run[when][figure] for figure in FIGURES for when in ("before", "after"))] for run in result.runs
     ]
     means: list[object] = ["mean", *_means(result.runs)]
     print_table(["test", "before", "after", " before", " after", "  before", "  after"], [*rows, means])
     click.echo("before: nominal programs; after: programs compensated with the joint model")
+    click.echo(G_LOW_PASSED)
     click.echo()
     left = result.calibration
     click.echo(

@@ -84,11 +84,11 @@ def _print(result: DemoResult) -> None:
             for name, number in source["parameters"].items():
                 click.echo(
                     f"The diagnosis names {source['name']}: {name} {number['value']:.3g} ± {number['uncertainty']:.1g} "
-                    f"{number['unit']}; the kinematic parameters had swallowed {hidden:.0f} % of it."
+                    f"{number['unit']}; the kinematic parameters had concealed {hidden:.0f} % of it."
                 )
     held_out = result.diagnosis["held_out_rms_um"]
     click.echo(
-        f"Tests left out of the fit: predicted to {held_out['before']:.1f} µm before, {held_out['after']:.1f} after."
+        f"Held-out tests are predicted to {held_out['before']:.1f} µm rms before, {held_out['after']:.1f} after."
     )
     click.echo()
     click.echo(f"everything is in {result.folder}:")

@@ -124,7 +124,7 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
         [s["name"], s["verdict"], f"{s['gain']:.0f}", f"{100 * s['concealed']:.0f} %", ", ".join(s["ambiguous_with"])]
         for s in sources
     ]
-    print_table(["cause", "verdict", "log evidence", "concealed", "not told from"], rows)
+    print_table(["cause", "verdict", "log Bayes factor", "concealed (R²)", "not distinguished from"], rows)
     for source in sources:
         if source["verdict"] in {"identified", "ambiguous"}:
             click.echo()

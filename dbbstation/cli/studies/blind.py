@@ -99,7 +99,7 @@ def _print(found: dict[str, Any]) -> None:
         print_table(["", ""], [[label, f"{s['hits']} of {s['count']}"] for label, s in found["right_by_law"].items()])
     for title, table in (found["reliability"] or {}).items():
         click.echo(f"\nprobabilities of {title}")
-        print_table(["said", "mean", "there", "share", "95 % interval"], [_bin(entry) for entry in table])
+        print_table(["probability", "mean", "there", "share", "95 % interval"], [_bin(entry) for entry in table])
     click.echo()
     rows = []
     for name, effect in found["effects"].items():
@@ -119,7 +119,7 @@ def _print(found: dict[str, Any]) -> None:
     over, gain, inside = (found["held_out"][key] for key in ("normalised", "gain", "inside"))
     if over:
         click.echo(
-            f"left-out tests, where rightly named: {over[1]:.2f} of what is predicted ({over[0]:.2f} to {over[2]:.2f}; "
+            f"held-out tests, where rightly named: {over[1]:.2f} of what is predicted ({over[0]:.2f} to {over[2]:.2f}; "
             f"{inside['hits']} of {inside['count']} between 0.8 and 1.3), {gain[1]:.1f} times less than before"
         )
     if found["failures"]:
@@ -128,7 +128,7 @@ def _print(found: dict[str, Any]) -> None:
             [f["session"], f["seed"], f["recorded"], f["kind"], ", ".join(f["truth"]) or "-", f["said"]]
             for f in found["failures"]
         ]
-        print_table(["session", "seed", "recorded", "kind", "hidden (size in limits)", "said"], rows)
+        print_table(["session", "seed", "recorded", "kind", "hidden (size in limits)", "verdict"], rows)
 
 
 def _bin(entry: dict[str, Any]) -> list[object]:

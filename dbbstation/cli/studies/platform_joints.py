@@ -70,8 +70,8 @@ def _print(found: Mapping[str, Any]) -> None:
                 f"{predicted['before']:.2f} -> {predicted['after']:.2f}",
             ]
         )
-    titles = ["tests", "verdict", "not told from", "log evidence", "concealed"]
-    print_table([*titles, "kinematic", "joint", "stated", "left-out tests"], rows)
+    titles = ["tests", "verdict", "not distinguished from", "log Bayes factor", "concealed (R²)"]
+    print_table([*titles, "kinematic", "joint", "stated", "held-out tests"], rows)
     click.echo(
         "kinematic, joint: true position error over the workspace less its mean, stated: as the model says [µm rms]"
     )

@@ -21,23 +21,25 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
 @click.option(
-    "--sources", metavar="A,B,...", help="Error sources to fit, in place of strut-reference-length,base-joints."
+    "--sources", metavar="A,B,...", help="Error sources to fit [default: strut-reference-length,base-joints]."
 )
 @source_file_option
 @click.option(
-    "--law-over-time", is_flag=True, help="Fit what grows with time by its law even where its temperature was logged."
+    "--law-over-time",
+    is_flag=True,
+    help="Fit thermal growth as a function of time, even where temperatures were logged.",
 )
 @click.option(
     "--method",
     type=click.Choice(["jig", "conv-a", "conv-b"]),
     default="jig",
     show_default=True,
-    help="How the places of the balls are known: from a CMM sheet; not at all; from micrometer readings of set-up errors.",
+    help="How ball positions are known: from a CMM sheet (jig); not at all (conv-a); from micrometer readings (conv-b).",
 )
 @click.option(
     "--prescribe",
     metavar="SOURCE.PARAMETER,...",
-    help="Parameters to hold at nominal in place of the directions that the tests lose, as many as are lost.",
+    help="Parameters to hold at nominal, as many as the tests cannot identify.",
 )
 @exclude_option
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
@@ -60,12 +62,13 @@ def calibrate(
 ) -> None:
     r"""Fit the machine's errors to the raw circles of one or more sessions.
 
-    Fits 24 kinematic parameters, reference lengths of the struts and places of the base joints, with the scatter of
-    mountings, CMM and bar as random effects. Directions that the tests cannot see are named and held at nominal.
-    Balls and runs that are outliers are named and kept out of the fit.
+    Fits 24 kinematic parameters: the reference lengths of the struts and the positions of the base joints. The scatter of
+    mountings, CMM and bar enters as random effects. Combinations of parameters that the tests cannot identify are named
+    and held at nominal. Balls and runs that are outliers are named and kept out of the fit.
 
-    With --method conv-a or conv-b the balls were put up under the spindle (or are taken to be): six directions are
-    lost, and six parameters are held at nominal instead, chosen by the program or named with --prescribe.
+    With --method conv-a or conv-b the balls were put up under the spindle, and their positions are unknown. Six
+    combinations cannot be identified then. Six parameters are held at nominal instead; the program chooses them, or
+    --prescribe names them.
 
     \b
     Examples:
@@ -76,8 +79,8 @@ def calibrate(
       dbbstation calibrate monday --sources strut-reference-length,base-joints,gravity,cog-shift,drive-friction
       dbbstation calibrate monday --source-file scale_bow.py --sources strut-reference-length,base-joints,scale-bow
 
-    With drive-friction among the sources, recorded motor currents count as well: gains and friction of the drives, and
-    with cog-shift the centre of gravity.
+    With drive-friction among the sources, recorded motor currents are fitted too. They give gains and friction of the
+    drives, and with cog-shift the centre of gravity.
     """
     from dbbstation.calibration.evaluation import evaluate
     from dbbstation.calibration.fit import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources

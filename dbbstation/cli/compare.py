@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 def compare(a: Path, b: Path, *, exclude: tuple[str, ...], figure: Path | None, force: bool, as_json: bool) -> None:
     r"""Put two sessions side by side, without a model: differences are B less A.
 
-    Last year against today, or a simulation against a recording. Says where they differ and by how much against noise,
-    mountings, CMM sheets and bars as stated, and which variable orders the difference: time, height, tilt, direction, a
-    strut. It names no cause; `diagnose` does, one session at a time.
+    For last year against today, or a simulation against a recording. The result is where they differ, by how much
+    beyond the stated noise, mountings, CMM sheets and bars, and which variable the difference follows: time, height,
+    tilt, direction, a strut. It names no cause; `diagnose` does, one session at a time.
 
     \b
     Examples:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="New folder for everything.")
-@click.option("--seed", default=3, show_default=True, type=click.IntRange(min=0), help="Of the machine's errors.")
+@click.option("--seed", default=3, show_default=True, type=click.IntRange(min=0), help="Seed of the machine's errors.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def demo(*, out: Path | None, seed: int, as_json: bool) -> None:
     r"""Measure, calibrate, diagnose, compensate and measure again, on a virtual machine over a real serial line.

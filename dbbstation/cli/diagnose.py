@@ -30,7 +30,7 @@ STAGES = {
 
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@click.option("--sources", metavar="A,B,...", help="Error sources to compare, in place of all that are known.")
+@click.option("--sources", metavar="A,B,...", help="Error sources to compare [default: all].")
 @source_file_option
 @exclude_option
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")

@@ -16,8 +16,13 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("recording", type=click.Path(path_type=Path), metavar="RECORDING.csv")
 @click.option("--force-per-ampere", type=float, metavar="N/A", help="Force of the drive at 1 A, for motor_current_a.")
-@click.option("--sources", metavar="A,B,...", help="Causes to look for, in place of all.")
-@click.option("--cutoff-hz", type=float, metavar="HZ", help="Band in which force and model are compared; else chosen.")
+@click.option("--sources", metavar="A,B,...", help="Causes to compare [default: all].")
+@click.option(
+    "--cutoff-hz",
+    type=float,
+    metavar="HZ",
+    help="Bandwidth in which force and model are compared [default: chosen from the recording].",
+)
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write what was compared here, as CSV.")
 @figure_option("Draw force and friction here")
 @click.option("--force", is_flag=True, help="Overwrite these files.")
@@ -36,7 +41,7 @@ def drive(
     r"""Identify one strut drive from position and force, and find the physics that mass and viscous friction leave out.
 
     The recording is a CSV file with the columns t_s, position_mm and force_n, or motor_current_a. Record strokes to and
-    fro at several speeds. The verdicts are those of diagnose: identified, ambiguous, ruled-out, not-testable.
+    fro at several speeds. Verdicts: identified, ambiguous, ruled-out, not-testable.
 
     \b
     Examples:

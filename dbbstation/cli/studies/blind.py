@@ -11,11 +11,9 @@ import click
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
-@click.option(
-    "--candidates", metavar="A,B,...", help="Sources to look for; every known one if left out, as in `diagnose`."
-)
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes; all cores if left out.")
-@click.option("--again", is_flag=True, help="Judge sessions anew that have a verdict: the diagnosis has changed.")
+@click.option("--candidates", metavar="A,B,...", help="Error sources to compare [default: all, as in `diagnose`].")
+@click.option("--jobs", type=click.IntRange(min=1), help="Number of processes [default: all cores].")
+@click.option("--again", is_flag=True, help="Diagnose sessions again that have a verdict already.")
 @click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Reliability diagram, as SVG.")
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")

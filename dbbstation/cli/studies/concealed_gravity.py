@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of everything random.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of everything random.")
 @figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")

@@ -11,13 +11,15 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of machine and measurements.")
+@click.option(
+    "--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of machine and measurements."
+)
 @click.option(
     "--size-um",
     default=5.0,
     show_default=True,
     type=click.FloatRange(0.1, 500.0),
-    help="Of a joint coordinate's error.",
+    help="Standard deviation of a joint coordinate's error.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def platform_joints(*, seed: int, size_um: float, as_json: bool) -> None:

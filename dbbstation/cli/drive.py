@@ -94,7 +94,7 @@ def _print(summary: Mapping[str, Any]) -> None:
     _print_sources(summary["sources"])
     click.echo("\nidentified:")
     for name, number in summary["parameters"].items():
-        known = _number(number) if number["identifiable"] else "cannot be told from this recording"
+        known = _number(number) if number["identifiable"] else "not identifiable from this recording"
         click.echo(f"  {name}: {known}")
     for side, values in summary["friction"].items():
         click.echo(f"  friction {side}: " + ", ".join(f"{name} {_number(n)}" for name, n in values.items()))

@@ -12,6 +12,7 @@ import click
 import pytest
 
 from dbbstation.cli import cli
+from dbbstation.cli.diagnose import _print as print_diagnosis
 from dbbstation.files.shipped import shipped_folder
 from tests.cli.conftest import call
 
@@ -169,6 +170,51 @@ def test_a_command_exists_with_its_options(command):
         assert (HERE / words[1]).exists()
     else:
         assert words[0] == "cat"
+
+
+def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys):
+    """Lines without a cause's own text, numbers aside, against what the command prints of made-up numbers."""
+    source = {
+        "name": "gravity",
+        "verdict": "identified",
+        "probability": 1.0,
+        "concealed": 0.9,
+        "gain": 9.0,
+        "stability": 1.0,
+        "ambiguous_with": [],
+        "class": [],
+        "parameters": {},
+        "text": "",
+    }
+    both = {"before": 2.0, "after": 1.0}
+    print_diagnosis(
+        {
+            "mismatch": True,
+            "misfit_rms_um": 2.0,
+            "probability": 0.0,
+            "outliers": [],
+            "sources": [source],
+            "locations": [],
+            "residual_rms_um": both,
+            "held_out_rms_um": both,
+            "held_out_normalised": both,
+            "workspace": None,
+            "parameter_shift": [{"parameter": "joint", "shift_um": 1.0}],
+            "unexplained": {"text": "Nothing is left beyond noise.", "curve": None},
+            "further_tests": None,
+        }
+    )
+    printed = {_without_numbers(line) for line in capsys.readouterr().out.splitlines()}
+    beginnings = ("The recordings", "cause ", "value ±", "residual ", "error of ", "bias of ", "Nothing ")
+    for document, least in (("README.md", 2), ("docs/diagnosis.md", 7)):
+        shown = [c.shown for c in COMMANDS if c.kind == (document, "dbbstation diagnose measured")]
+        lines = [line for block in shown for line in block if line.startswith(beginnings)]
+        assert len(lines) >= least
+        assert {_without_numbers(line) for line in lines} <= printed
+
+
+def _without_numbers(line: str) -> str:
+    return " ".join(re.sub(r"\d+(\.\d+)?(e-\d+)?", "#", line).split())
 
 
 def test_every_exemption_is_one():

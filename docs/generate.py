@@ -13,13 +13,18 @@ import click
 
 import dbbstation
 from dbbstation.cli import COMMANDS, cli
+from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
+from dbbstation.files.machine_file import read_machine
+from dbbstation.files.shipped import shipped_folder
 from dbbstation.sources.registry import known_sources
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import ErrorSource
     from dbbstation.texts import Texts
 
 NOT_PUBLIC = {"cli", "tui", "studies", "__main__"}
@@ -33,7 +38,8 @@ names are what `drive --sources` takes."""
 
 _SOURCES_HEAD = """\
 Every cause that a model can contain, from its own texts in `dbbstation/sources/`. The names are what
-`calibrate --sources` takes."""
+`calibrate --sources` takes. Those that a diagnosis compares have a plausible size, here for the machine in
+`fixtures/machines/every-key.yaml`, and the exactness of their formula: [Diagnosis](../diagnosis.md) says what these decide."""
 
 
 def write_pages(folder: Path) -> None:
@@ -138,13 +144,28 @@ def _headed(title: str, line: str) -> str:
 
 def _sources() -> str:
     lines = ["# Error sources", "", _SOURCES_HEAD, ""]
+    machine = read_machine(shipped_folder("fixtures") / "machines" / "every-key.yaml")
+    compared = set(default_candidates(known_sources()))
     for name, source in known_sources().items():
         needs = ", ".join(sorted(source.needs))
         logged = source.by_temperature()
         forms = f"Belongs to the {source.belongs_to}; needs {needs}"
         forms += f", or in its second form {', '.join(sorted(logged.needs))}." if logged else "."
-        lines += [*_texts(name, source.texts, forms), ""]
+        sizes = _sizes(source, machine) if name in compared else []
+        lines += [*_texts(name, source.texts, forms), *sizes, ""]
     return "\n".join(lines)
+
+
+def _sizes(source: ErrorSource, machine: Machine) -> list[str]:
+    """What a diagnosis takes from a source beforehand: plausible sizes and how exact the formula is."""
+    amplitudes = [parameter for parameter in source.parameters(machine) if not parameter.shape]
+    sizes = dict.fromkeys(f"{p.plausible:g} {p.unit}" for p in amplitudes)
+    share = source.form_uncertainty
+    exact = f"real machines depart from it by {100 * share:g} % of the effect (one standard deviation)"
+    return [
+        f"- Plausible size, one standard deviation: {', '.join(sizes)}",
+        f"- Formula: {exact if share else 'exact'}",
+    ]
 
 
 def _drive_sources() -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.fit import residuals
 from dbbstation.inference.harmonics import smooth
+from dbbstation.model.machine_model import MachineModel
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.model.machine_model import MachineModel
     from dbbstation.model.observation import Observation
     from dbbstation.trace.circle import RawCircle
 
@@ -33,10 +33,14 @@ class PredictedCircle:
     Attributes:
         measured_um: circularity of the recording up to 30 undulations per revolution [µm].
         predicted_um: of what the machine's own sources make the bar read, by the same figure [µm].
+        before_um: of what the nominal machine leaves; the same as measured where a plain circle was commanded [µm].
+        after_um: of what the model leaves [µm].
     """
 
     measured_um: float
     predicted_um: float
+    before_um: float
+    after_um: float
 
 
 def predicted_circles(model: MachineModel, observations: Sequence[Observation]) -> tuple[PredictedCircle, ...]:
@@ -46,12 +50,16 @@ def predicted_circles(model: MachineModel, observations: Sequence[Observation]) 
         TraceError: a run that is no circle.
         ModelError: a source needs what the runs do not give.
     """
+    nominal = residuals(MachineModel(model.machine), observations)
     left = residuals(model.of_the_machine(), observations)
     return tuple(
         PredictedCircle(
-            smooth_circularity_um(o.raw, o.raw.length_mm), smooth_circularity_um(o.raw, o.raw.length_mm - r)
+            measured_um=smooth_circularity_um(o.raw, o.raw.length_mm),
+            predicted_um=smooth_circularity_um(o.raw, o.raw.length_mm - after),
+            before_um=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + before),
+            after_um=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + after),
         )
-        for o, r in zip(observations, left, strict=True)
+        for o, before, after in zip(observations, nominal, left, strict=True)
     )
 
 

@@ -21,23 +21,25 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
 @click.option(
-    "--sources", metavar="A,B,...", help="Error sources to fit, in place of strut-reference-length,base-joints."
+    "--sources", metavar="A,B,...", help="Error sources to fit [default: strut-reference-length,base-joints]."
 )
 @source_file_option
 @click.option(
-    "--law-over-time", is_flag=True, help="Fit what grows with time by its law even where its temperature was logged."
+    "--law-over-time",
+    is_flag=True,
+    help="Fit thermal growth as a function of time, even where temperatures were logged.",
 )
 @click.option(
     "--method",
     type=click.Choice(["jig", "conv-a", "conv-b"]),
     default="jig",
     show_default=True,
-    help="How the places of the balls are known: from a CMM sheet; not at all; from micrometer readings of set-up errors.",
+    help="How ball positions are known: from a CMM sheet (jig); not at all (conv-a); from micrometer readings (conv-b).",
 )
 @click.option(
     "--prescribe",
     metavar="SOURCE.PARAMETER,...",
-    help="Parameters to hold at nominal in place of the directions that the tests lose, as many as are lost.",
+    help="Parameters to hold at nominal, as many as the tests cannot identify.",
 )
 @exclude_option
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
@@ -60,12 +62,13 @@ def calibrate(
 ) -> None:
     r"""Fit the machine's errors to the raw circles of one or more sessions.
 
-    Fits 24 kinematic parameters, reference lengths of the struts and places of the base joints, with the scatter of
-    mountings, CMM and bar as random effects. Directions that the tests cannot see are named and held at nominal.
-    Balls and runs that do not belong are named and kept from pulling the fit.
+    Fits 24 kinematic parameters: the reference lengths of the struts and the positions of the base joints. The scatter of
+    mountings, CMM and bar enters as random effects. Combinations of parameters that the tests cannot identify are named
+    and held at nominal. Balls and runs that are outliers are named and kept out of the fit.
 
-    With --method conv-a or conv-b the balls were put up under the spindle (or are taken to be): six directions are
-    lost, and six parameters are held at nominal instead, chosen by the program or named with --prescribe.
+    With --method conv-a or conv-b the balls were put up under the spindle, and their positions are unknown. Six
+    combinations cannot be identified then. Six parameters are held at nominal instead; the program chooses them, or
+    --prescribe names them.
 
     \b
     Examples:
@@ -76,8 +79,8 @@ def calibrate(
       dbbstation calibrate monday --sources strut-reference-length,base-joints,gravity,cog-shift,drive-friction
       dbbstation calibrate monday --source-file scale_bow.py --sources strut-reference-length,base-joints,scale-bow
 
-    With drive-friction among the sources, recorded motor currents count as well: gains and friction of the drives, and
-    with cog-shift the centre of gravity.
+    With drive-friction among the sources, recorded motor currents are fitted too. They give gains and friction of the
+    drives, and with cog-shift the centre of gravity.
     """
     from dbbstation.calibration.evaluation import evaluate
     from dbbstation.calibration.fit import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
@@ -122,7 +125,7 @@ def calibrate(
         write_bytes(figure, calibration_figure(calibration, format_of(figure)), force=force)
         say(f"figure written to {figure}")
     for outlier in summary["outliers"]:
-        say(f"does not belong, kept from pulling the fit: {outlier['text']}")
+        say(f"outlier, kept out of the fit: {outlier['text']}")
     if as_json:
         print_json(summary)
     else:
@@ -132,7 +135,7 @@ def calibrate(
 
 
 LEAST_PRINTED = 1e-99
-"""Probabilities below are not told apart."""
+"""Probabilities below are printed alike."""
 
 IN_A_TABLE_OF_THEIR_OWN = frozenset({"drive-friction"})
 """Sources with a row for each motor in place of one for each parameter."""
@@ -189,8 +192,8 @@ def _print(summary: Mapping[str, Any]) -> None:
 
 def _print_plan_check(check: Mapping[str, Any]) -> None:
     click.echo(
-        f"so few tests ({check['tests']}) cannot show a wrong tilt, height or place in the plan: {check['left']} degrees of "
-        f"freedom are left to check it, one circle has {check['of_one_test']}; a small residual proves nothing here, so "
+        f"{check['tests']} tests are too few to reveal a wrong tilt, height or position in the plan: {check['left']} degrees "
+        f"of freedom are left to check it, one circle has {check['of_one_test']}; a small residual proves nothing here, so "
         "check the tilts by hand or measure further circles"
     )
 
@@ -202,9 +205,9 @@ def _print_misfit(summary: Mapping[str, Any]) -> None:
         return
     chance = misfit["probability"]
     click.echo(
-        f"more is left than noise and mountings explain, {misfit['rms_um']:.2f} µm rms (probability by chance "
-        f"{'below 1e-99' if chance < LEAST_PRINTED else f'{chance:.1g}'}): physics is missing from the model, and "
-        "`dbbstation diagnose` says which"
+        f"the residual exceeds noise and mountings by {misfit['rms_um']:.2f} µm rms (probability by chance "
+        f"{'below 1e-99' if chance < LEAST_PRINTED else f'{chance:.1g}'}): physics is missing from the model; "
+        "`dbbstation diagnose` looks for it"
     )
     if summary["residual_within_mounting_rms_um"] > NOT_THIS_MACHINE * summary["noise_um"]:
         click.echo(
@@ -225,7 +228,7 @@ def _print_parameters(summary: Mapping[str, Any]) -> None:
             if unit == "mm" and source["name"] not in IN_MM:
                 value, uncertainty, unit = 1e3 * value, 1e3 * uncertainty, "µm"
             rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), value, "±", uncertainty, unit])
-    print_table(["source", "parameter", "value", "", "std", "unit"], rows)
+    print_table(["source", "parameter", "value", "", "u", "unit"], rows)
 
 
 SAID_OF_SCATTER = {

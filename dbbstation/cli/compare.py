@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 def compare(a: Path, b: Path, *, exclude: tuple[str, ...], figure: Path | None, force: bool, as_json: bool) -> None:
     r"""Put two sessions side by side, without a model: differences are B less A.
 
-    Last year against today, or a simulation against a recording. Says where they differ and by how much against noise,
-    mountings, CMM sheets and bars as stated, and which variable orders the difference: time, height, tilt, direction, a
-    strut. It names no cause; `diagnose` does, one session at a time.
+    For last year against today, or a simulation against a recording. The result is where they differ, by how much
+    beyond the stated noise, mountings, CMM sheets and bars, and which variable the difference follows: time, height,
+    tilt, direction, a strut. It names no cause; `diagnose` does, one session at a time.
 
     \b
     Examples:
@@ -97,24 +97,24 @@ def _print_runs(summary: Mapping[str, Any]) -> None:
     from dbbstation.diagnosis.compare_summary import chance_text
 
     click.echo(
-        "B less A [µm], worst first: how many times what noise and mountings leave; ± is one standard deviation by these"
+        "B less A [µm], largest first; ratio: rms over what noise and mountings allow; u: standard uncertainty by these"
     )
     titles = [
         "test",
         "dir",
         "n",
-        "x chance",
+        "ratio",
         "rms",
         "noise",
         "centre x",
         "y",
-        "±",
+        "u",
         "mean",
-        "±",
-        "form",
-        "most",
+        "u",
+        "G",
+        "peak",
         "at deg",
-        "probability",
+        "by chance",
     ]
     rows = [
         [
@@ -155,7 +155,7 @@ def _print_organised(summary: Mapping[str, Any]) -> None:
             f"(by chance {chance_text(halves['opposite_probability'])})"
         )
     click.echo(
-        "\norganised by, best first; share of what is beyond chance, each undulation by its own chance, and of plain µm²"
+        "\nvariables that the difference follows, best first; share: of what is beyond chance; of µm²: of the plain sum of squares"
     )
     rows = [
         [
@@ -168,6 +168,6 @@ def _print_organised(summary: Mapping[str, Any]) -> None:
         for one in summary["organised"]
         if max(one["share"], one["share_of_um2"]) > SMALLEST_SHARE
     ]
-    print_table(["variable", "share", "of µm²", "freedom", "by chance"], rows)
+    print_table(["variable", "share", "of µm²", "degrees of freedom", "by chance"], rows)
     click.echo(f"\nin short: {summary['organised_text']}")
     click.echo(f"No cause is named here: `dbbstation diagnose {summary['b']}` looks for one in a session.")

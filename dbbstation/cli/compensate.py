@@ -17,7 +17,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.option("--model", "model_file", type=_FILE, required=True, help="Calibrated model.")
 @source_file_option
 @click.option("--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language to write.")
-@click.option("--from", "source", metavar="D", help="Language of PROGRAM [what its extension says].")
+@click.option("--from", "source", metavar="D", help="Language of PROGRAM [default: by its extension].")
 @click.option("--out", type=_FILE, required=True, help="File to write.")
 @click.option("--start", metavar="X,Y,Z,A,B,C", help="Pose before the program, in mm and degrees.")
 @click.option(
@@ -25,13 +25,13 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     type=click.FloatRange(0.001, 1000.0),
     default=0.1,
     show_default=True,
-    help="Farthest a straight move may lie from the path [µm].",
+    help="Greatest distance between a straight move and the path [µm].",
 )
 @click.option(
     "--time-s",
     type=float,
     metavar="S",
-    help="When the program starts, after the session began [s]; for models that need time.",
+    help="Start of the program after the session's start [s], for models that depend on time.",
 )
 @largest_correction_option
 @click.option("--force", is_flag=True, help="Overwrite the file.")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="New folder for everything.")
-@click.option("--seed", default=3, show_default=True, type=click.IntRange(min=0), help="Of the machine's errors.")
+@click.option("--seed", default=3, show_default=True, type=click.IntRange(min=0), help="Seed of the machine's errors.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def demo(*, out: Path | None, seed: int, as_json: bool) -> None:
     r"""Measure, calibrate, diagnose, compensate and measure again, on a virtual machine over a real serial line.
@@ -56,20 +56,22 @@ def _unused(folder: Path) -> Path:
     return next(name for name in names if not name.exists())
 
 
-FIGURES = ("centre_deviation_um", "mean_radial_error_um", "circularity_um")
+FIGURES = ("centre_deviation_um", "mean_radial_error_um", "circularity_30_upr_um")
 
 
 def _print(result: DemoResult) -> None:
+    from dbbstation.cli.figures import G_LOW_PASSED
     from dbbstation.cli.output import print_table
 
     click.echo()
-    click.echo("      centre deviation  mean radial error        circularity   [µm, measured]")
+    click.echo("      centre deviation  mean radial error  circular deviation G   [µm, measured]")
     rows: list[list[object]] = [
         [run["test"], *(run[when][figure] for figure in FIGURES for when in ("before", "after"))] for run in result.runs
     ]
     means: list[object] = ["mean", *_means(result.runs)]
     print_table(["test", "before", "after", " before", " after", "  before", "  after"], [*rows, means])
     click.echo("before: nominal programs; after: programs compensated with the joint model")
+    click.echo(G_LOW_PASSED)
     click.echo()
     left = result.calibration
     click.echo(
@@ -82,11 +84,11 @@ def _print(result: DemoResult) -> None:
             for name, number in source["parameters"].items():
                 click.echo(
                     f"The diagnosis names {source['name']}: {name} {number['value']:.3g} ± {number['uncertainty']:.1g} "
-                    f"{number['unit']}; the kinematic parameters had swallowed {hidden:.0f} % of it."
+                    f"{number['unit']}; the kinematic parameters had concealed {hidden:.0f} % of it."
                 )
     held_out = result.diagnosis["held_out_rms_um"]
     click.echo(
-        f"Tests left out of the fit: predicted to {held_out['before']:.1f} µm before, {held_out['after']:.1f} after."
+        f"Held-out tests are predicted to {held_out['before']:.1f} µm rms before, {held_out['after']:.1f} after."
     )
     click.echo()
     click.echo(f"everything is in {result.folder}:")

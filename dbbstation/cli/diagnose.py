@@ -25,19 +25,19 @@ STAGES = {
     "held-out tests": 77,
     "next test": 80,
 }
-"""Stages that a diagnosis tells, and how much of its time has passed about then [%]; joint fits are none or several."""
+"""Stages that a diagnosis reports, and the share of its time that has passed by then [%]; joint fits are none or several."""
 
 
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@click.option("--sources", metavar="A,B,...", help="Sources to look for, in place of all that are known.")
+@click.option("--sources", metavar="A,B,...", help="Error sources to compare [default: all].")
 @source_file_option
 @exclude_option
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
 @click.option(
     "--keep-unexplained",
     is_flag=True,
-    help="Keep in that model what has no name, as a curve over strut length or force: compensated, cause unknown.",
+    help="Keep an unmodelled effect in that model, as a curve over strut length or force: compensated, cause unknown.",
 )
 @figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
@@ -56,9 +56,10 @@ def diagnose(
 ) -> None:
     r"""Find the physics that a kinematic calibration of these recordings leaves out, name it and model it.
 
-    A calibration can hide gravity, drift or play in its joints: the residual then looks fine here and is wrong
-    elsewhere. This fits the kinematic parameters again with every candidate, lets the evidence decide, and says what
-    cannot be told. Verdicts: identified, ambiguous, ruled-out, not-testable.
+    A calibration can hide gravity, drift or play in its joints: the residual is then small here, and the machine is
+    wrong elsewhere. This command compares sets of causes. It fits each set together with the kinematic parameters and
+    gives the probability of each cause, given the catalogue of causes. Verdicts: identified (probability 0.95 or more),
+    ambiguous, ruled-out, not-testable.
 
     \b
     Examples:
@@ -118,28 +119,28 @@ def _print(summary: Mapping[str, Any]) -> None:
     if summary["mismatch"]:
         click.echo(
             f"The recordings differ from the kinematic model by {summary['misfit_rms_um']:.2f} µm rms beyond noise "
-            f"(probability by chance {summary['probability']:.1g})."
+            f"(probability by chance {_chance(summary['probability'])})."
         )
     else:
         click.echo(f"The recordings agree with the kinematic model (probability {summary['probability']:.2g}).")
     click.echo()
     for outlier in summary["outliers"]:
-        click.echo(f"does not belong, kept from pulling the fits: {outlier['text']}")
+        click.echo(f"outlier, kept out of the fits: {outlier['text']}")
     _print_sources(summary["sources"])
     if summary["locations"]:
-        click.echo("\nwhere the misfit is largest:")
+        click.echo("\nlargest misfit of the kinematic calibration:")
         for location in summary["locations"][:5]:
             click.echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
     _print_gain(summary)
     if summary["workspace"]:
         elsewhere = summary["workspace"]
         click.echo(
-            f"over the workspace the earlier calibration was off by {elsewhere['error_rms_um']:.1f} µm rms, "
-            f"{elsewhere['error_greatest_um']:.1f} µm at most; the joint model is uncertain by "
-            f"{elsewhere['uncertainty_rms_um']:.1f} µm"
+            "over the workspace, kinematic calibration less joint model: "
+            f"{elsewhere['error_rms_um']:.1f} µm rms, {elsewhere['error_greatest_um']:.1f} µm at most; "
+            f"u of the joint model {elsewhere['uncertainty_rms_um']:.1f} µm rms"
         )
     if summary["parameter_shift"]:
-        click.echo("the earlier calibration had been pulled, most of all:")
+        click.echo("bias of the kinematic calibration, largest parameters:")
         for shift in summary["parameter_shift"][:4]:
             click.echo(f"  {shift['parameter']}: {shift['shift_um']:+.0f} µm")
     click.echo(summary["unexplained"]["text"])
@@ -156,22 +157,20 @@ STILL_OPEN = frozenset({"ambiguous", "not-testable"})
 
 
 def _print_next_tests(summary: Mapping[str, Any]) -> None:
-    """Print the tests that would settle what is open; that there are none where nothing would; nothing where all is settled."""
+    """Print which tests to measure next; that none helps, where a verdict is open; nothing where none is."""
     if summary["next_test"]:
         tests = [summary["next_test"], *summary["further_tests"]]
-        together = "it" if len(tests) == 1 else f"these {len(tests)} together"
+        which = "this test" if len(tests) == 1 else f"these {len(tests)} tests"
         click.echo(
-            f"measure next: {'; and '.join(test['text'] for test in tests)}; {together} would tell {tests[0]['source']} to "
-            f"{tests[-1]['sigma_after']:.2g} instead of {tests[0]['sigma_before']:.2g} {tests[0]['unit']}"
+            f"measure next: {'; and '.join(test['text'] for test in tests)}; {which} would bring u of {tests[0]['source']} "
+            f"to {tests[-1]['sigma_after']:.2g} instead of {tests[0]['sigma_before']:.2g} {tests[0]['unit']}"
         )
     elif any(source["verdict"] in STILL_OPEN and source["gain"] is not None for source in summary["sources"]):
-        click.echo(
-            "measure next: no single further test would change a verdict or halve an uncertainty, nor would three"
-        )
+        click.echo("measure next: no proposal; up to three further tests would neither change a verdict nor halve u")
 
 
 def _kept(found: Diagnosis) -> Kept | None:
-    """What is left without a name, to be kept in the model; None, and why, where it cannot be."""
+    """Unmodelled effect to be kept in the model; None where it cannot be kept, and the reason on standard error."""
     from dbbstation.cli.output import say
     from dbbstation.diagnosis.unexplained_model import keep_unexplained
     from dbbstation.errors import ModelError
@@ -184,7 +183,7 @@ def _kept(found: Diagnosis) -> Kept | None:
 
 
 MOST_POINTS = 12
-"""Points of a curve that are printed; a wave has many more, and is said by its size and period."""
+"""Points of a curve that are printed, at the most; a wave has many more, and its size and period are printed."""
 
 
 def _print_curve(curve: Mapping[str, Any]) -> None:
@@ -192,8 +191,8 @@ def _print_curve(curve: Mapping[str, Any]) -> None:
 
     points = curve["points"]
     click.echo(
-        f"it moves the readings by {curve['readings_um']:.2f} µm rms, {curve['unconcealed_um']:.2f} µm of that where no "
-        "kinematic parameter can follow; cause unknown:"
+        f"it moves the readings by {curve['readings_um']:.2f} µm rms; {curve['unconcealed_um']:.2f} µm rms of that no "
+        "kinematic parameter can imitate; cause unknown:"
     )
     if curve["period_mm"] is not None:
         click.echo(
@@ -204,22 +203,22 @@ def _print_curve(curve: Mapping[str, Any]) -> None:
         click.echo(f"  {curve['form']}")
     step = -(-len(points) // MOST_POINTS)
     rows = [[f"{p['at']:.6g}", f"{p['value_um']:+.2f}", "±", f"{p['uncertainty_um']:.2f}"] for p in points[::step]]
-    print_table([f"{curve['variable']} / {curve['unit']}", "error / µm", "", "std / µm"], rows)
+    print_table([f"{curve['variable']} / {curve['unit']}", "error / µm", "", "u / µm"], rows)
     if curve["convention"]:
         click.echo(f"  ({curve['convention']})")
 
 
 def _print_gain(summary: Mapping[str, Any]) -> None:
-    """Print residual and prediction of left-out tests before and after."""
+    """Print residual and prediction of held-out tests before and after."""
     residual, held_out = summary["residual_rms_um"], summary["held_out_rms_um"]
     click.echo(f"\nresidual within mountings {residual['before']:.2f} -> {residual['after']:.2f} µm rms")
     normalised = summary["held_out_normalised"]
     if max(held_out.values()) > UNPREDICTABLE_UM:
-        click.echo("left-out tests cannot be predicted from the others: too few tests to know the machine without them")
+        click.echo("held-out tests cannot be predicted: the other tests are too few to identify the machine")
     else:
         click.echo(
-            f"left-out tests, predicted {held_out['before']:.2f} -> {held_out['after']:.2f} µm rms; in units of what "
-            f"noise and uncertainties allow {normalised['before']:.2f} -> {normalised['after']:.2f}"
+            f"error of predicting held-out tests {held_out['before']:.2f} -> {held_out['after']:.2f} µm rms; over its "
+            f"stated uncertainty {normalised['before']:.2f} -> {normalised['after']:.2f}"
         )
 
 
@@ -238,18 +237,29 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
         "verdict",
         "probability",
         "log Bayes factor",
-        "concealed",
+        "concealed (R²)",
         "selection frequency",
-        "not told from",
+        "not distinguished from",
     ]
     print_table(titles, rows)
-    for source in sources:
-        if source["verdict"] in {"identified", "ambiguous"}:
+    named = [source for source in sources if source["verdict"] in {"identified", "ambiguous"}]
+    if named:
+        click.echo("\nvalue ± u (one standard uncertainty)")
+        for source in named:
             click.echo()
             for name, number in source["parameters"].items():
                 value, uncertainty = f"{number['value']:.4g}", f"{number['uncertainty']:.2g}"
                 click.echo(f"{source['name']}: {name} {value} ± {uncertainty} {number['unit']}")
             click.echo(f"  {source['text']}")
+
+
+def _chance(probability: float) -> str:
+    """Probability of an F test as printed; the smallest ones underflow."""
+    return "below 1e-99" if probability < LEAST_PRINTED else f"{probability:.1g}"
+
+
+LEAST_PRINTED = 1e-99
+"""Probabilities below are printed alike."""
 
 
 def _probable(source: Mapping[str, Any]) -> str:

@@ -16,8 +16,13 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("recording", type=click.Path(path_type=Path), metavar="RECORDING.csv")
 @click.option("--force-per-ampere", type=float, metavar="N/A", help="Force of the drive at 1 A, for motor_current_a.")
-@click.option("--sources", metavar="A,B,...", help="Causes to look for, in place of all.")
-@click.option("--cutoff-hz", type=float, metavar="HZ", help="Band in which force and model are compared; else chosen.")
+@click.option("--sources", metavar="A,B,...", help="Causes to compare [default: all].")
+@click.option(
+    "--cutoff-hz",
+    type=float,
+    metavar="HZ",
+    help="Bandwidth in which force and model are compared [default: chosen from the recording].",
+)
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write what was compared here, as CSV.")
 @figure_option("Draw force and friction here")
 @click.option("--force", is_flag=True, help="Overwrite these files.")
@@ -36,7 +41,7 @@ def drive(
     r"""Identify one strut drive from position and force, and find the physics that mass and viscous friction leave out.
 
     The recording is a CSV file with the columns t_s, position_mm and force_n, or motor_current_a. Record strokes to and
-    fro at several speeds. The verdicts are those of diagnose: identified, ambiguous, ruled-out, not-testable.
+    fro at several speeds. Verdicts: identified, ambiguous, ruled-out, not-testable.
 
     \b
     Examples:
@@ -89,7 +94,7 @@ def _print(summary: Mapping[str, Any]) -> None:
     _print_sources(summary["sources"])
     click.echo("\nidentified:")
     for name, number in summary["parameters"].items():
-        known = _number(number) if number["identifiable"] else "cannot be told from this recording"
+        known = _number(number) if number["identifiable"] else "not identifiable from this recording"
         click.echo(f"  {name}: {known}")
     for side, values in summary["friction"].items():
         click.echo(f"  friction {side}: " + ", ".join(f"{name} {_number(n)}" for name, n in values.items()))
@@ -124,7 +129,7 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
         [s["name"], s["verdict"], f"{s['gain']:.0f}", f"{100 * s['concealed']:.0f} %", ", ".join(s["ambiguous_with"])]
         for s in sources
     ]
-    print_table(["cause", "verdict", "log evidence", "concealed", "not told from"], rows)
+    print_table(["cause", "verdict", "log Bayes factor", "concealed (R²)", "not distinguished from"], rows)
     for source in sources:
         if source["verdict"] in {"identified", "ambiguous"}:
             click.echo()

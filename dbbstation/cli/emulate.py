@@ -23,18 +23,45 @@ _LOOK_S = 0.2
 
 
 @click.command()
-@click.option("--instrument", required=True, metavar="NAME", help="An instrument that is known, or a protocol file.")
-@click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="Balls and circles.")
-@click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
-@click.option("--truth", type=click.Path(path_type=Path), help="Model with what is wrong with the actual machine.")
-@source_file_option
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of everything random.")
-@click.option("--rate-hz", type=click.FloatRange(0.1, 100000.0), help="Samples per second, where it is set to others.")
-@click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of NC programs to run.")
-@click.option("--time-scale", type=click.FloatRange(0.01, 200.0), default=1.0, show_default=True, help="Times faster.")
-@click.option("--noise-um", type=click.FloatRange(min=0.0), default=0.3, show_default=True, help="Of a reading [µm].")
 @click.option(
-    "--bar-um", type=click.FloatRange(min=0.0), default=0.5, show_default=True, help="Of the bar length [µm]."
+    "--instrument",
+    required=True,
+    metavar="NAME",
+    help="Name of an instrument (`dbbstation instruments`), or a protocol file.",
+)
+@click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="Test plan.")
+@click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
+@click.option(
+    "--truth", type=click.Path(path_type=Path), help="Model file with the true errors of the virtual machine."
+)
+@source_file_option
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of everything random.")
+@click.option(
+    "--rate-hz",
+    type=click.FloatRange(0.1, 100000.0),
+    help="Sampling rate [1/s], where it is not the instrument's usual one.",
+)
+@click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of NC programs to run.")
+@click.option(
+    "--time-scale",
+    type=click.FloatRange(0.01, 200.0),
+    default=1.0,
+    show_default=True,
+    help="Factor by which machine and line run faster than real time.",
+)
+@click.option(
+    "--noise-um",
+    type=click.FloatRange(min=0.0),
+    default=0.3,
+    show_default=True,
+    help="Standard deviation of the noise of a reading [µm].",
+)
+@click.option(
+    "--bar-um",
+    type=click.FloatRange(min=0.0),
+    default=0.5,
+    show_default=True,
+    help="Standard deviation of the bar's length error [µm].",
 )
 @click.option("--baud", type=click.IntRange(min=1), help="Baud rate that the virtual instrument is set to.")
 @click.option("--json", "as_json", is_flag=True, help="Print port and control address as one JSON line.")
@@ -54,7 +81,7 @@ def emulate(
     baud: int | None,
     as_json: bool,
 ) -> None:
-    r"""Be a hexapod with a ball bar: answer as an instrument on a pseudo-terminal, until Ctrl-C or `quit`.
+    r"""Run a virtual hexapod with a ball bar, as an instrument on a pseudo-terminal, until Ctrl-C or `quit`.
 
     Prints the port, and a control address on this computer that starts circles: one line of text per command, one line
     of JSON per answer. Without --truth the machine has random kinematic errors of 0.1 mm. Its mountings, ball

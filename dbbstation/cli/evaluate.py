@@ -26,9 +26,10 @@ def evaluate(
 ) -> None:
     r"""Compare recordings with the nominal machine (before) and with a model (after), which must be of the same machine.
 
-    After is what the model leaves of the recordings, not a new measurement. The second table sets the circularity that
-    was measured beside the one that the model predicts, both up to 30 undulations per revolution. Flatness over X, Y = ±190 mm and
-    parallelism of a move along X are what the model predicts of programs that are not compensated.
+    After is what the model leaves of the recordings, not a new measurement. The second table shows the circular
+    deviation G that was measured and the one that the model predicts. In both tables G is that of readings low-passed at
+    30 undulations per revolution. Flatness over X, Y = ±190 mm and parallelism of a move along X are what the model
+    predicts of programs that are not compensated.
 
     \b
     Examples:
@@ -53,7 +54,12 @@ def evaluate(
         say(f"note: {warning}")
     summary = evaluation_summary(compare(identified.model, recorded.observations))
     for run, circle in zip(summary["runs"], predicted_circles(identified.model, recorded.observations), strict=True):
-        run["circularity_30_upr_um"] = {"measured": circle.measured_um, "predicted": circle.predicted_um}
+        run["circularity_30_upr_um"] = {
+            "measured": circle.measured_um,
+            "predicted": circle.predicted_um,
+            "before": circle.before_um,
+            "after": circle.after_um,
+        }
     height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
     plane = plane_figures(identified.model, height_mm)
     summary |= {"flatness_um": plane.flatness_um, "parallelism_um": plane.parallelism_um, "plane_z_mm": height_mm}
@@ -62,7 +68,7 @@ def evaluate(
     if as_json:
         print_json(summary)
         return
-    print_runs(summary)
+    print_runs(summary, low_passed=True)
     click.echo()
     _print_predicted(summary)
     click.echo()
@@ -84,5 +90,5 @@ def _print_predicted(summary: Mapping[str, Any]) -> None:
         off = predicted - measured
         share = f"{100 * off / measured:.0f}" if measured else "-"
         rows.append([run["test"], run["direction"], run["repeat"], measured, predicted, off, share])
-    click.echo("circularity up to 30 undulations per revolution [µm]")
+    click.echo("circular deviation G up to 30 undulations per revolution [µm]")
     print_table(["test", "dir", "n", "measured", "predicted", "difference", "%"], rows)

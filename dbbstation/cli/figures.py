@@ -11,17 +11,40 @@ from dbbstation.cli.output import print_table
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+G_WITH_NOISE = "G: greatest less least deviation from the least-squares circle [ISO 230-4], the bar's noise included"
+G_LOW_PASSED = (
+    "G: greatest less least deviation from the least-squares circle [ISO 230-4], readings low-passed at 30 undulations "
+    "per revolution"
+)
+"""What a table means by circular deviation G. Of a good circle the first is mostly noise, about six times its standard
+deviation; only the second can be held against a prediction, which has no noise."""
 
-def print_runs(summary: Mapping[str, Any]) -> None:
-    """Print centre deviation, mean radial error and circularity of every run, before and after."""
-    click.echo("             centre deviation     mean radial error         circularity      [µm]")
+
+def print_runs(summary: Mapping[str, Any], *, low_passed: bool = False) -> None:
+    """Print centre deviation, mean radial error and circular deviation of every run, before and after.
+
+    Args:
+        summary: what `evaluation_summary` returns.
+        low_passed: print the circular deviation of low-passed readings, which its runs must then have.
+    """
+    click.echo("             centre deviation     mean radial error  circular deviation G  [µm]")
     titles = ["test", "dir", "n", "before", "after", " before", " after", "  before", "  after"]
     rows = []
     for run in summary["runs"]:
-        pairs = [
-            run[when][figure]
-            for figure in ("centre_deviation_um", "mean_radial_error_um", "circularity_um")
-            for when in ("before", "after")
-        ]
-        rows.append([run["test"], run["direction"], run["repeat"], *pairs])
+        both = [run[when] for when in ("before", "after")]
+        bent = [run["circularity_30_upr_um"][when] if low_passed else run[when]["circularity_um"] for when in WHEN]
+        rows.append(
+            [
+                run["test"],
+                run["direction"],
+                run["repeat"],
+                *(of["centre_deviation_um"] for of in both),
+                *(of["mean_radial_error_um"] for of in both),
+                *bent,
+            ]
+        )
     print_table(titles, rows)
+    click.echo(G_LOW_PASSED if low_passed else G_WITH_NOISE)
+
+
+WHEN = ("before", "after")

@@ -27,17 +27,30 @@ _AUTO_PATIENCE_S = 60.0
 
 
 @click.command()
-@click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="What is measured.")
+@click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="Test plan.")
 @click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
-@click.option("--instrument", required=True, metavar="NAME", help="An instrument that is known, or a protocol file.")
+@click.option(
+    "--instrument",
+    required=True,
+    metavar="NAME",
+    help="Name of an instrument (`dbbstation instruments`), or a protocol file.",
+)
 @click.option("--port", required=True, help="Port name, or a URL such as socket://127.0.0.1:4001.")
 @click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder.")
 @click.option("--auto", metavar="URL", help="Start each circle at this control address of `emulate`, accept every run.")
 @click.option(
-    "--time-scale", type=click.FloatRange(0.01, 200.0), default=1.0, show_default=True, help="As of `emulate`."
+    "--time-scale",
+    type=click.FloatRange(0.01, 200.0),
+    default=1.0,
+    show_default=True,
+    help="The same factor as of `emulate`.",
 )
-@click.option("--rate-hz", type=click.FloatRange(0.1, 100000.0), help="Samples per second, where it is set to others.")
+@click.option(
+    "--rate-hz",
+    type=click.FloatRange(0.1, 100000.0),
+    help="Sampling rate [1/s], where it is not the instrument's usual one.",
+)
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
@@ -58,9 +71,9 @@ def measure(
 ) -> None:
     r"""Measure a plan, test by test, into a session folder.
 
-    Says which ball goes into which bore and how the tool is tilted, waits for Enter, then for the machine: begin and
-    end of a circle are seen in the readings. Every sample is on the disk within a second. Ctrl-C stops; the same
-    command goes on where it stopped.
+    Tells you which ball goes into which bore and how to tilt the tool. It waits for Enter, then for the machine: it
+    detects start and end of a circle in the readings. Every sample is on the disk within a second. Ctrl-C stops the
+    measurement; the same command continues it.
 
     \b
     Examples:

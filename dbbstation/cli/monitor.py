@@ -15,11 +15,16 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--instrument", required=True, metavar="NAME", help="An instrument that is known, or a protocol file.")
+@click.option(
+    "--instrument",
+    required=True,
+    metavar="NAME",
+    help="Name of an instrument (`dbbstation instruments`), or a protocol file.",
+)
 @click.option("--port", required=True, help="Port name, or a URL such as socket://127.0.0.1:4001.")
 @click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
-@click.option("--count", type=click.IntRange(min=1), help="Stop after so many readings.")
-@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="Write down every byte, for `replay`.")
+@click.option("--count", type=click.IntRange(min=1), help="Number of readings after which to stop.")
+@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="Log every byte here, for `replay`.")
 @click.option("--force", is_flag=True, help="Overwrite the log file.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per reading, and one with the totals.")
 def monitor(

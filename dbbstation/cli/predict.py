@@ -17,11 +17,11 @@ from dbbstation.cli.source_files import source_file_option
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON.")
 def predict(*, model: Path, source_files: tuple[Path, ...], poses: Path, out: Path, force: bool, as_json: bool) -> None:
-    r"""Say where the tool really goes for commanded poses, and how well that is known.
+    r"""Predict the actual poses for commanded ones, with standard uncertainties.
 
-    Columns in: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Out: the same, actual, with u_x_mm,u_y_mm,u_z_mm, one standard
-    uncertainty each. Further columns are carried over. Directions that the calibration could not see are not part
-    of the uncertainty; they are named.
+    Input columns: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Output: the same columns with the actual pose, and u_x_mm,u_y_mm,
+    u_z_mm, the standard uncertainties. Further columns are copied. Combinations of parameters that the calibration
+    could not identify are not part of the uncertainty; they are named.
 
     \b
     Examples:

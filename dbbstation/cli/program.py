@@ -28,14 +28,14 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     type=click.FloatRange(0.0),
     default=20.0,
     show_default=True,
-    help="Height of rapids over the first point [mm].",
+    help="Height of rapid moves above the first point [mm].",
 )
 @click.option("--bar-stays-on", is_flag=True, help="Start and end with the bar on its balls: no rapids, no stops.")
 @click.option(
     "--time-s",
     type=float,
     metavar="S",
-    help="When programs start, after the session began [s]; for models that need time.",
+    help="Start of the programs after the session's start [s], for models that depend on time.",
 )
 @largest_correction_option
 @click.option("--force", is_flag=True, help="Overwrite programs.")

@@ -10,7 +10,9 @@ import click
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--instrument", metavar="NAME", help="An instrument that is known, or a protocol file [that of the log].")
+@click.option(
+    "--instrument", metavar="NAME", help="Name of an instrument, or a protocol file [default: that of the log]."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def replay(file: Path, *, instrument: str | None, as_json: bool) -> None:
     """Decode a byte log that `monitor --log` wrote: every reading, and everything that is not understood.

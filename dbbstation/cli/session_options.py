@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 _OPTIONS = (
-    click.option("--operator", default="", help="Who measures."),
-    click.option("--serial-number", default="", help="Of the machine."),
+    click.option("--operator", default="", help="Name of the operator."),
+    click.option("--serial-number", default="", help="Serial number of the machine."),
     click.option("--ambient-temp-c", type=float, help="Temperature of the shop [degC]."),
-    click.option("--bar-serial-number", default="", help="Of the bar."),
+    click.option("--bar-serial-number", default="", help="Serial number of the bar."),
     click.option(
         "--bar-length-mm",
         type=float,
         help="Calibrated distance between the ball centres [mm]; held against the plan's radii, never added to readings.",
     ),
-    click.option("--bar-uncertainty-um", type=float, help="Of that length, one standard deviation [µm]."),
-    click.option("--bar-temp-c", type=float, help="Of the bar when it was calibrated [degC]."),
+    click.option("--bar-uncertainty-um", type=float, help="Standard uncertainty u of that length [µm]."),
+    click.option("--bar-temp-c", type=float, help="Temperature of the bar at its calibration [degC]."),
 )
 
 

@@ -21,8 +21,8 @@ def simulate(
 ) -> None:
     r"""Write the session that a ball bar would record on the machine of a model, without noise.
 
-    Balls stand where the plan has them, those that it puts up under the spindle where the model has the tool tip; only
-    the machine's own error sources act. Rows carry their angles, lengths are written to 1 nm.
+    Balls are at the positions of the plan; balls under the spindle are at the tool tip of the model. Only the machine's
+    own error sources act. Samples have commanded angles; lengths are written to 1 nm.
 
     \b
     Examples:

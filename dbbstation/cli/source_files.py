@@ -21,5 +21,5 @@ def source_file_option(function: _Function) -> _Function:
         multiple=True,
         type=click.Path(path_type=Path),
         metavar="FILE.py",
-        help="Python file with an error source of your own; it is run. May be given more than once.",
+        help="Python file with an error source of your own. It is executed. May be given more than once.",
     )(function)

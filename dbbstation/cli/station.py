@@ -31,21 +31,23 @@ _DEMO_SEED = 3
 
 
 @click.command()
-@click.option("--plan", "plan_file", type=click.Path(path_type=Path), help="What is measured.")
+@click.option("--plan", "plan_file", type=click.Path(path_type=Path), help="Test plan.")
 @click.option("--machine", "machine_file", type=click.Path(path_type=Path), help="Nominal machine.")
-@click.option("--instrument", metavar="NAME", help="An instrument that is known, or a protocol file.")
+@click.option(
+    "--instrument", metavar="NAME", help="Name of an instrument (`dbbstation instruments`), or a protocol file."
+)
 @click.option("--port", help="Port name, or a URL such as socket://127.0.0.1:4001.")
 @click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
 @click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), help="Session folder; one that exists goes on."
+    "--out", type=click.Path(path_type=Path, file_okay=False), help="Session folder. An existing session is continued."
 )
-@click.option("--virtual", is_flag=True, help="Without hardware: a virtual machine and instrument.")
+@click.option("--virtual", is_flag=True, help="Use a virtual machine and instrument.")
 @click.option(
     "--time-scale",
     type=click.FloatRange(0.01, 50.0),
     default=1.0,
     show_default=True,
-    help="Times faster than real, with --virtual.",
+    help="Factor by which the virtual machine runs faster than real time, with --virtual.",
 )
 @session_options
 def station(
@@ -62,7 +64,7 @@ def station(
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
 
-    Records what `dbbstation measure` records. Quitting loses nothing; the same command goes on where it stopped.
+    Records what `dbbstation measure` records. Quitting loses nothing; the same command continues the session.
 
     \b
     Examples:

@@ -2,7 +2,7 @@
 
 Readings are added up over narrow pieces of a variable, once for what the base leaves and once for everything that the
 base can do. Any curve over the variable then costs as much as it has pieces, and what it would explain beside the base
-is still exact but for the width of a piece. The best few of each kind enter the race as shapes.
+is still exact but for the width of a piece. The best few of each kind are compared as unmodelled effects.
 """
 
 from __future__ import annotations

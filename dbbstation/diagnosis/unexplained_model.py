@@ -108,7 +108,7 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> Kept:
 
 
 def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
-    """Return the finding with the wave of an exact fit: the race knows its period from a first look only.
+    """Return the finding with the wave of an exact fit: the comparison knows its period from the scan only.
 
     A wave of few turns is partly made by joints, which pulls that look by some per cent; the fit has the period among
     its parameters, with its uncertainty. Where the fit does not converge the finding stays.

@@ -37,7 +37,7 @@ MOST_ALTERNATIVES = 6
 """Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
 
 
-NOT_SURE = "It may be there; these tests are not sure of it."
+NOT_SURE = "It may be there; these tests do not decide it."
 
 
 def judge(explained: Explained) -> tuple[SourceFinding, ...]:
@@ -114,7 +114,7 @@ class _Judge:
         if self._probability((name,)) >= EVEN:
             return Verdict.AMBIGUOUS, (), (), NOT_SURE
         if self._testable(name):
-            return Verdict.RULED_OUT, (), (), "It would have been seen at its usual size and was not needed."
+            return Verdict.RULED_OUT, (), (), "It would have been seen at its plausible size and was not needed."
         return Verdict.NOT_TESTABLE, (), (), self._why_not_testable(name)
 
     def _verdict_of_member(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
@@ -189,8 +189,8 @@ class _Judge:
             plausible = self._named[name].variants[0].plausible
             scaled = plausible[:, None] * products * plausible
             if np.sqrt(max(float(np.linalg.eigvalsh(scaled)[-1]), 0.0)) >= TESTABLE_SIGMA:
-                return f"Beside {member.cause.name}, and what its formula may be off by, these tests would not see it."
-        return "These tests would not see it at its usual size: the fitted parameters conceal it."
+                return f"Beside {member.cause.name}, and what its formula may be off by, these tests would not show it."
+        return "These tests would not show it at its plausible size: the fitted parameters conceal it."
 
     def _beside(self, cause: Cause) -> tuple[float, Member]:
         """Log Bayes factor of a cause beside the most probable hypothesis, and the form that suits it best there."""

@@ -45,7 +45,8 @@ class DemoResult:
 
     Attributes:
         folder: where everything is.
-        runs: per test, figures of the first circle in its first direction, before and after, in µm.
+        runs: per test, figures of the first circle in its first direction, before and after, in µm; the circularity with
+            the bar's noise and without, as `evaluate --json` has both.
         diagnosis: what `diagnose --json` said.
         calibration: what `calibrate --json` said.
     """
@@ -172,9 +173,14 @@ def _short(argument: str) -> str:
 
 def _side_by_side(before: dict[str, Any], after: dict[str, Any]) -> list[dict[str, Any]]:
     """Measured figures of the same runs in two sessions, [CAL Table III]."""
-    later = {(run["test"], run["direction"]): run["measured"] for run in after["runs"]}
+    later = {(run["test"], run["direction"]): _measured(run) for run in after["runs"]}
     return [
-        {"test": run["test"], "before": run["measured"], "after": later[run["test"], run["direction"]]}
+        {"test": run["test"], "before": _measured(run), "after": later[run["test"], run["direction"]]}
         for run in before["runs"]
         if run["direction"] == "ccw"
     ]
+
+
+def _measured(run: dict[str, Any]) -> dict[str, float]:
+    """Measured figures of a run."""
+    return {**run["measured"], "circularity_30_upr_um": run["circularity_30_upr_um"]["measured"]}

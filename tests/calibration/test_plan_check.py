@@ -58,7 +58,7 @@ def test_half_the_tilts_pass_unseen_at_three_tests_and_that_is_said(tmp_path, ca
     assert told["left"] == told["determined"] - told["identified"] < told["of_one_test"]
     with pytest.raises(SystemExit):
         main(["calibrate", str(tmp_path / "s")])
-    assert "so few tests (3) cannot show a wrong tilt, height or place in the plan" in capsys.readouterr().out
+    assert "3 tests are too few to reveal a wrong tilt, height or position in the plan" in capsys.readouterr().out
 
 
 def test_six_tests_show_half_the_tilts(tmp_path):

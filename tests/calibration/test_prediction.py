@@ -59,7 +59,7 @@ def test_the_command_prints_both(tmp_path):
     model = str(tmp_path / "model.yaml")
     assert CliRunner().invoke(cli, ["calibrate", small, "--out", model]).exit_code == 0
     said = CliRunner().invoke(cli, ["evaluate", small, "--model", model])
-    assert "circularity up to 30 undulations per revolution" in said.stdout
+    assert "circular deviation G up to 30 undulations per revolution" in said.stdout
     answer = json.loads(CliRunner().invoke(cli, ["evaluate", small, "--model", model, "--json"]).stdout)
     for run in answer["runs"]:
         both = run["circularity_30_upr_um"]

@@ -82,7 +82,7 @@ def test_an_outlier_is_told_and_its_model_kept_clean(run, tmp_path):
     (outlier,) = outcome.data["outliers"]
     assert outlier["test"] == "h"
     assert outlier["shift_um"][0] == pytest.approx(-40.0, abs=8.0)
-    assert "does not belong, kept from pulling the fit: the ball of test h" in outcome.err
+    assert "outlier, kept out of the fit: the ball of test h" in outcome.err
     for a, b in zip(before["sources"], outcome.data["sources"], strict=True):
         for name, number in a["parameters"].items():
             assert abs(b["parameters"][name]["value"] - number["value"]) < 3.0 * number["uncertainty"]

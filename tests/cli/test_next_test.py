@@ -34,7 +34,7 @@ def test_nothing_is_proposed_where_nothing_is_gained(diagnosed):
     assert data["next_test"] is None
     assert data["further_tests"] == []
     (line,) = (line for line in printed.splitlines() if line.startswith("measure next"))
-    assert "no single further test would change a verdict or halve an uncertainty" in line
+    assert "no proposal; up to three further tests would neither change a verdict nor halve u" in line
 
 
 def test_what_is_proposed_halves_an_uncertainty(diagnosed):

@@ -11,11 +11,9 @@ import click
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
-@click.option(
-    "--candidates", metavar="A,B,...", help="Sources to look for; every known one if left out, as in `diagnose`."
-)
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes; all cores if left out.")
-@click.option("--again", is_flag=True, help="Judge sessions anew that have a verdict: the diagnosis has changed.")
+@click.option("--candidates", metavar="A,B,...", help="Error sources to compare [default: all, as in `diagnose`].")
+@click.option("--jobs", type=click.IntRange(min=1), help="Number of processes [default: all cores].")
+@click.option("--again", is_flag=True, help="Diagnose sessions again that have a verdict already.")
 @click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Reliability diagram, as SVG.")
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
@@ -99,7 +97,7 @@ def _print(found: dict[str, Any]) -> None:
         print_table(["", ""], [[label, f"{s['hits']} of {s['count']}"] for label, s in found["right_by_law"].items()])
     for title, table in (found["reliability"] or {}).items():
         click.echo(f"\nprobabilities of {title}")
-        print_table(["said", "mean", "there", "share", "95 % interval"], [_bin(entry) for entry in table])
+        print_table(["probability", "mean", "there", "share", "95 % interval"], [_bin(entry) for entry in table])
     click.echo()
     rows = []
     for name, effect in found["effects"].items():
@@ -119,7 +117,7 @@ def _print(found: dict[str, Any]) -> None:
     over, gain, inside = (found["held_out"][key] for key in ("normalised", "gain", "inside"))
     if over:
         click.echo(
-            f"left-out tests, where rightly named: {over[1]:.2f} of what is predicted ({over[0]:.2f} to {over[2]:.2f}; "
+            f"held-out tests, where rightly named: {over[1]:.2f} of what is predicted ({over[0]:.2f} to {over[2]:.2f}; "
             f"{inside['hits']} of {inside['count']} between 0.8 and 1.3), {gain[1]:.1f} times less than before"
         )
     if found["failures"]:
@@ -128,7 +126,7 @@ def _print(found: dict[str, Any]) -> None:
             [f["session"], f["seed"], f["recorded"], f["kind"], ", ".join(f["truth"]) or "-", f["said"]]
             for f in found["failures"]
         ]
-        print_table(["session", "seed", "recorded", "kind", "hidden (size in limits)", "said"], rows)
+        print_table(["session", "seed", "recorded", "kind", "hidden (size in limits)", "verdict"], rows)
 
 
 def _bin(entry: dict[str, Any]) -> list[object]:

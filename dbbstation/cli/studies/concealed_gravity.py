@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of everything random.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of everything random.")
 @figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
@@ -56,13 +56,13 @@ def _print(numbers: dict[str, Any]) -> None:
     click.echo(f"  leaves {residual['kinematic']:.1f} µm rms within mountings")
     click.echo(f"  ({residual['without_gravity_in_the_machine']:.1f} µm if the machine had no gravity)")
     click.echo(
-        f"  gravity bends these circles by {numbers['signature_um']:.1f} µm rms; the kinematic parameters swallow"
+        f"  gravity bends these circles by {numbers['signature_um']:.1f} µm rms; the kinematic parameters conceal"
     )
     click.echo(
         f"  {100 * numbers['concealed']:.0f} % of its sum of squares, {numbers['unconcealed_um']:.1f} µm rms remain"
     )
     shift = numbers["base_joint_shift_um"]
-    click.echo(f"  base joints pulled by up to {shift['greatest']:.0f} µm, {shift['rms']:.0f} µm rms")
+    click.echo(f"  bias of the base joints up to {shift['greatest']:.0f} µm, {shift['rms']:.0f} µm rms")
     click.echo("Named")
     click.echo(f"  gravity: {numbers['verdict']}")
     click.echo("Modelled")
@@ -72,11 +72,11 @@ def _print(numbers: dict[str, Any]) -> None:
     )
     held_out = numbers["held_out_um"]
     click.echo(f"After: {residual['joint']:.2f} µm rms within mountings;")
-    click.echo(f"  left-out tests predicted to {held_out['kinematic']:.1f} µm before, {held_out['joint']:.2f} µm after")
+    click.echo(f"  held-out tests predicted to {held_out['kinematic']:.1f} µm before, {held_out['joint']:.2f} µm after")
     click.echo("\nThe circle about (0, 100, -1008) mm, tilted by -23 degrees, if compensated with")
     rows = [
         [name, of["circularity_um"], of["centre_deviation_um"], of["greatest_position_error_um"]]
         for name, of in numbers["tilted_circle"].items()
     ]
-    print_table(["", "circularity", "centre deviation", "greatest position error [µm]"], rows)
+    print_table(["", "G, no noise in it", "centre deviation", "greatest position error [µm]"], rows)
     click.echo("(in the last column a common height remains, which level circles on the jig do not see)")

@@ -14,7 +14,7 @@ PLANS = {"elevated": "table2-elevated", "level": "table2"}
     "--machines", default=500, show_default=True, type=click.IntRange(min=10), help="Random machines per plan."
 )
 @click.option("--plan", type=click.Choice(sorted(PLANS)), help="One of the two plans only.")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of the first machine.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def coverage(*, machines: int, plan: str | None, seed: int, as_json: bool) -> None:
     r"""Calibrate many random machines and count how often the 95 % intervals contain the truth.

@@ -22,7 +22,7 @@ ROWS = {
 
 @click.command()
 @click.option("--machines", default=60, show_default=True, type=click.IntRange(min=3), help="Random machines.")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of the first machine.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
 @figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")

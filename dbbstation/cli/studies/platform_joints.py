@@ -11,13 +11,15 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of machine and measurements.")
+@click.option(
+    "--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of machine and measurements."
+)
 @click.option(
     "--size-um",
     default=5.0,
     show_default=True,
     type=click.FloatRange(0.1, 500.0),
-    help="Of a joint coordinate's error.",
+    help="Standard deviation of a joint coordinate's error.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def platform_joints(*, seed: int, size_um: float, as_json: bool) -> None:
@@ -70,8 +72,8 @@ def _print(found: Mapping[str, Any]) -> None:
                 f"{predicted['before']:.2f} -> {predicted['after']:.2f}",
             ]
         )
-    titles = ["tests", "verdict", "not told from", "log evidence", "concealed"]
-    print_table([*titles, "kinematic", "joint", "stated", "left-out tests"], rows)
+    titles = ["tests", "verdict", "not distinguished from", "log Bayes factor", "concealed (R²)"]
+    print_table([*titles, "kinematic", "joint", "stated", "held-out tests"], rows)
     click.echo(
         "kinematic, joint: true position error over the workspace less its mean, stated: as the model says [µm rms]"
     )

@@ -18,7 +18,7 @@ TITLES = {
 @click.command()
 @click.option("--machines", default=100, show_default=True, type=click.IntRange(min=5), help="Random machines.")
 @click.option("--rigid", is_flag=True, help="Struts that gravity does not stretch: nothing but kinematic errors.")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Of the first machine.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def table_iii(*, machines: int, rigid: bool, seed: int, as_json: bool) -> None:
     r"""Calibrate random machines in the paper's three ways and verify them on the jig [CAL Table III, Fig 7].

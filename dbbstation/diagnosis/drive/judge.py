@@ -163,8 +163,8 @@ def _text(source: DriveSource, verdict: Verdict, alike: Sequence[str]) -> str:
     if verdict is Verdict.AMBIGUOUS:
         return f"This recording cannot tell it from {', '.join(alike)}. {source.texts.confirm}"
     if verdict is Verdict.NOT_TESTABLE:
-        return "This recording would not show it at its usual size: what was fitted swallows it."
-    return "It would have been seen at its usual size and was not needed."
+        return "This recording would not show it at its plausible size: the fitted parameters conceal it."
+    return "It would have been seen at its plausible size and was not needed."
 
 
 def overruled(race: Race, shapes: Sequence[Candidate], chosen: Sequence[Choice]) -> set[str]:

@@ -1,0 +1,235 @@
+"""Console blocks of README and documentation: their commands exist, and print what is shown."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import click
+import pytest
+
+from dbbstation.cli import cli
+from dbbstation.cli.diagnose import _print as print_diagnosis
+from dbbstation.files.shipped import shipped_folder
+from tests.cli.conftest import call
+
+HERE = Path(__file__).resolve().parents[2]
+DOCUMENTS = ["README.md", *sorted(str(path.relative_to(HERE)) for path in (HERE / "docs").glob("*.md"))]
+ANYTHING = "…"
+
+EXEMPT = {
+    ("README.md", "dbbstation demo"): "measures thirty circles twice, a minute or two; see tests/studies/test_demo.py",
+    ("README.md", "dbbstation diagnose measured"): "the session of the demonstration, which takes a minute to record",
+    ("docs/calibration.md", "dbbstation calibrate standard-test"): "thirty circles that are in no repository",
+    ("docs/compare.md", "dbbstation compare before after"): "two sessions of thirty circles, a minute to record",
+    ("docs/currents.md", "dbbstation calibrate recorded"): "thirty circles at 50 Hz with currents, a minute to record",
+    ("docs/diagnosis.md", "dbbstation diagnose measured"): "the session of the demonstration, as in the README",
+    ("docs/drive.md", "dbbstation drive emps.csv"): "a recording that is not ours to give; see test_drive_real.py",
+    ("docs/getting-started.md", "dbbstation emulate"): "a machine that runs until it is stopped; its port changes",
+    ("docs/getting-started.md", "dbbstation measure"): "thirty circles at ten times real speed, four minutes",
+    ("docs/getting-started.md", "dbbstation calibrate recorded"): "the session that took four minutes",
+    ("docs/getting-started.md", "dbbstation predict"): "the model of that session",
+    ("docs/getting-started.md", "cat in.csv"): "an input that the reader writes",
+    ("docs/getting-started.md", "cat out.csv"): "the answer of that model",
+    ("docs/getting-started.md", "dbbstation program"): "the model of that session",
+    ("docs/gravity.md", "dbbstation study gravity"): "sixty machines, minutes; see tests/studies/test_gravity_study.py",
+}
+"""Commands whose output is shown and not compared, by document and beginning of the line, with the reason."""
+
+SLOW = {("docs/diagnosis.md", "dbbstation study concealed-gravity")}
+"""Those that take about ten seconds."""
+
+
+@dataclass
+class Command:
+    """One line after a dollar sign, and what is shown of its output."""
+
+    document: str
+    number: int
+    text: str
+    shown: list[str] = field(default_factory=list)
+
+    @property
+    def kind(self) -> tuple[str, str]:
+        """Key of a command that begins as this one does, in the tables above."""
+        keys = (key for key in (*EXEMPT, *SLOW) if key[0] == self.document and self.text.startswith(key[1]))
+        return next(keys, (self.document, self.text))
+
+    def __str__(self) -> str:
+        return f"{self.document}:{self.number}"
+
+
+def commands_of(document: str) -> list[Command]:
+    found: list[Command] = []
+    in_block, continued = False, False
+    for number, line in enumerate((HERE / document).read_text(encoding="utf-8").splitlines(), start=1):
+        if line.startswith("```"):
+            in_block = not in_block and line == "```console"
+            continued = False
+        elif in_block and line.startswith("$ "):
+            found.append(Command(document, number, line[2:].removesuffix("\\")))
+            continued = line.endswith("\\")
+        elif in_block and continued:
+            found[-1].text += line.removeprefix(">").strip().removesuffix("\\") + " "
+            continued = line.endswith("\\")
+        elif in_block and found:
+            found[-1].shown.append(line)
+    return found
+
+
+COMMANDS = [command for document in DOCUMENTS for command in commands_of(document)]
+COMPARED = [command for command in COMMANDS if command.shown and command.kind not in EXEMPT]
+
+
+def words_of(command: Command) -> list[str]:
+    return shlex.split(command.text.partition(" > ")[0], comments=True)
+
+
+def is_alike(shown: str, printed: str) -> bool:
+    """Whether words are the same, and numbers within one unit of their last digit or a hundredth."""
+    if shown.endswith(ANYTHING):
+        shown = shown.removesuffix(ANYTHING).rstrip()
+        printed = " ".join(printed.split()[: len(shown.split())])
+    ours, theirs = shown.split(), printed.split()
+    return len(ours) == len(theirs) and all(map(_same, ours, theirs))
+
+
+def _same(one: str, other: str) -> bool:
+    if one == other:
+        return True
+    number = re.compile(r"[+-]?\d+(?:\.(\d+))?")
+    if number.sub("#", one) != number.sub("#", other):
+        return False
+    for a, b in zip(number.finditer(one), number.finditer(other), strict=True):
+        unit = 10.0 ** -len(a[1] or "")
+        if abs(float(a[0]) - float(b[0])) > max(1.01 * unit, 0.01 * abs(float(a[0]))):
+            return False
+    return True
+
+
+def is_shown_by(shown: list[str], printed: list[str]) -> bool:
+    """Whether shown lines are what was printed, any lines standing where there is an ellipsis alone."""
+    if not shown:
+        return not printed
+    if shown[0] == ANYTHING:
+        return any(is_shown_by(shown[1:], printed[k:]) for k in range(len(printed) + 1))
+    return bool(printed) and is_alike(shown[0], printed[0]) and is_shown_by(shown[1:], printed[1:])
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory):
+    """A folder with what the examples find in a checkout, and files that the documents speak of."""
+    folder = tmp_path_factory.mktemp("checkout")
+    for name in ("fixtures", "protocols"):
+        (folder / name).symlink_to(shipped_folder(name))
+    (folder / "docs" / "images").mkdir(parents=True)
+    machine = re.search(
+        r"^```yaml\n(format: dbb-machine/1\n.*?)^```", (HERE / "README.md").read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
+    assert machine
+    (folder / "our-machine.yaml").write_text(machine[1], encoding="utf-8")
+    shutil.copy(shipped_folder("fixtures") / "machines" / "reference.yaml", folder / "machine.yaml")
+    plan = (shipped_folder("protocols") / "plans" / "table2-elevated.yaml").read_text("utf-8").splitlines()
+    second = next(k for k, line in enumerate(plan) if "{name: b," in line)
+    plan[second] = plan[second].replace("elevation_deg", "elevaton_deg")
+    (folder / "plan.yaml").write_text("\n".join(plan) + "\n", encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(c, id=str(c), marks=[pytest.mark.slow] if c.kind in SLOW else []) for c in COMPARED],
+)
+def test_a_command_prints_what_is_shown(command, workshop, monkeypatch):
+    monkeypatch.chdir(workshop)
+    words = words_of(command)
+    assert words[0] == "dbbstation"
+    outcome = call(*words[1:])
+    # On a terminal both streams are seen; which comes first depends on the command.
+    printed = [outcome.out, outcome.err + outcome.out, outcome.out + outcome.err]
+    assert any(is_shown_by(command.shown, one.splitlines()) for one in printed), "\n".join(printed)
+
+
+@pytest.mark.parametrize("command", [pytest.param(c, id=str(c)) for c in COMMANDS])
+def test_a_command_exists_with_its_options(command):
+    words = words_of(command)
+    if words[0] == "dbbstation":
+        group, context = cli, click.Context(cli, info_name="dbbstation")
+        while isinstance(group, click.Group):
+            name, *words = words[1:] if words[0] == "dbbstation" else words
+            group = group.get_command(context, name)
+            assert group is not None, name
+        group.make_context(group.name, [word for word in words if word != ANYTHING], resilient_parsing=True)
+    elif words[:2] == ["python", "-m"]:
+        place = HERE.joinpath(*words[2].split("."))
+        assert place.with_suffix(".py").exists() or (place / "__main__.py").exists()
+    elif words[0] == "python":
+        assert (HERE / words[1]).exists()
+    else:
+        assert words[0] == "cat"
+
+
+def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys):
+    """Lines without a cause's own text, numbers aside, against what the command prints of made-up numbers."""
+    source = {
+        "name": "gravity",
+        "verdict": "identified",
+        "probability": 1.0,
+        "concealed": 0.9,
+        "gain": 9.0,
+        "stability": 1.0,
+        "ambiguous_with": [],
+        "class": [],
+        "parameters": {},
+        "text": "",
+    }
+    both = {"before": 2.0, "after": 1.0}
+    print_diagnosis(
+        {
+            "mismatch": True,
+            "misfit_rms_um": 2.0,
+            "probability": 0.0,
+            "outliers": [],
+            "sources": [source],
+            "locations": [],
+            "residual_rms_um": both,
+            "held_out_rms_um": both,
+            "held_out_normalised": both,
+            "workspace": None,
+            "parameter_shift": [{"parameter": "joint", "shift_um": 1.0}],
+            "unexplained": {"text": "Nothing is left beyond noise.", "curve": None},
+            "further_tests": None,
+        }
+    )
+    printed = {_without_numbers(line) for line in capsys.readouterr().out.splitlines()}
+    beginnings = ("The recordings", "cause ", "value ±", "residual ", "error of ", "bias of ", "Nothing ")
+    for document, least in (("README.md", 2), ("docs/diagnosis.md", 7)):
+        shown = [c.shown for c in COMMANDS if c.kind == (document, "dbbstation diagnose measured")]
+        lines = [line for block in shown for line in block if line.startswith(beginnings)]
+        assert len(lines) >= least
+        assert {_without_numbers(line) for line in lines} <= printed
+
+
+def _without_numbers(line: str) -> str:
+    return " ".join(re.sub(r"\d+(\.\d+)?(e-\d+)?", "#", line).split())
+
+
+def test_every_exemption_is_one():
+    shown = {command.kind for command in COMMANDS if command.shown}
+    assert set(EXEMPT) <= shown
+    assert shown >= SLOW
+
+
+def test_the_comparison_sees_what_differs():
+    printed = ["a  1.0", "b  2.0", "c  3.0"]
+    assert is_shown_by(["a 1.0", ANYTHING, "c 3.1"], printed)
+    assert is_shown_by([ANYTHING, "b 2.0", ANYTHING], printed)
+    assert not is_shown_by(["a 1.0", "c 3.0"], printed)
+    assert not is_shown_by(["a 1.0", ANYTHING, "c 3.2"], printed)
+    assert not is_shown_by(["a 1.0", "b 2.0"], printed)
+    assert not is_shown_by(["a 1.0", "b two", "c 3.0"], printed)
+    assert is_alike("said of it …", "said of it and more")
+    assert not is_alike("said of it …", "said of her and more")

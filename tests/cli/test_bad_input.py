@@ -135,7 +135,7 @@ def test_missing_run(spoilt, refused):
     assert re.match(rf"session\.yaml:{line}:\d+: there is no file `{RUN}` in the session folder; restore it", refused())
 
 
-@pytest.mark.parametrize("file", ["machine.yaml", "plan.yaml", "session.yaml"])
+@pytest.mark.parametrize("file", ["machine.yaml", "plan.yaml"])
 def test_missing_file(spoilt, refused, file):
     spoilt.path(file).unlink()
     assert refused() == f"{file}: there is no such file; check the path\n"
@@ -224,7 +224,8 @@ def test_nothing_left(refused):
 def test_no_session_there(run, tmp_path):
     outcome = run("calibrate", tmp_path)
     assert outcome.code == FAILED
-    assert outcome.err == f"{tmp_path}/session.yaml: there is no such file; check the path\n"
+    what = "this folder is no session: there is no session.yaml in it; name a session folder"
+    assert outcome.err == f"{tmp_path}: {what}\n"
 
 
 @pytest.mark.parametrize(

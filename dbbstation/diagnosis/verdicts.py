@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import expit
 
+from dbbstation.diagnosis.channel import NAMED_ODDS
 from dbbstation.diagnosis.explain import SURE
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties
@@ -32,6 +34,9 @@ other: what is left of one beside the other is 4.5 % of it, about what real mach
 
 EVEN = 0.5
 """Probability from which on a cause that is not certain is rather there than not."""
+
+PRIOR = float(expit(NAMED_ODDS))
+"""Probability that a cause has before anything is measured: what is more probable afterwards is not ruled out."""
 
 MOST_ALTERNATIVES = 6
 """Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
@@ -113,9 +118,15 @@ class _Judge:
                 return Verdict.AMBIGUOUS, others, (), f"These tests cannot tell it from {', '.join(others)}."
         if self._probability((name,)) >= EVEN:
             return Verdict.AMBIGUOUS, (), (), NOT_SURE
-        if self._testable(name):
-            return Verdict.RULED_OUT, (), (), "It would have been seen at its plausible size and was not needed."
-        return Verdict.NOT_TESTABLE, (), (), self._why_not_testable(name)
+        return self._verdict_of_absent(name)
+
+    def _verdict_of_absent(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
+        """The same of a cause that is rather not there."""
+        if not self._testable(name):
+            return Verdict.NOT_TESTABLE, (), (), self._why_not_testable(name)
+        if self._probability((name,)) > PRIOR:
+            return Verdict.NOT_TESTABLE, (), (), "These tests leave it open: they neither show nor exclude it."
+        return Verdict.RULED_OUT, (), (), "It would have been seen at its plausible size and was not needed."
 
     def _verdict_of_member(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
         """The same of a cause of the most probable hypothesis."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+from dbbstation.diagnosis.unexplained import _overrules, _rival
+from dbbstation.diagnosis.unnamed import Best
 
 from dbbstation.diagnosis.forms import Proportional
 from dbbstation.diagnosis.shapes import EVERY, Shape
-from dbbstation.diagnosis.unexplained import _overrules, _rival
-from dbbstation.diagnosis.unnamed import Best
 from dbbstation.inference.race import Race, Variant
 
 COLUMN = Variant(np.array([0]), np.array([10.0]))

@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 import pytest
+from dbbstation.diagnosis.unexplained import unexplained
 
 from dbbstation.calibration.fit import calibrate
 from dbbstation.calibration.missing_physics import misfit_of
 from dbbstation.calibration.outliers import calibrate_robust
 from dbbstation.diagnosis.channel import channel_of, thinned
 from dbbstation.diagnosis.shapes import moves_struts, variable_of
-from dbbstation.diagnosis.unexplained import unexplained
 from dbbstation.recorded import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.oddities import CreepingSpindle, CyclingChiller, RockingTable, SpringyDrive, WindingCable

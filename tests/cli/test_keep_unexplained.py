@@ -24,7 +24,7 @@ def kept(tmp_path_factory, run):
 
 def test_the_curve_is_printed_with_its_uncertainty_and_that_its_cause_is_unknown(kept):
     outcome, _ = kept
-    assert "An error without a known name, organised by strut-length wave, strut 3." in outcome.out
+    assert "An unmodelled effect, organised by strut-length wave, strut 3." in outcome.out
     assert "cause unknown:" in outcome.out
     assert "a wave of 66.7" in outcome.out or "a wave of 66.6" in outcome.out
     assert "strut-length wave / mm" in outcome.out

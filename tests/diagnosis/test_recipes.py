@@ -20,7 +20,7 @@ SURE = 0.95
 
 def _diagnosed(recipe, folder):
     truth = recipe(folder)
-    return diagnose_sessions([truth.folder], None, (), lambda _: None, by_sets=True), truth
+    return diagnose_sessions([truth.folder], None, (), lambda _: None), truth
 
 
 def _named(summary):

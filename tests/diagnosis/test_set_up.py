@@ -30,7 +30,7 @@ def diagnosed(folder, seed, *mechanisms):
         seed=seed,
         plan=replace(table_ii_plan(seed), repeat_at_end=("a", "f", "k")),
         mechanisms=[RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05), *mechanisms],
-        rate_hz=20.0,
+        rate_hz=5.0,
     )
     recorded = load_sessions([folder])
     return diagnose(recorded.machine, recorded.observations, sources_named(NAMES))

@@ -213,6 +213,13 @@ def test_the_summary_has_the_agreed_keys(gravity):
     }
     assert agreed <= set(summary)
     assert {"test", "direction", "theta_deg", "strut", "variable", "share", "text"} <= set(summary["locations"][0])
-    assert {"name", "verdict", "ambiguous_with", "concealed", "gain", "parameters"} <= set(summary["sources"][0])
-    assert summary["sources"][-1]["verdict"] == "not-testable"
+    of_a_source = {"name", "verdict", "ambiguous_with", "concealed", "gain", "parameters"}
+    of_a_source |= {"probability", "class", "log_evidence", "stability"}
+    assert all(of_a_source <= set(source) for source in summary["sources"])
+    first, *_, last = summary["sources"]
+    assert first["name"] == "gravity"
+    assert 0.95 <= first["probability"] <= 1.0
+    # 15 µm where noise is 0.5 are found in any part of the tests.
+    assert first["stability"] == 1.0
+    assert (last["verdict"], last["probability"]) == ("not-testable", None)
     assert sum(location["share"] for location in summary["locations"]) <= 1.0

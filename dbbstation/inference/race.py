@@ -8,7 +8,7 @@ punished by the evidence itself [MacKay, Bayesian interpolation, Neural Computat
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,57 +48,24 @@ class Variant:
         columns: of the whole problem, shape (p,).
         prior: standard deviation of each amplitude, shape (p,).
         shape: values of the shape parameters, for reports.
-        scale: of the prior, against the amplitudes' plausible sizes: 1, or less where effects smaller than usual are
-            looked for. Many amplitudes that are all small would otherwise count as unlikely.
-        of: what it is the form of, where the variants of a candidate are several things of a kind and not several
-            shapes of one.
-        law: which law it follows, where a candidate has several.
     """
 
     columns: NDArray[np.int64]
     prior: NDArray[np.float64]
     shape: tuple[float, ...] = ()
-    scale: float = 1.0
-    of: str = ""
-    law: str = ""
-
-    @property
-    def plausible(self) -> NDArray[np.float64]:
-        """Plausible sizes of the amplitudes, shape (p,)."""
-        return self.prior / self.scale
-
-    def scaled(self, scale: float) -> Variant:
-        """Return the same form for effects of another size."""
-        return replace(self, prior=self.plausible * scale, scale=scale)
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Something that the base model may lack; its variants share the prior probability equally, and so do its sizes.
+    """Something that the base model may lack; its variants share the prior probability equally.
 
     Attributes:
         name: of it.
-        variants: its forms, at plausible sizes.
-        sizes: at which each of them is looked for, in units of the plausible one. How large an effect is, is known only
-            roughly: where it can be seen at a fraction of its usual size, that it is not larger is no sign against it.
+        variants: its forms.
     """
 
     name: str
     variants: tuple[Variant, ...]
-    sizes: tuple[float, ...] = (1.0,)
-
-    def whole(self, variant: Variant) -> Variant:
-        """Return the form with all its amplitudes, where a variant has some of them, at their plausible sizes."""
-        alike = [
-            one for one in self.variants if (one.law, one.shape, one.of) == (variant.law, variant.shape, variant.of)
-        ]
-        return max(alike, key=lambda one: len(one.columns)).scaled(1.0)
-
-    def spread(self, variant: Variant) -> NDArray[np.float64]:
-        """Amplitudes of a form to those of the whole: some of these, or one for all of them, shape (p, q)."""
-        whole = self.whole(variant).columns
-        same = (whole[:, None] == variant.columns).astype(np.float64)
-        return same if same.any() else np.ones((len(whole), 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,10 +119,6 @@ class Race:
         size = np.abs(np.diag(triangle))
         return float(np.sum((axes[:, size > INDEPENDENT * size[0]].T @ self.left[:, -1]) ** 2))
 
-    def agreement(self, variants: Sequence[Variant]) -> float:
-        """Weighted sum of squares that variants take out of what the base leaves, less what their sizes cost."""
-        return self.chi2 - self._solved(variants)[1]
-
     def amplitudes(self, variants: Sequence[Variant]) -> Amplitudes:
         """Most probable amplitudes of a combination, and their covariance."""
         columns = np.concatenate([v.columns for v in variants]) - self.first
@@ -165,46 +128,28 @@ class Race:
         inverse = np.linalg.pinv(stacked)
         return Amplitudes(inverse @ target, np.asarray(inverse @ inverse.T, dtype=np.float64))
 
-    def sigma(self, variant: Variant, others: Sequence[Variant] = ()) -> NDArray[np.float64]:
-        """Standard deviation of a variant's amplitudes from the measurement alone, base and others fitted, (p,).
-
-        Infinite where the measurement cannot tell it from those.
-        """
-        columns = [variant.columns, *(other.columns for other in others)]
-        prior = [np.full(len(variant.columns), np.inf), *(other.prior for other in others)]
-        stacked = np.vstack([self.left[:, np.concatenate(columns) - self.first], np.diag(1.0 / np.concatenate(prior))])
-        scaled = stacked * np.concatenate([variant.prior, *(other.prior for other in others)])
-        _, s, vt = np.linalg.svd(scaled, full_matrices=False)
-        with np.errstate(divide="ignore"):
-            variance = np.sum((vt[:, : len(variant.columns)] / s[:, None]) ** 2, axis=0)
-        return variant.prior * np.sqrt(variance)
-
-    def visible(self, variant: Variant, others: Sequence[Variant] = ()) -> NDArray[np.float64]:
+    def visible(self, variant: Variant) -> NDArray[np.float64]:
         """How far plausible amplitudes stand out of what the measurement leaves uncertain, most visible first, (p,).
 
-        Singular values of the signature in units of plausible sizes, base and others fitted: along each direction of
-        the amplitudes the plausible size over its standard deviation.
+        Singular values of the signature in units of plausible sizes, the base fitted: along each direction of the
+        amplitudes the plausible size over its standard deviation.
         """
-        rest, _ = self._beside(others)
-        columns = rest.left[:, variant.columns - self.first] * variant.plausible
+        columns = self.left[:, variant.columns - self.first] * variant.prior
         return np.asarray(np.linalg.svd(columns, compute_uv=False), dtype=np.float64)
 
     def best_variant(self, candidate: Candidate, others: Sequence[Variant]) -> tuple[Variant, float]:
-        """Best form of a candidate beside others, at its best size, and the log evidence of all its forms together."""
+        """Best form of a candidate beside others, and the log evidence of all its forms together."""
         rest, beside = self._beside(others)
-        gains = np.array([rest.gains(variant, candidate.sizes) for variant in candidate.variants])
-        form, size = np.unravel_index(int(gains.argmax()), gains.shape)
-        best, scale = candidate.variants[int(form)], candidate.sizes[int(size)]
-        return best if scale == best.scale else best.scaled(scale), beside + together(gains)
+        gains = np.array([rest.gain(variant) for variant in candidate.variants])
+        return candidate.variants[int(gains.argmax())], beside + together(gains)
 
-    def gains(self, variant: Variant, sizes: Sequence[float]) -> NDArray[np.float64]:
-        """Log evidence of base and one variant over that of the base alone, for each size in plausible ones, (s,)."""
-        columns = self.left[:, variant.columns - self.first] * variant.plausible
+    def gain(self, variant: Variant) -> float:
+        """Log evidence of base and one variant over that of the base alone."""
+        columns = self.left[:, variant.columns - self.first] * variant.prior
         seen, axes = np.linalg.eigh(columns.T @ columns)
         along = (axes.T @ (columns.T @ self.left[:, -1])) ** 2
-        scales = np.square(sizes)[:, None]
-        information = 1.0 + scales * np.maximum(seen, 0.0)
-        return np.asarray(0.5 * np.sum(scales * along / information - np.log(information), axis=1), dtype=np.float64)
+        information = 1.0 + np.maximum(seen, 0.0)
+        return float(0.5 * np.sum(along / information - np.log(information)))
 
     def _beside(self, variants: Sequence[Variant]) -> tuple[Race, float]:
         """Race on what base and variants leave, these in any size that their priors allow, and their log evidence."""
@@ -340,61 +285,6 @@ def worth_of(race: Race, chosen: Sequence[Choice], one: Choice) -> float:
     """Log evidence that one of the chosen brings beside the others."""
     others = [c.variant for c in chosen if c is not one]
     return race.best_variant(one.candidate, others)[1] - race.evidence(others)
-
-
-def contained(
-    race: Race, chosen: Sequence[Choice], one: Choice, rivals: Sequence[Candidate], few: int
-) -> tuple[str, ...]:
-    """Names of rivals, not chosen themselves, that explain the same in the place of one of the chosen, at thinkable sizes.
-
-    Only that they could explain more speaks against them: measurements cannot tell them from it.
-
-    Args:
-        race: on what the base leaves.
-        chosen: combination.
-        one: of them.
-        rivals: what might stand in its place.
-        few: amplitudes of a rival at the most; what has many explains anything.
-    """
-    names = {choice.candidate.name for choice in chosen}
-    others = [choice.variant for choice in chosen if choice is not one]
-    enough = race.agreement([*others, one.variant.scaled(THINKABLE)]) - SAME_SIGMAS**2
-    beside = race.evidence(others)
-
-    def same(variant: Variant) -> bool:
-        if len(variant.columns) > few or race.agreement([*others, variant.scaled(THINKABLE)]) <= enough:
-            return False
-        return race.evidence([*others, variant]) > beside
-
-    return tuple(r.name for r in rivals if r.name not in names and any(same(v) for v in r.variants))
-
-
-THINKABLE = 5.0
-"""Times the plausible size that an amplitude may have."""
-
-SAME_SIGMAS = 3.0
-"""What explains less by this in standard deviations explains something else."""
-
-
-def as_good(
-    race: Race, chosen: Sequence[Choice], one: Choice, rivals: Sequence[Candidate], enough: float
-) -> tuple[str, ...]:
-    """Names of rivals, not chosen themselves, that do about as well in the place of one of the chosen.
-
-    A rival has to bring half of what it brings, at least: what does little itself is none.
-
-    Args:
-        race: on what the base leaves.
-        chosen: combination.
-        one: of them.
-        rivals: what might stand in its place.
-        enough: log evidence by which it must be better than a rival to be told from it.
-    """
-    names = {choice.candidate.name for choice in chosen}
-    others = [choice.variant for choice in chosen if choice is not one]
-    _, own = race.best_variant(one.candidate, others)
-    enough = min(enough, 0.5 * (own - race.evidence(others)))
-    return tuple(r.name for r in rivals if r.name not in names and own - race.best_variant(r, others)[1] < enough)
 
 
 def _settled(race: Race, chosen: list[Choice]) -> list[Choice]:

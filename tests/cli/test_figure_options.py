@@ -48,8 +48,16 @@ BEGINS = {".png": b"\x89PNG\r\n\x1a\n", ".pdf": b"%PDF-1."}
 """PNG: ISO/IEC 15948, 5.2; PDF: ISO 32000-1, 7.5.2."""
 
 
-@pytest.mark.parametrize("ending", [".png", ".pdf", ".PNG"])
-@pytest.mark.parametrize("command", [("calibrate",), ("diagnose", "--sources", "backlash")])
+@pytest.mark.parametrize(
+    ("command", "ending"),
+    [
+        (("calibrate",), ".png"),
+        (("calibrate",), ".pdf"),
+        (("calibrate",), ".PNG"),
+        (("diagnose", "--sources", "backlash"), ".png"),
+        (("diagnose", "--sources", "backlash"), ".pdf"),
+    ],
+)
 def test_the_ending_says_the_format(run, elsewhere, tmp_path, command, ending):
     target = tmp_path / f"figure{ending}"
     outcome = run(command[0], elsewhere, *command[1:], "--figure", target)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from dbbstation.cli import FAILED, USAGE
@@ -24,8 +26,18 @@ def kept(tmp_path_factory, run):
 
 def test_the_curve_is_printed_with_its_uncertainty_and_that_its_cause_is_unknown(kept):
     outcome, _ = kept
-    assert "An error without a known name, organised by strut-length wave, strut 3." in outcome.out
+    assert "An unmodelled effect, organised by strut-length wave, strut 3." in outcome.out
     assert "cause unknown:" in outcome.out
+    titles = (
+        "cause",
+        "verdict",
+        "probability",
+        "log Bayes factor",
+        "concealed",
+        "selection frequency",
+        "not told from",
+    )
+    assert any(re.split(r"\s{2,}", line.strip()) == list(titles) for line in outcome.out.splitlines())
     assert "a wave of 66.7" in outcome.out or "a wave of 66.6" in outcome.out
     assert "strut-length wave / mm" in outcome.out
     assert "the model has unexplained-wave, an error whose cause is unknown" in outcome.err

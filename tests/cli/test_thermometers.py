@@ -8,6 +8,7 @@ from dbbstation.cli import FAILED
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.thermal import ThermalFrame
 from tests.plant.mechanisms.warming import Shop
+from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 
 SHOP = Shop(rise_k=1.2, time_constant_s=900.0)
@@ -61,8 +62,13 @@ def test_the_law_can_be_asked_for(run, sessions):
     assert "time_constant_s" in frame["parameters"]
 
 
-def test_sessions_with_and_without_a_thermometer_go_together(run, sessions):
-    together = run("diagnose", sessions / "logged", sessions / "bare", "--sources", "thermal-frame,gravity", "--json")
+def test_sessions_with_and_without_a_thermometer_go_together(run, tmp_path):
+    for name in ("logged", "bare"):
+        frame = ThermalFrame(SHOP, logged=name == "logged")
+        few = subset(table_ii_plan(19), "aghl")
+        record(tmp_path / name, seed=19, plan=few, mechanisms=[RandomKinematics(), frame], rate_hz=5.0)
+    both = (tmp_path / "logged", tmp_path / "bare")
+    together = run("diagnose", *both, "--sources", "thermal-frame,gravity", "--json")
     assert together.code == 0, together.err
     named = {s["name"]: s for s in together.data["sources"]}
     assert "growth_um_m_k" not in named["thermal-frame"]["parameters"]

@@ -51,7 +51,7 @@ def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):
         outliers=(),
         workspace=None,
         locations=(),
-        sources=tuple(SourceFinding(s.name, Verdict.IDENTIFIED, (), 9.0, 0.5, 2.0, 1.0, {}, "") for s in sources)
+        sources=tuple(SourceFinding(s.name, Verdict.IDENTIFIED, (), 9.0, 0.5, 2.0, 1.0, {}, "", 1.0) for s in sources)
         if after is not before
         else (),
         unexplained=unexplained or Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."),

@@ -44,7 +44,7 @@ def gravity(tmp_path_factory):
     return diagnosed(tmp_path_factory.mktemp("blind") / "gravity", 21, Gravity())
 
 
-@pytest.mark.parametrize("seed", [31, 32])
+@pytest.mark.parametrize("seed", [31, pytest.param(32, marks=pytest.mark.nightly)])
 def test_silent_when_clean(tmp_path, seed):
     _, diagnosis = diagnosed(tmp_path / "clean", seed)
     assert not diagnosis.mismatch
@@ -63,7 +63,8 @@ def test_gravity_is_named_and_its_size_is_right(gravity):
     compliance = found.parameters["strut_compliance_um_kn"]
     # 9.68 µm/kN at 1000 mm; the plant takes tensions on the sagged machine, which costs half a per cent.
     assert compliance.value == pytest.approx(9.68, rel=0.01)
-    assert 0 < compliance.uncertainty < 0.1
+    # Tests know it better than to the 2 % by which machines depart from linear springs.
+    assert compliance.uncertainty == pytest.approx(0.02 * 9.68, rel=0.05)
     # The jig circles conceal nine tenths of it: 15.1 µm rms leave 4.5 on the reference machine.
     assert found.concealed == pytest.approx(0.91, abs=0.02)
     assert found.rest_um == pytest.approx(4.5, abs=0.5)
@@ -117,6 +118,7 @@ def test_backlash_is_named_strut_by_strut(tmp_path):
     assert diagnosis.locations[0].variable == "strut-speed-sign"
 
 
+@pytest.mark.nightly  # those of tests/diagnosis/test_recipes.py warm too, with every source as candidate
 def test_warming_struts_are_named(tmp_path):
     _, diagnosis = diagnosed(tmp_path / "s", 23, ThermalStruts())
     assert "thermal-struts" in named(diagnosis) | set(_ambiguous(diagnosis))
@@ -124,6 +126,7 @@ def test_warming_struts_are_named(tmp_path):
     assert diagnosis.held_out[1].rms < diagnosis.held_out[0].rms / 3
 
 
+@pytest.mark.nightly  # beside backlash it is found by default
 def test_a_warming_bar_is_named(tmp_path):
     _, diagnosis = diagnosed(tmp_path / "s", 24, BarDrift())
     assert "bar-drift" in named(diagnosis) | set(_ambiguous(diagnosis))
@@ -136,7 +139,10 @@ def _ambiguous(diagnosis):
 
 @pytest.mark.parametrize(
     ("pair", "names"),
-    [((Gravity(), Backlash()), {"gravity", "backlash"}), ((Backlash(), BarDrift()), {"backlash", "bar-drift"})],
+    [
+        pytest.param((Gravity(), Backlash()), {"gravity", "backlash"}, marks=pytest.mark.nightly),
+        ((Backlash(), BarDrift()), {"backlash", "bar-drift"}),
+    ],
 )
 def test_pairs_are_both_named(tmp_path, pair, names):
     _, diagnosis = diagnosed(tmp_path / "s", 25, *pair)
@@ -148,14 +154,9 @@ def test_pairs_are_both_named(tmp_path, pair, names):
 
 
 def test_drifts_of_struts_and_bar_together_keep_their_concealed_shares(tmp_path):
-    """The direction that the tests cannot see is held; at the fitted geometry it would swallow another fifth.
-
-    The bar brings a twentieth of what the struts bring, and so might a second stage of theirs.
-    """
+    """The direction that the tests cannot see is held; at the fitted geometry it would swallow another fifth."""
     _, diagnosis = diagnosed(tmp_path / "s", 3003, ThermalStruts(), BarDrift())
-    assert named(diagnosis) == {"thermal-struts"}
-    assert finding(diagnosis, "bar-drift").verdict is Verdict.AMBIGUOUS
-    assert finding(diagnosis, "bar-drift").ambiguous_with == ("thermal-struts",)
+    assert named(diagnosis) == {"thermal-struts", "bar-drift"}
     assert finding(diagnosis, "thermal-struts").concealed == pytest.approx(0.96, abs=0.015)
     assert finding(diagnosis, "bar-drift").concealed == pytest.approx(0.74, abs=0.06)
 
@@ -167,6 +168,7 @@ def test_a_bar_that_warms_within_one_run_does_not_end_the_diagnosis(tmp_path):
     assert finding(diagnosis, "bar-drift").verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}
 
 
+@pytest.mark.nightly  # the same with every source as candidate: tests/diagnosis/test_recipes.py
 def test_a_warm_up_with_a_law_of_its_own_lends_no_second_name(tmp_path):
     """Struts heated through another body: one exponential does not fit, and a drifting bar would mend some of it."""
     _, diagnosis = diagnosed(tmp_path / "s", 2013, ThermalStruts(Warming(3.0, 2400.0, 600.0)))
@@ -183,6 +185,7 @@ def test_silent_when_clean_under_correlated_noise(tmp_path):
     assert diagnosis.misfit.probability > 1e-3
 
 
+@pytest.mark.nightly  # a slower wave in the same strut: tests/diagnosis/test_unexplained.py
 def test_what_stands_on_no_list_is_called_unexplained_on_the_right_strut(tmp_path):
     """A wheel out of true in the drive of strut 3."""
     _, diagnosis = diagnosed(tmp_path / "s", 26, OddGearWobble(strut=3))
@@ -210,6 +213,13 @@ def test_the_summary_has_the_agreed_keys(gravity):
     }
     assert agreed <= set(summary)
     assert {"test", "direction", "theta_deg", "strut", "variable", "share", "text"} <= set(summary["locations"][0])
-    assert {"name", "verdict", "ambiguous_with", "concealed", "gain", "parameters"} <= set(summary["sources"][0])
-    assert summary["sources"][-1]["verdict"] == "not-testable"
+    of_a_source = {"name", "verdict", "ambiguous_with", "concealed", "gain", "parameters"}
+    of_a_source |= {"probability", "class", "log_evidence", "stability"}
+    assert all(of_a_source <= set(source) for source in summary["sources"])
+    first, *_, last = summary["sources"]
+    assert first["name"] == "gravity"
+    assert 0.95 <= first["probability"] <= 1.0
+    # 15 µm where noise is 0.5 are found in any part of the tests.
+    assert first["stability"] == 1.0
+    assert (last["verdict"], last["probability"]) == ("not-testable", None)
     assert sum(location["share"] for location in summary["locations"]) <= 1.0

@@ -14,23 +14,36 @@ from dbbstation.studies.blind import judge_sessions, read_answers
 from dbbstation.studies.blind_score import numbers, score
 from tests.plant.blind.sessions import make_study
 
-COUNTS = {"clean": 3, "single": 6, "pair": 1, "outside": 1, "concealed": 1}
+SMALL = {"clean": 1, "single": 3, "concealed": 1}
+LARGER = {"clean": 3, "single": 6, "pair": 1, "outside": 1, "concealed": 1}
+
+
+@pytest.fixture(
+    scope="module",
+    params=[(SMALL, 2027), pytest.param((LARGER, 2026), marks=pytest.mark.nightly)],
+    ids=["small", "larger"],
+)
+def study(request, tmp_path_factory):
+    """How many sessions of each kind there are, and what became of them."""
+    counts, seed = request.param
+    folder = tmp_path_factory.mktemp("hidden")
+    make_study(folder, counts, seed=seed, jobs=1, told=lambda _: None)
+    verdicts = judge_sessions(folder, default_candidates(known_sources()), 1, lambda *_: None)
+    return counts, score(read_answers(folder), verdicts)
 
 
 @pytest.fixture(scope="module")
-def outcomes(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("hidden")
-    make_study(folder, COUNTS, seed=2026, jobs=1, told=lambda _: None)
-    verdicts = judge_sessions(folder, default_candidates(known_sources()), 1, lambda *_: None)
-    return score(read_answers(folder), verdicts)
+def outcomes(study):
+    return study[1]
 
 
 def of_kind(outcomes, kind):
     return [outcome for outcome in outcomes if outcome.kind == kind]
 
 
-def test_every_session_has_a_diagnosis(outcomes):
-    assert len(outcomes) == sum(COUNTS.values())
+def test_every_session_has_a_diagnosis(study):
+    counts, outcomes = study
+    assert len(outcomes) == sum(counts.values())
     assert [outcome.error for outcome in outcomes if outcome.error] == []
 
 
@@ -49,8 +62,9 @@ def test_nothing_is_claimed_that_cannot_be_seen(outcomes):
     assert all(outcome.quiet for outcome in of_kind(outcomes, "concealed"))
 
 
-def test_the_table_counts_what_was_judged(outcomes):
+def test_the_table_counts_what_was_judged(study):
+    counts, outcomes = study
     table = numbers(outcomes)
     assert table["sessions"] == len(outcomes)
-    assert table["shares"]["clean: false alarm"]["count"] == COUNTS["clean"]
-    assert table["shares"]["single: detected"]["count"] == COUNTS["single"]
+    assert table["shares"]["clean: false alarm"]["count"] == counts["clean"]
+    assert table["shares"]["single: detected"]["count"] == counts["single"]

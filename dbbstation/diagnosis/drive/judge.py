@@ -105,7 +105,7 @@ def judge(design: Design, race: Race, chosen: Sequence[Choice], after: DriveFit)
         else:
             best, gain = rest.best_variant(beside, [])
             values = _best_values(design, rest, beside, best)
-            seen = float(np.mean(rest.visible(best, []) >= TESTABLE_SIGMA))
+            seen = float(np.mean(rest.visible(best) >= TESTABLE_SIGMA))
             verdict = Verdict.RULED_OUT if seen >= TESTABLE_SHARE else Verdict.NOT_TESTABLE
             verdict = Verdict.AMBIGUOUS if alike else verdict
             variant, _ = race.best_variant(candidate, [])

@@ -62,7 +62,7 @@ def test_three_causes_at_once_are_all_named(tmp_path):
     assert all(s["probability"] >= SURE for s in summary["sources"] if s["verdict"] == "identified")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly  # a warm-up in two stages asks for more of the same
 def test_a_warm_up_needs_no_second_name_for_its_time_constant(tmp_path):
     found, _ = _diagnosed(warm_up_of_unknown_time_constant, tmp_path / "s")
     assert _named(found.summary()) == {"thermal-struts"}

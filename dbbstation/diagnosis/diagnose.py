@@ -112,10 +112,10 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
     shape = shapes[member.cause.name]
     curve = curve_of(explained.channel, settled, member)
     where = f"strut {shape.strut}" if shape.strut else "no single strut"
-    text = f"An unmodelled effect, organised by {shape.name}, {where}."
+    text = f"An unmodelled effect, organised by {curve.variable}, {where}."
     rms_um = 1e3 * left.rms if is_missing_physics(left) else curve.unconcealed_um
     gain = settled.best.log_factor(member.cause.name)
-    return Unexplained(rms_um, shape.strut, shape.name, gain, text, curve)
+    return Unexplained(rms_um, shape.strut, curve.variable, gain, text, curve)
 
 
 def _where(observations: Sequence[Observation], found: Remainder) -> tuple[float, str]:

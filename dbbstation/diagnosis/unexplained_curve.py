@@ -55,35 +55,48 @@ AXES = {
 
 
 def curve_of(channel: Channel, settled: Settled, member: Member) -> Curve:
-    """Return the curve of an unmodelled effect.
+    """Return the curve of an unmodelled effect, with others of the most probable hypothesis that follow the same.
+
+    A dent between two widths of the catalogue is two bumps in one place: their sum is the error of that strut.
 
     Args:
         channel: of all columns.
         settled: what the comparison came to.
         member: of its most probable hypothesis, the effect.
     """
-    shape, runs, comparison = settled.unmodelled.shapes[member.cause.name], settled.unmodelled.runs, settled.comparison
-    others, columns = settled.best.without(member.cause.name), member.variant.columns
+    shapes, runs, comparison = settled.unmodelled.shapes, settled.unmodelled.runs, settled.comparison
+    shape = shapes[member.cause.name]
+    together = [m for m in settled.best.members if m is member or _adds(shape, shapes.get(m.cause.name))]
+    others = [m for m in settled.best.members if m not in together]
     sized = max(
-        (replace(member, scale=size * member.scale) for size in SIZES),
-        key=lambda one: comparison.log_evidence([one, *others]),
+        ([replace(m, scale=size * m.scale) for m in together] for size in SIZES),
+        key=lambda some: comparison.log_evidence([*some, *others]),
     )
-    found = comparison.estimates([sized, *others])
-    amplitudes, to_points, at, words = _along(runs, shape, found.values[: len(columns)])
-    spread = found.covariance[: len(columns), : len(columns)]
+    columns = np.concatenate([m.variant.columns for m in together])
+    found = comparison.estimates([*sized, *others])
+    ends = np.cumsum([0, *(len(m.variant.columns) for m in together)])
+    pieces = [
+        _along(runs, shapes[m.cause.name], found.values[a:b])
+        for m, a, b in zip(together, ends[:-1], ends[1:], strict=True)
+    ]
+    amplitudes = np.concatenate([piece[0] for piece in pieces])
+    at, to_points = _summed(runs, [shapes[m.cause.name] for m in together], pieces)
+    spread = found.covariance[: ends[-1], : ends[-1]]
     values, covariance = to_points @ amplitudes, to_points @ spread @ to_points.T
-    covariance = covariance + np.eye(len(at)) * _not_followed(settled, member) * np.mean(values**2)
+    covariance = covariance + np.eye(len(at)) * _not_followed(settled, together) * np.mean(values**2)
     known, machine = channel.base, np.flatnonzero(~channel.base.random)
     free = free_directions(known, machine, channel.held)
     blocks = channel.blocks(columns, np.zeros(channel.runs[-1].stop))
     signature = concealment(blocks, machine, len(known.prior) + np.arange(len(columns)), amplitudes, free)
+    alone = len(together) == 1
+    alike = len({shapes[m.cause.name].kind for m in together}) == 1
     return Curve(
-        variable=shape.name,
+        variable=shape.name if alike else replace(shape, kind="").name,
         unit=UNITS[shape.variable],
         strut=shape.strut,
-        form=shape.form.text(UNITS[shape.variable]),
-        period_mm=shape.period,
-        convention=words,
+        form=shape.form.text(UNITS[shape.variable]) if alone else f"sum of {len(together)}",
+        period_mm=shape.period if alone else None,
+        convention=", ".join(dict.fromkeys(words for *_, words in pieces if words)),
         readings_um=1e3 * signature.whole_rms,
         unconcealed_um=1e3 * signature.rest_rms,
         points=tuple(
@@ -93,7 +106,26 @@ def curve_of(channel: Channel, settled: Settled, member: Member) -> Curve:
     )
 
 
-def _not_followed(settled: Settled, member: Member) -> float:
+def _adds(one: Shape, other: Shape | None) -> bool:
+    """Whether two effects are errors of one thing over one variable, so that their sum is a curve as well."""
+    if other is None or one.variable not in OF_STRUTS or one.strut is None:
+        return False
+    return (one.variable, one.strut, one.moves) == (other.variable, other.strut, other.moves)
+
+
+def _summed(
+    runs: Sequence[Samples],
+    shapes: Sequence[Shape],
+    pieces: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], str]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points of a sum of curves, and the matrix from the amplitudes of all to them; of one curve its own."""
+    if len(pieces) == 1:
+        return pieces[0][2], pieces[0][1]
+    at = max((piece[2] for piece in pieces), key=len)
+    return at, np.hstack([shape.form.columns(at) @ _convention(runs, shape)[0] for shape in shapes])
+
+
+def _not_followed(settled: Settled, together: Sequence[Member]) -> float:
     """Structured sum of squares that the curve leaves to all other curves together, over what it explains itself.
 
     A curve with a kink between two points, or another error beside this one, spoils the values more than noise does:
@@ -101,14 +133,16 @@ def _not_followed(settled: Settled, member: Member) -> float:
     """
     # Those picked from many forms would find something in noise as well: more than one for each amplitude.
     unmodelled, comparison = settled.unmodelled, settled.comparison
-    others = settled.best.without(member.cause.name)
+    names = {m.cause.name for m in together}
+    others = settled.best.without(*names)
+    scale = max(m.scale for m in together)
     every = [
-        Member(cause, cause.variants[0], member.scale)
+        Member(cause, cause.variants[0], scale)
         for cause in unmodelled.causes
-        if unmodelled.shapes[cause.name].tried == 1.0 or cause is member.cause
+        if unmodelled.shapes[cause.name].tried == 1.0 or cause.name in names
     ]
     without = comparison.explained(others)
-    own = comparison.explained([member, *others]) - without
+    own = comparison.explained([*together, *others]) - without
     more = comparison.explained([*every, *others]) - without - sum(len(one.variant.columns) for one in every) - own
     return max(more, 0.0) / max(own, 1e-300)
 

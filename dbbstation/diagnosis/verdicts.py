@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +13,11 @@ from dbbstation.diagnosis.explain import SURE
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties
 from dbbstation.inference.concealment import concealment
+from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -64,7 +66,8 @@ class _Judge:
         self._rivals = {name: self._beside(c) for name, c in self._named.items() if name not in self._classes}
         self._effects = {name: self._effect(name) for name in self._named}
         # One compression of all runs serves the signatures of all causes.
-        self._columns = np.unique(np.concatenate([columns for columns, _ in self._effects.values()]))
+        columns = [np.zeros(0, dtype=np.int64), *(columns for columns, _ in self._effects.values())]
+        self._columns = np.unique(np.concatenate(columns))
         self._blocks = self._channel.blocks(self._columns, np.zeros(self._channel.runs[-1].stop))
 
     def findings(self) -> tuple[SourceFinding, ...]:
@@ -78,7 +81,7 @@ class _Judge:
         name = cause.name
         member = next((m for m in self._settled.members if m.cause.name == name), None)
         verdict, alike, equal, text = self._verdict(name)
-        probability = self._probability(equal or (name,))
+        probability = self._probability(self._class_with(name))
         source = self._channel.sources[name, member.variant.law if member else cause.variants[0].law]
         if member is None:
             rival = self._rivals[name]
@@ -111,13 +114,15 @@ class _Judge:
         for own, equal in self._classes.items():
             if name in equal:
                 text = f"It is observationally equivalent to {own}: no test of this plan tells one from the other."
-                return Verdict.AMBIGUOUS, tuple(n for n in equal if n != name), equal, text
+                names = self._with_a_name(equal)
+                return Verdict.AMBIGUOUS, tuple(n for n in names if n != name), names, text
         for ambiguity in self._ambiguities.values():
             if name in ambiguity:
                 others = tuple(other for other in ambiguity if other != name)
-                return Verdict.AMBIGUOUS, others, (), f"These tests cannot tell it from {', '.join(others)}."
+                return Verdict.AMBIGUOUS, others, (), _either(others)
         if self._probability((name,)) >= EVEN:
-            return Verdict.AMBIGUOUS, (), (), NOT_SURE
+            others = tuple(other for other in self._ambiguity(name) if other != name)
+            return Verdict.AMBIGUOUS, others, (), _either(others)
         return self._verdict_of_absent(name)
 
     def _verdict_of_absent(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
@@ -131,25 +136,33 @@ class _Judge:
     def _verdict_of_member(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
         """The same of a cause of the most probable hypothesis."""
         equal = self._classes[name]
-        shown = equal if len(equal) > 1 else ()
+        shown = self._with_a_name(equal)
+        shown = shown if len(shown) > 1 else ()
         if self._probability(equal) >= SURE:
             return Verdict.IDENTIFIED, (), shown, ""
         others = tuple(other for other in self._ambiguities[name] if other != name)
-        text = f"These tests cannot tell it from {', '.join(others)}." if others else NOT_SURE
-        return Verdict.AMBIGUOUS, others, shown, text
+        return Verdict.AMBIGUOUS, others, shown, _either(others)
+
+    def _class_with(self, name: str) -> tuple[str, ...]:
+        """Class that a cause belongs to; itself alone where there is none."""
+        return next((equal for equal in self._classes.values() if name in equal), (name,))
+
+    def _with_a_name(self, names: Iterable[str]) -> tuple[str, ...]:
+        return tuple(name for name in names if name in self._named)
 
     def _probability(self, names: Iterable[str]) -> float:
         return self._settled.posterior.probability(names)
 
     def _ambiguity(self, name: str) -> tuple[str, ...]:
         """Causes of which one is there for sure, if not this one; itself alone where there are none such."""
-        posterior = self._settled.posterior
+        posterior, probable = self._settled.posterior, self._probability((name,))
+        chosen = list(self._class_with(name))
         alone: dict[str, float] = {}
-        for cause in self._settled.causes:
-            if cause.name not in self._best.names:
-                own = cause.name
-                alone[own] = posterior.probability_of(lambda key, own=own: own in key and name not in key)  # type: ignore[misc]
-        chosen = list(self._classes[name])
+        for other in (cause.name for cause in self._settled.causes if cause.name not in chosen):
+            both = posterior.probability_of(lambda key, pair={name, other}: pair <= key)  # type: ignore[misc]
+            # What is there beside it anyway is no alternative to it.
+            if both < EVEN * probable:
+                alone[other] = self._probability((other,)) - both
         for other in sorted(alone, key=lambda n: -alone[n]):
             if self._probability(chosen) >= SURE or len(chosen) > MOST_ALTERNATIVES:
                 break
@@ -164,10 +177,10 @@ class _Judge:
         return name if shape is None else f"an unmodelled effect over {shape.name}"
 
     def _class(self, member: Member) -> tuple[str, ...]:
-        """Causes whose effects no test of these tells from those of a member, itself first."""
+        """Causes whose effects no test of these tells from those of a member, itself first; also those without a name."""
         others = self._best.without(member.cause.name)
         scan = self._settled.comparison.scan(
-            others, [c for name, c in self._named.items() if name not in self._best.names]
+            others, [c for c in self._settled.causes if c.name not in self._best.names and not c.setup]
         )
         size = len(member.variant.columns)
         rivals = [r for r in scan.best if len(r.variant.columns) == size and self._same(member, r, others)]
@@ -246,7 +259,8 @@ class _Judge:
     def _would_be(self, member: Member) -> dict[str, Value]:
         """Best amplitudes of a cause beside the others, with the uncertainty that says how much could hide."""
         source = self._channel.source_of(member.cause.name, member.variant)
-        found = self._settled.comparison.estimates([member, *self._best.without(member.cause.name)])
+        wide = replace(member, scale=float(SCALES[-1]))  # the prior must not say how much could hide
+        found = self._settled.comparison.estimates([wide, *self._best.without(member.cause.name)])
         own = len(member.variant.columns)
         spread = self._channel.to_whole(member.variant)
         values = spread @ found.values[:own]
@@ -256,6 +270,11 @@ class _Judge:
             p.name: Value(float(values[k]), float(np.sqrt(max(covariance[k, k], 0.0))), p.unit)
             for k, p in enumerate(amplitudes)
         }
+
+
+def _either(others: Sequence[str]) -> str:
+    """Text of a cause that may be there, or one of others in its place."""
+    return f"These tests cannot tell it from {', '.join(others)}." if others else NOT_SURE
 
 
 def _refused(name: str, why: str) -> SourceFinding:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import logsumexp
 
-from dbbstation.inference.model_comparison import FLEXIBLE, Member, with_slack_of
+from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member, with_slack_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -241,8 +241,8 @@ class _Search:
                 others = [*members[:k], *members[k + 1 :]]
                 members[k] = self._comparison.scan(others, [member.cause]).best[0]
             members = self._with_slack(members)
-        evidence = self._comparison.log_evidence(members)
-        factors, more = [], 0.0
+        members, more = self._as_close_as_it_is(members)
+        evidence, factors = self._comparison.log_evidence(members), []
         for k, member in enumerate(members):
             others = [*members[:k], *members[k + 1 :]]
             scan = self._comparison.scan(others, [member.cause])
@@ -251,6 +251,22 @@ class _Search:
             more += averaged
         odds = sum(member.cause.log_prior_odds for member in members)
         return Hypothesis(tuple(members), evidence + more + odds, tuple(factors))
+
+    def _as_close_as_it_is(self, members: list[Member]) -> tuple[list[Member], float]:
+        """Members with the share of their slack that suits each best, and what averaging over the shares adds."""
+        more = 0.0
+        for k, member in enumerate(members):
+            if not len(member.variant.slack):
+                continue
+            tried = [
+                replace(member, slack_share=share, slack_scale=member.slack_scale * share / member.slack_share)
+                for share in SLACK_SHARES.tolist()
+            ]
+            evidence = [self._comparison.log_evidence([*members[:k], one, *members[k + 1 :]]) for one in tried]
+            best = int(np.argmax(evidence))
+            members[k] = tried[best]
+            more += float(logsumexp(evidence)) - evidence[best] - float(np.log(len(tried)))
+        return members, more
 
     def _with_slack(self, members: list[Member]) -> list[Member]:
         """Members whose slack belongs to the amplitudes that they have together."""

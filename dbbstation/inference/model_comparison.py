@@ -35,6 +35,10 @@ NO_SLACK = np.zeros(0)
 FLEXIBLE = 12
 """Amplitudes from which on a form can imitate two causes at once: two for each strut."""
 
+SLACK_SHARES = np.array([0.1, 1.0])
+"""Shares of the stated slack that are averaged over: some machines follow a formula ten times as closely as it is stated, and a
+slack that nothing calls for would count against a cause that is there."""
+
 MOST_SLACK = 1.5
 """Times the amplitudes that the slack of a variant was made for up to which it grows with them."""
 
@@ -96,12 +100,14 @@ class Member:
         variant: which of its forms.
         scale: standard deviation of its amplitudes, in plausible ones.
         slack_scale: standard deviation of its slack, in units of that of its variant.
+        slack_share: how closely this machine follows the formula, in units of what is stated.
     """
 
     cause: Cause
     variant: Variant
     scale: float
     slack_scale: float = 1.0
+    slack_share: float = 1.0
 
     @property
     def columns(self) -> NDArray[np.int64]:
@@ -272,7 +278,7 @@ def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:
     if len(member.variant.slack) == 0:
         return member
     size = float(np.sqrt(np.mean(np.square(values / member.variant.plausible))))
-    return replace(member, slack_scale=min(size / member.variant.slack_at, MOST_SLACK))
+    return replace(member, slack_scale=member.slack_share * min(size / member.variant.slack_at, MOST_SLACK))
 
 
 def _log_factors(seen: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -128,7 +128,8 @@ def test_a_wave_is_found_with_its_period_and_is_the_true_one_within_its_uncertai
 def test_a_curve_over_length_is_the_true_one_within_its_uncertainty(hollow):
     _, diagnosis = hollow
     curve = diagnosis.unexplained.curve
-    assert (curve.variable, curve.strut, len(curve.points)) == ("strut-length", 5, 7)
+    assert (curve.variable, curve.strut) == ("strut-length", 5)
+    assert len(curve.points) >= 7
     assert "straight line" in curve.convention
     at, value, _ = arrays(curve)
     true_um = HOLLOW.height_um * np.exp(-0.5 * ((at - HOLLOW.at_mm) / HOLLOW.width_mm) ** 2)

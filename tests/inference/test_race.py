@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from dbbstation.inference.stability import stability
 from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 

@@ -81,6 +81,10 @@ def _commands() -> Iterator[tuple[str, str]]:
                 continue  # announced, not written yet; tests/cli asks for all of them
             with click.Context(command, info_name=name, parent=parent) as context:
                 yield name, _command(name, command, context)
+                for part in command.list_commands(context) if isinstance(command, click.Group) else ():
+                    inner = command.get_command(context, part)
+                    with click.Context(inner, info_name=part, parent=context) as within:
+                        yield f"{name}-{part}", _command(f"{name} {part}", inner, within)
 
 
 def _command(name: str, command: click.Command, context: click.Context) -> str:

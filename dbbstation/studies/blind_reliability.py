@@ -48,13 +48,18 @@ def equivalents(source: Mapping[str, Any]) -> frozenset[str]:
     return frozenset({source["name"], *(source.get("class") or ())})
 
 
+PRIOR = 0.05
+"""Probability that a cause has before anything is measured."""
+
+
 def forecasts(
     sources: Iterable[Mapping[str, Any]], hidden: Collection[str], *, perturbed: bool = False
 ) -> tuple[Forecast, ...]:
     """Forecasts of one session.
 
     A class of equivalent sources makes one, with the largest probability of its members. What is `not-testable` makes
-    none: its probability is that of the prior. Verdicts without a probability make none.
+    none where its probability is that of the prior; what the recordings made more probable than that, and left open,
+    makes one. Verdicts without a probability make none.
 
     Args:
         sources: as in the summary of a diagnosis.
@@ -63,7 +68,9 @@ def forecasts(
     """
     best: dict[frozenset[str], Mapping[str, Any]] = {}
     for source in sources:
-        if source.get("probability") is None or source["verdict"] == "not-testable":
+        if source.get("probability") is None:
+            continue
+        if source["verdict"] == "not-testable" and source["probability"] <= PRIOR:
             continue
         names = equivalents(source)
         if names not in best or source["probability"] > best[names]["probability"]:

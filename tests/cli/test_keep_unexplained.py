@@ -33,9 +33,9 @@ def test_the_curve_is_printed_with_its_uncertainty_and_that_its_cause_is_unknown
         "verdict",
         "probability",
         "log Bayes factor",
-        "concealed",
+        "concealed (R²)",
         "selection frequency",
-        "not told from",
+        "not distinguished from",
     )
     assert any(re.split(r"\s{2,}", line.strip()) == list(titles) for line in outcome.out.splitlines())
     assert "a wave of 66.7" in outcome.out or "a wave of 66.6" in outcome.out

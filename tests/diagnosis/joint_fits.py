@@ -56,5 +56,6 @@ def joint_fit(machine, names, noise_mm=3e-4, *, unexplained=None):
         else (),
         unexplained=unexplained or Unexplained(0.0, None, None, 0.0, "Nothing is left beyond noise."),
         shifts=(),
+        second_start_agrees=True,
         next_tests=(),
     )

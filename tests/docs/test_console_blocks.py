@@ -201,7 +201,9 @@ def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys
             "workspace": None,
             "parameter_shift": [{"parameter": "joint", "shift_um": 1.0}],
             "unexplained": {"text": "Nothing is left beyond noise.", "curve": None},
-            "further_tests": None,
+            "second_start_agrees": True,
+            "next_test": None,
+            "further_tests": [],
         }
     )
     printed = {_without_numbers(line) for line in capsys.readouterr().out.splitlines()}

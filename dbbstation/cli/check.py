@@ -14,7 +14,7 @@ from dbbstation.cli.source_files import source_file_option
 @click.argument("files", nargs=-1, type=click.Path(path_type=Path), metavar="FILE...")
 @source_file_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-@click.option("--schema", metavar="FORMAT", help="Print the JSON Schema of a format, such as dbb-plan/1, and stop.")
+@click.option("--schema", metavar="FORMAT", help="Print the JSON Schema of a format, such as dbb-plan/2, and stop.")
 def check(files: tuple[Path, ...], *, source_files: tuple[Path, ...], as_json: bool, schema: str | None) -> None:
     r"""Validate machines, plans, jigs, models, runs (.csv, .csv.part), recordings of drives and session folders.
 
@@ -25,7 +25,7 @@ def check(files: tuple[Path, ...], *, source_files: tuple[Path, ...], as_json: b
     Examples:
       dbbstation check plan.yaml machine.yaml
       dbbstation check 2026-11-20-hexapod-7
-      dbbstation check --schema dbb-plan/1 > dbb-plan-1.schema.json
+      dbbstation check --schema dbb-plan/2 > dbb-plan-2.schema.json
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.errors import InputError
@@ -68,6 +68,10 @@ def _print_schema(name: str) -> None:
     from dbbstation.cli.output import print_json
     from dbbstation.files.formats import SCHEMAS, json_schema
 
-    if name not in SCHEMAS:
-        raise click.BadParameter(f"{name!r} is no format; there are {', '.join(SCHEMAS)}", param_hint="--schema")
-    print_json(json_schema(name))
+    try:
+        schema = json_schema(name)
+    except KeyError:
+        raise click.BadParameter(
+            f"{name!r} is no format; there are {', '.join(SCHEMAS)}", param_hint="--schema"
+        ) from None
+    print_json(schema)

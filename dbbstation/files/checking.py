@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, TravelError
 from dbbstation.files.drive_csv import looks_like_drive, read_drive
+from dbbstation.files.formats import SCHEMAS
 from dbbstation.files.jig_file import parse_jig
 from dbbstation.files.machine_file import parse_machine
 from dbbstation.files.models import parse_model
 from dbbstation.files.plan_file import parse_plan
 from dbbstation.files.run_csv import PART, read_run
-from dbbstation.files.schema import FORMATS
 from dbbstation.files.session import SESSION_FILE, RunState, SessionFolder, no_session, parse_session
 from dbbstation.files.yaml_text import load_yaml
 from dbbstation.trace.loss import lost_samples
@@ -48,7 +48,8 @@ def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
     checked = Checked(path)
     if path.is_dir():
         if (path / SESSION_FILE).exists():
-            checked.kind = "dbb-session/1"
+            document = load_yaml(path / SESSION_FILE, [])
+            checked.kind = "dbb-session" if document is None else str(document.data.get("format", "dbb-session"))
             _session(checked)
         else:
             checked.problems.append(no_session(path))
@@ -83,7 +84,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         by_name[name]()
         return
     what = "the file does not say what format it has" if given is None else f"`{given}` is no format"
-    formats = ", ".join(f"{name}/1" for name in FORMATS)
+    formats = ", ".join(SCHEMAS)
     checked.problems.append(document.problem(("format",), what, f"begin it with `format: `, one of {formats}"))
 
 

@@ -8,23 +8,27 @@ from dbbstation.files.jig_file import JigFile
 from dbbstation.files.machine_file import MachineFile
 from dbbstation.files.model_file import ModelFile
 from dbbstation.files.plan_file import PlanFile
-from dbbstation.files.schema import format_of
+from dbbstation.files.schema import format_of, versions_of
 from dbbstation.files.session_file import SessionFile
 
 if TYPE_CHECKING:
     from dbbstation.files.schema import Schema
 
-SCHEMAS: dict[str, type[Schema]] = {
-    format_of(schema): schema for schema in (JigFile, MachineFile, ModelFile, PlanFile, SessionFile)
-}
-"""Schema of each format by its name with version."""
+_NEWEST = (JigFile, MachineFile, ModelFile, PlanFile, SessionFile)
+
+SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _NEWEST}
+"""Schema of each format by its name with its newest version, which has all keys of those before."""
 
 
 def json_schema(name: str) -> dict[str, Any]:
     """Return the JSON Schema of a format, units and plausible ranges included.
 
+    Args:
+        name: with any version that is read; a schema has the keys of all of them.
+
     Raises:
         KeyError: no format has this name.
     """
-    schema = SCHEMAS[name].model_json_schema()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": name}
+    newest = next((known for known, schema in SCHEMAS.items() if name in versions_of(schema)), name)
+    schema = SCHEMAS[newest].model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": newest}

@@ -1,4 +1,4 @@
-"""`dbb-machine/1`: the nominal machine, as its controller believes it."""
+"""`dbb-machine/2`, which has all of `dbb-machine/1`: the nominal machine, as its controller believes it."""
 
 import math
 from dataclasses import asdict
@@ -199,7 +199,7 @@ def machine_data(parts: MachineParts) -> dict[str, Any]:
 class MachineFile(MachineParts):
     """A hexapod machine tool as its controller believes it: joints, travel, screws, masses."""
 
-    format: Literal["dbb-machine/1"]
+    format: Literal["dbb-machine/1", "dbb-machine/2"]
     """Name and version of this format."""
 
 

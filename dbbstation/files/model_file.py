@@ -1,4 +1,4 @@
-"""`dbb-model/1`: an identified machine model with the uncertainty and provenance of its numbers."""
+"""`dbb-model/2`, which has all of `dbb-model/1`: an identified machine model with the uncertainty and provenance of its numbers."""
 
 from typing import Annotated, Any, Literal
 
@@ -49,7 +49,7 @@ class ModelFile(Schema):
     Every key is required, empty where there is nothing to say, so that a file that was cut short is noticed.
     """
 
-    format: Literal["dbb-model/1"]
+    format: Literal["dbb-model/1", "dbb-model/2"]
     """Name and version of this format."""
     machine: MachineParts
     """The nominal machine, as in a `dbb-machine/1` file."""

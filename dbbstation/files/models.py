@@ -12,7 +12,7 @@ from dbbstation.files.atomic import refuse_existing, write_text
 from dbbstation.files.machine_file import machine_data, machine_parts
 from dbbstation.files.model_file import CovarianceSchema, ModelFile, SourceSchema
 from dbbstation.files.quantities import Quantity
-from dbbstation.files.schema import dotted, read_document, validate
+from dbbstation.files.schema import dotted, format_for, read_document, validate
 from dbbstation.files.yaml_out import yaml_text
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
@@ -219,9 +219,10 @@ def model_data(model: IdentifiedModel) -> dict[str, Any]:
     machine = model.model.machine
     own = [one for one in model.model.sources if one.source.belongs_to is Owner.MACHINE]
     others = [one for one in model.model.sources if one.source.belongs_to is not Owner.MACHINE]
+    nominal = machine_data(machine_parts(machine))
     return {
-        "format": "dbb-model/1",
-        "machine": machine_data(machine_parts(machine)),
+        "format": format_for(ModelFile, nominal),
+        "machine": nominal,
         "sources": [_source_data(one, machine) for one in own],
         "measurement_effects": [_source_data(one, machine) for one in others],
         "covariance": {

@@ -1,7 +1,7 @@
 """What all schemas share: strict, nothing unknown, frozen; and how their complaints become placed problems."""
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,6 +19,16 @@ FORMATS = {
     "dbb-model": "a model",
 }
 """Every format by the name before its version, with what it is called in messages."""
+
+
+SINCE = {
+    "largest_loss_percent": 2,
+    "stroke_mm": 2,
+    "greatest_feed_mm_min": 2,
+    "greatest_turn_deg_min": 2,
+}
+"""Keys that came after the first version of a format, with the version. A file of an older version must not have them: a
+program of that time would refuse it without saying that a newer one reads it."""
 
 
 class Schema(BaseModel):
@@ -45,11 +55,15 @@ def read_document(path: Path, schema: type[Schema], faults: list[Problem]) -> Ya
         what = "the file holds no `key: value` lines"
         faults.append(document.problem((), what, "compare it with the example of its format"))
         return None
-    return document if _has_format(document, format_of(schema), faults) else None
+    return document if _has_format(document, versions_of(schema), faults) else None
 
 
 def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> S | None:
     """Return a document's data as its schema has it; None with every fault added to `faults`."""
+    newer = _newer_keys(document, schema)
+    if newer:
+        faults.extend(newer)
+        return None
     try:
         return schema.model_validate(document.data)
     except ValidationError as error:
@@ -58,11 +72,50 @@ def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> 
 
 
 def format_of(schema: type[Schema]) -> str:
-    """Return the format's name with its version, such as `dbb-plan/1`."""
-    return str(schema.model_fields["format"].annotation.__args__[0])  # type: ignore[union-attr]  # it is a Literal
+    """Return the format's name with its newest version, such as `dbb-plan/2`."""
+    return versions_of(schema)[-1]
 
 
-def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) -> bool:
+def versions_of(schema: type[Schema]) -> tuple[str, ...]:
+    """Return the format's name with every version that is read, oldest first."""
+    return tuple(map(str, schema.model_fields["format"].annotation.__args__))  # type: ignore[union-attr]  # a Literal
+
+
+def format_for(schema: type[Schema], data: Mapping[str, Any]) -> str:
+    """Return the format's name with the oldest version that has all keys of some data, so that older programs read it."""
+    needed = max((SINCE[key] for key in _keys(data) if key in SINCE), default=1)
+    return versions_of(schema)[needed - 1]
+
+
+def _keys(data: object) -> Iterator[str]:
+    """Keys of all mappings in plain data."""
+    if isinstance(data, Mapping):
+        for key, value in data.items():
+            yield str(key)
+            yield from _keys(value)
+    elif isinstance(data, list | tuple):
+        for value in data:
+            yield from _keys(value)
+
+
+def _newer_keys(document: YamlDocument, schema: type[Schema]) -> list[Problem]:
+    """Faults of keys that the version of the file has not yet."""
+    given = document.data.get("format") if isinstance(document.data, dict) else None
+    if "format" not in schema.model_fields or given not in versions_of(schema):
+        return []
+    name, _, version = str(given).partition("/")
+    found = []
+    for location in document.key_places:
+        since = SINCE.get(str(location[-1]), 1)
+        if since > int(version):
+            what = f"the key `{location[-1]}` came with {name}/{since}, and this file is {given}"
+            remedy = f"write `format: {name}/{since}`"
+            found.append(document.problem(location, what, remedy, at_key=True))
+    return found
+
+
+def _has_format(document: YamlDocument, known: Sequence[str], faults: list[Problem]) -> bool:
+    expected = known[-1]
     name = expected.partition("/")[0]
     wanted = FORMATS[name]
     if "format" not in document.data:
@@ -70,11 +123,12 @@ def _has_format(document: YamlDocument, expected: str, faults: list[Problem]) ->
         faults.append(document.problem((), what, f"begin it with `format: {expected}`"))
         return False
     given = document.data["format"]
-    if given == expected:
+    if given in known:
         return True
     given_name = str(given).partition("/")[0]
     if given_name == name:
-        what, remedy = f"`{given}` is a version that this program does not know", f"it reads {expected}"
+        what = f"`{given}` is a version that this program does not know"
+        remedy = f"it reads {', '.join(known)}; a newer dbbstation reads the file"
     elif given_name in FORMATS:
         what = f"this file is {FORMATS[given_name]} (`{given}`), {wanted} (`{expected}`) was expected"
         remedy = "check which file is given where"

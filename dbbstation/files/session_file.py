@@ -1,4 +1,4 @@
-"""`dbb-session/1`: what was done in a session, one entry per run."""
+"""`dbb-session/2`, which has all of `dbb-session/1`: what was done in a session, one entry per run."""
 
 from datetime import datetime
 from pathlib import PurePosixPath
@@ -130,7 +130,7 @@ class SetUpErrorsSchema(Schema):
 class SessionFile(Schema):
     """What was done: where the machine and plan stand, the bar, one entry per run."""
 
-    format: Literal["dbb-session/1"]
+    format: Literal["dbb-session/1", "dbb-session/2"]
     """Name and version of this format."""
     machine: InsidePath
     """The nominal model that the controller had while measuring, `dbb-machine/1`."""

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Self
 from dbbstation.errors import InputError, OutputError, Problem
 from dbbstation.files.atomic import write_bytes, write_folder, write_text
 from dbbstation.files.journal import RunWriter, run_header, run_line, run_name
-from dbbstation.files.machine_file import machine_data, machine_parts
+from dbbstation.files.machine_file import MachineFile, machine_data, machine_parts
 from dbbstation.files.plan_file import InlinePlan, plan_data
+from dbbstation.files.schema import format_for
 from dbbstation.files.session import (
     SESSION_FILE,
     Bar,
@@ -21,6 +22,7 @@ from dbbstation.files.session import (
     SessionFolder,
     read_session,
 )
+from dbbstation.files.session_file import SessionFile
 from dbbstation.files.session_set_up import readings_in
 from dbbstation.files.yaml_out import yaml_text
 
@@ -132,7 +134,8 @@ def _make_folder(
     if folder.exists():
         raise OutputError("the session folder exists already", where=str(folder), remedy="choose another name")
     whole: dict[str, str | bytes] = {f"{RUNS}/": "", f"{PROGRAMS}/": "", **files}
-    whole[MACHINE_FILE] = yaml_text({"format": "dbb-machine/1", **machine_data(machine_parts(machine))})
+    nominal = machine_data(machine_parts(machine))
+    whole[MACHINE_FILE] = yaml_text({"format": format_for(MachineFile, nominal), **nominal})
     whole[PLAN_FILE] = yaml_text(plan_data(plan))
     names = (folder / MACHINE_FILE, folder / PLAN_FILE)
     whole[SESSION_FILE] = _session_text(folder, names, details, entries)
@@ -303,7 +306,7 @@ class SessionWriter:
 def _session_text(folder: Path, names: tuple[Path, Path], details: SessionDetails, runs: Sequence[RunEntry]) -> str:
     bar = details.bar
     data: dict[str, object] = {
-        "format": "dbb-session/1",
+        "format": "",
         "machine": names[0].relative_to(folder).as_posix(),
         "plan": names[1].relative_to(folder).as_posix(),
         "serial_number": details.serial_number,
@@ -313,6 +316,7 @@ def _session_text(folder: Path, names: tuple[Path, Path], details: SessionDetail
         "set_up_errors": [_without_none(asdict(readings)) for readings in details.set_up_errors] or None,
     }
     data = {key: _without_none(value) for key, value in data.items() if value is not None}
+    data["format"] = format_for(SessionFile, data)
     return yaml_text({**data, "runs": [_without_none(_run_data(folder, run)) for run in runs]})
 
 

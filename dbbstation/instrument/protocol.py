@@ -1,4 +1,4 @@
-"""The wire protocol of a length instrument, `dbb-instrument/1`: what one YAML file in `protocols/instruments` says.
+"""The wire protocol of a length instrument, `dbb-instrument/2`: what one YAML file in `protocols/instruments` says.
 
 Protocol
 ├── line       baud rate, bits, parity, stop bits, flow control
@@ -270,7 +270,7 @@ class Protocol(Schema):
         references: manual pages.
     """
 
-    format: Literal["dbb-instrument/1"]
+    format: Literal["dbb-instrument/1", "dbb-instrument/2"]
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
     title: str = Field(min_length=1)
     setup: tuple[str, ...] = ()

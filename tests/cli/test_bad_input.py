@@ -119,7 +119,7 @@ def test_machine_in_metres(spoilt, refused):
         ("machine.yaml", "name:", "name: twice\nname:", "the key `name` stands here a second time"),
         ("machine.yaml", "screw_lead_mm", "screw_led_mm", "`screw_led_mm` is not known; did you mean `screw_lead_mm`?"),
         ("session.yaml", "machine:", "machin:", "the key `machin` is not known; did you mean `machine`?"),
-        ("plan.yaml", "dbb-plan/1", "dbb-plan/2", "`dbb-plan/2` is a version that this program does not know"),
+        ("plan.yaml", "dbb-plan/1", "dbb-plan/9", "`dbb-plan/9` is a version that this program does not know"),
     ],
     ids=["brackets", "no colon", "a key twice", "unknown key", "unknown and missing key", "later version"],
 )
@@ -222,10 +222,12 @@ def test_nothing_left(refused):
 
 
 def test_no_session_there(run, tmp_path):
-    outcome = run("calibrate", tmp_path)
+    empty = tmp_path / "shop" / "empty"
+    empty.mkdir(parents=True)
+    outcome = run("calibrate", empty)
     assert outcome.code == FAILED
     what = "this folder is no session: there is no session.yaml in it; name a session folder"
-    assert outcome.err == f"{tmp_path}: {what}\n"
+    assert outcome.err == f"{empty}: {what}\n"
 
 
 @pytest.mark.parametrize(
@@ -255,10 +257,10 @@ def test_model_tampered_with(run, tmp_path, model, elsewhere, old, new, what):
 def test_files_in_each_others_places(run, fifteen, model):
     outcome = run("evaluate", fifteen, "--model", fifteen / "machine.yaml")
     assert outcome.code == FAILED
-    assert "this file is a machine (`dbb-machine/1`), a model (`dbb-model/1`) was expected" in outcome.err
+    assert "this file is a machine (`dbb-machine/1`), a model (`dbb-model/2`) was expected" in outcome.err
     outcome = run("calibrate", model)
     assert outcome.code == FAILED
-    assert "this file is a model (`dbb-model/1`), a session (`dbb-session/1`) was expected" in outcome.err
+    assert "this file is a model (`dbb-model/1`), a session (`dbb-session/2`) was expected" in outcome.err
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,7 @@ def test_one_bar_serves_150_and_144_mm(run, spoilt, length_mm):
 
 
 def test_a_stated_stroke_holds(run, spoilt):
+    spoilt.replace("session.yaml", "dbb-session/1", "dbb-session/2")
     spoilt.replace("session.yaml", STATED, "stroke_mm: 1.0, calibrated_length_mm: 148.5")
     outcome = run("check", spoilt.folder)
     assert outcome.code == FAILED
@@ -55,6 +56,7 @@ def test_the_stroke_comes_from_the_instrument_file(run, tmp_path):
     shipped = shipped_folder("protocols") / "instruments" / "heidenhain-nd281b.yaml"
     own = tmp_path / "short-gauge.yaml"
     text = shipped.read_text().replace("name: heidenhain-nd281b", "name: short-gauge")
+    text = text.replace("dbb-instrument/1", "dbb-instrument/2")
     own.write_text(text.replace("length:\n", "length:\n  stroke_mm: 1.0\n"))
     outcome = measure(run, tmp_path, own, "152")
     assert outcome.code == FAILED

@@ -89,7 +89,7 @@ def test_a_session_is_checked_with_runs_and_travel(capsys, tmp_path: Path) -> No
     [
         ("name: x\n", "the file does not say what format it has"),
         ("format: dbb-thing/1\n", "`dbb-thing/1` is no format"),
-        ("format: dbb-plan/2\n", "`dbb-plan/2` is a version that this program does not know"),
+        ("format: dbb-plan/9\n", "`dbb-plan/9` is a version that this program does not know"),
         ("[1]\n", "the file does not say what format it has"),
     ],
 )

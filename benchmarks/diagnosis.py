@@ -42,7 +42,7 @@ FEW = 4
 """Sources that are named beside their number."""
 
 USUAL_HZ, QUICK_HZ = 50.0, 10.0
-WANTED_S = 30.0
+WANTED_S = 10.0
 """A diagnosis of thirty runs at the usual rate, with all sources."""
 
 

@@ -1,7 +1,7 @@
 """The curve of an error without a name: its values along the variable that organises it, with their uncertainty.
 
-Amplitudes are those of the most probable set of causes, with the kinematic parameters, mountings, balls and bar fitted anew beside them. What
-these can make of a curve cannot be told from them, so it is taken out by convention: a constant of everything, which is
+Amplitudes are those of the most probable set of causes, with the kinematic parameters, mountings, balls and bar fitted
+anew beside them. What these can make of a curve cannot be told from them, so it is taken out by convention: a constant of everything, which is
 a strut's reference length or the bar's offset, and of a curve over strut length also a slope, which joints can do almost
 whole. What is printed is the curve less the straight line (or constant) that fits it best over all readings.
 
@@ -131,11 +131,11 @@ def _not_followed(settled: Settled, together: Sequence[Member]) -> float:
     A curve with a kink between two points, or another error beside this one, spoils the values more than noise does:
     each point is then uncertain by that share of the curve's own size.
     """
-    # Those picked from many forms would find something in noise as well: more than one for each amplitude.
     unmodelled, comparison = settled.unmodelled, settled.comparison
     names = {m.cause.name for m in together}
     others = settled.best.without(*names)
     scale = max(m.scale for m in together)
+    # Those picked from many forms would find something in noise as well: more than one for each amplitude.
     every = [
         Member(cause, cause.variants[0], scale)
         for cause in unmodelled.causes

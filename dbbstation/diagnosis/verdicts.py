@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.explain import Explained, Settled
-    from dbbstation.inference.model_comparison import Cause, Member
+    from dbbstation.inference.model_comparison import Cause, Member, Variant
 
 TESTABLE_SIGMA = 5.0
 """An amplitude of the plausible size must stand so far out of its standard deviation for a cause to be testable."""
@@ -54,7 +54,6 @@ def judge(explained: Explained) -> tuple[SourceFinding, ...]:
 
 class _Judge:
     def __init__(self, explained: Explained) -> None:
-        self._explained = explained
         self._channel = explained.channel
         self._settled: Settled = explained.settled
         self._best = explained.settled.best
@@ -198,21 +197,18 @@ class _Judge:
 
     def _testable(self, name: str) -> bool:
         """Whether plausible amplitudes would be seen beside base and causes; half of their combinations at least."""
-        others = self._best.without(name)
         whole = max(self._named[name].variants, key=lambda v: len(v.columns))
-        products = self._settled.comparison.beside(others, whole.columns)
-        scaled = whole.plausible[:, None] * products * whole.plausible
-        seen = np.sqrt(np.maximum(np.linalg.eigvalsh(scaled), 0.0)) >= TESTABLE_SIGMA
-        return bool(np.mean(seen) >= TESTABLE_SHARE)
+        return bool(np.mean(self._sigmas(whole, self._best.without(name)) >= TESTABLE_SIGMA) >= TESTABLE_SHARE)
+
+    def _sigmas(self, variant: Variant, others: tuple[Member, ...]) -> NDArray[np.float64]:
+        """By how many standard deviations combinations of plausible amplitudes stand out beside base and others, least first."""
+        products = self._settled.comparison.beside(others, variant.columns)
+        scaled = variant.plausible[:, None] * products * variant.plausible
+        return np.sqrt(np.maximum(np.linalg.eigvalsh(scaled), 0.0))
 
     def _why_not_testable(self, name: str) -> str:
         for member in self._settled.members:
-            products = self._settled.comparison.beside(
-                self._best.without(member.cause.name), self._named[name].variants[0].columns
-            )
-            plausible = self._named[name].variants[0].plausible
-            scaled = plausible[:, None] * products * plausible
-            if np.sqrt(max(float(np.linalg.eigvalsh(scaled)[-1]), 0.0)) >= TESTABLE_SIGMA:
+            if self._sigmas(self._named[name].variants[0], self._best.without(member.cause.name))[-1] >= TESTABLE_SIGMA:
                 return f"Beside {member.cause.name}, and what its formula may be off by, these tests would not show it."
         return "These tests would not show it at its plausible size: the fitted parameters conceal it."
 

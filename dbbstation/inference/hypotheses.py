@@ -8,6 +8,7 @@ best hypotheses until the neighbours of every likely one have been looked at.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -88,15 +89,14 @@ class Posterior:
     def probability(self, names: Iterable[str]) -> float:
         """Probability that at least one of these causes is there."""
         wanted = frozenset(names)
-        inside = [weight for key, weight in self.weights.items() if key & wanted]
-        return float(np.exp(logsumexp(inside) - self._total)) if inside else 0.0
+        return self.probability_of(lambda key: bool(key & wanted))
 
     def probability_of(self, holds: Callable[[frozenset[str]], bool]) -> float:
         """Probability of all sets of causes for which something holds."""
         inside = [weight for key, weight in self.weights.items() if holds(key)]
         return float(np.exp(logsumexp(inside) - self._total)) if inside else 0.0
 
-    @property
+    @cached_property
     def _total(self) -> float:
         return float(logsumexp(list(self.weights.values())))
 

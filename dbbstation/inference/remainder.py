@@ -45,7 +45,7 @@ class Remainder:
     Attributes:
         harmonic: the one that stands out most over all runs.
         run: the one that stands out most over all low harmonics.
-        pulse: run with the stretch of `PULSE_DEG` that stands out most.
+        pulse: run with the stretch that stands out most, one of `PULSES` of a turn.
         pulse_phase_rad: where that is.
     """
 

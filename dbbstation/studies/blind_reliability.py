@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.diagnosis.verdicts import PRIOR
 from dbbstation.studies.coverage import wilson
 
 if TYPE_CHECKING:
@@ -46,10 +47,6 @@ class Forecast:
 def equivalents(source: Mapping[str, Any]) -> frozenset[str]:
     """Name of a source and of all that are observationally equivalent to it."""
     return frozenset({source["name"], *(source.get("class") or ())})
-
-
-PRIOR = 0.05
-"""Probability that a cause has before anything is measured."""
 
 
 def forecasts(

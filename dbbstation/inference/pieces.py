@@ -1,0 +1,105 @@
+"""Sums over narrow pieces of a variable: any curve over it then costs as much as it has pieces.
+
+What a curve would explain beside a base and causes is still exact but for the width of a piece.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What a fit leaves of rows, and what it can do, in units of noise.
+
+    Attributes:
+        rest: what it leaves, shape (n,).
+        axes: orthonormal directions of what was fitted, less what priors take of them, shape (n, k).
+        noise: of one row, in the unit of the residual.
+    """
+
+    rest: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    noise: float
+
+    @classmethod
+    def of(
+        cls, target: NDArray[np.float64], columns: NDArray[np.float64], sd: NDArray[np.float64], noise: float
+    ) -> Left:
+        """What columns with Gaussian amplitudes leave of a target.
+
+        Args:
+            target: shape (n,).
+            columns: shape (n, k).
+            sd: standard deviations of their amplitudes, infinite where nothing is known, shape (k,).
+            noise: standard deviation of one row.
+        """
+        bounded = np.flatnonzero(np.isfinite(sd))
+        size = np.where(np.isfinite(sd), sd, noise / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+        priors = np.zeros((len(bounded), columns.shape[1]))
+        priors[np.arange(len(bounded)), bounded] = 1.0
+        axes = np.linalg.qr(np.vstack([columns * (size / noise), priors]))[0][: len(columns)]
+        weighted = target / noise
+        return cls(weighted - axes @ (axes.T @ weighted), axes, noise)
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums of rows over the pieces of one variable.
+
+    Attributes:
+        at: mean of the variable in each piece, shape (b,).
+        count: gain times gain, shape (b,).
+        rest: gain times what a fit leaves, shape (b,).
+        axes: gain times what it can do, shape (b, k).
+    """
+
+    at: NDArray[np.float64]
+    count: NDArray[np.float64]
+    rest: NDArray[np.float64]
+    axes: NDArray[np.float64]
+
+    @classmethod
+    def over(
+        cls, left: Left, values: NDArray[np.float64], pieces: int, gain: NDArray[np.float64] | None = None
+    ) -> Sums:
+        """Add up over so many equal pieces of a variable, shape (n,), where each row answers with a gain, shape (n,)."""
+        low, high = float(values.min()), float(values.max())
+        place = np.minimum(((values - low) / max(high - low, 1e-300) * pieces).astype(np.int64), pieces - 1)
+        _, number, count = np.unique(place, return_inverse=True, return_counts=True)
+        order = np.argsort(number, kind="stable")
+        starts = np.concatenate([[0], np.cumsum(count)[:-1]])
+
+        def added(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray(np.add.reduceat(rows[order], starts, axis=0), dtype=np.float64)
+
+        one = np.ones(len(values)) if gain is None else gain
+        return cls(added(values) / count, added(one**2), added(one * left.rest), added(one[:, None] * left.axes))
+
+    def explained(self, curves: NDArray[np.float64], size: float) -> NDArray[np.float64]:
+        """Sum of squares that curves explain, less what their sizes cost, shape (m,).
+
+        Args:
+            curves: at the pieces, shape (b, m, p).
+            size: standard deviation of their amplitudes, in units of noise.
+        """
+        pieces, many, count = curves.shape
+        flat = curves.reshape(pieces, many * count)
+        rest = (flat.T @ self.rest).reshape(many, count)
+        side = (flat.T @ self.axes).reshape(many, count, -1)
+        normal = np.einsum("bmp,b,bmq->mpq", curves, self.count, curves, optimize=True) - side @ side.transpose(0, 2, 1)
+        normal = normal + np.eye(count) / size**2
+        return np.asarray(np.einsum("mp,mp->m", rest, np.linalg.solve(normal, rest[:, :, None])[:, :, 0]))
+
+
+def peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:
+    """Places that explain more than their neighbours, best first."""
+    padded = np.concatenate([[-np.inf], explained, [-np.inf]])
+    found = np.flatnonzero((explained >= padded[:-2]) & (explained >= padded[2:]))
+    return np.asarray(found[np.argsort(-explained[found])][:most])

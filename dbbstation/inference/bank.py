@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.coloured import Coloured, bands_of, coloured_noise
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
 from dbbstation.inference.model_form import modulated
-from dbbstation.inference.noise import Noise, noise_of
 from dbbstation.inference.patterns import NAMED, Family, log_odds
 from dbbstation.inference.projection import BesideBase, CauseColumns
+from dbbstation.inference.square_root import compress, solve
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable, Sequence
 
     from numpy.typing import NDArray
+    from scipy.sparse import csr_array
 
     from dbbstation.inference.channel import Channel, Law
     from dbbstation.inference.patterns import Pattern
@@ -49,12 +51,16 @@ class Bank:
     Attributes:
         patterns: by the name of the cause.
         laws: by name.
+        noise: that columns are whitened for.
+        whitening: that does it, over the kept rows; None where the noise is white.
     """
 
     def __init__(self, channel: Channel) -> None:
         self.channel = channel
         self.patterns: dict[str, Pattern] = {}
         self.laws: dict[str, Law] = {law.name: law for law in channel.laws}
+        self.noise = Coloured(channel.size)
+        self.whitening: csr_array | None = None
         self._columns = CauseColumns(channel.base.samples[channel.kept])
         self._everywhere: list[NDArray[np.float64]] = []
         self._of_patterns: dict[str, Cause] = {}
@@ -79,7 +85,7 @@ class Bank:
         found = [p for p in {p.name: p for p in found}.values() if p.name not in self.patterns]
         if not found:
             return []
-        samples = np.hstack([p.samples for p in found])[self.channel.kept]
+        samples = self.whitened(np.hstack([p.samples for p in found]))
         taken = left.axes.T @ samples
         comparison = ModelComparison(samples.T @ samples - taken.T @ taken, samples.T @ left.rest)
         ends = np.cumsum([0, *(p.samples.shape[1] for p in found)])
@@ -103,12 +109,12 @@ class Bank:
         return found
 
     def fitted(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Columns over the kept rows, shape (m, p)."""
+        """Columns over the kept rows, whitened, shape (m, p)."""
         return np.asarray(self._columns.samples[:, columns], dtype=np.float64)
 
-    def beside(self, noise: float) -> BesideBase:
-        """Causes beside the base at a noise of one row."""
-        return BesideBase(self._columns, self.channel.known, self.channel.held, noise)
+    def beside(self) -> BesideBase:
+        """Causes beside the base."""
+        return BesideBase(self._columns, self.channel.known, self.channel.held, self.noise.innovation)
 
     def add(self, more: Sequence[Pattern]) -> list[str]:
         """Take in patterns that are not there yet, and return their names."""
@@ -128,37 +134,104 @@ class Bank:
             self._of_patterns[name] = replace(cause, log_prior_odds=self._odds(pattern))
         return [p.name for p in fresh]
 
-    def noise(self, target: NDArray[np.float64], about: float, *, ordered: bool) -> Noise:
-        """Noise from what base, laws and patterns together leave of a target.
+    def measure_noise(self, *, white: bool = False) -> Coloured:
+        """Noise from what base, laws and patterns together leave; columns are whitened for it from then on.
 
         What was looked for in the residual takes part only where it is worth its odds: the largest of many chance peaks takes
-        more from noise than a column may.
+        more from noise than a column may. What all columns take out of noise of this kind is put back, by frequency: it is seen
+        by what they take out of draws.
 
         Args:
-            target: kept rows, shape (m,).
-            about: noise of one row, about.
-            ordered: whether neighbours in the table were neighbours in time; else each row counts as independent.
+            white: take it for white, whatever it is.
         """
+        least = QUIETEST * self.channel.size
+        stretches = self.channel.stretches
         for _ in range(NOISE_ROUNDS):
-            beside = self.beside(about)
-            scan = beside.comparison(target).scan((), self.causes)
-            sd = np.zeros(self._columns.count)
-            for cause, worth in zip(scan.causes, scan.log_factor, strict=True):
-                pattern = self.patterns.get(cause.name)
-                if pattern is not None and pattern.family in LOOKED_FOR and worth + cause.log_prior_odds <= 0.0:
-                    continue
-                for variant in cause.variants:
-                    sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
+            beside = self.beside()
+            target = self.target
             rng = np.random.default_rng(len(target))
-            left = beside.left(np.column_stack([target, rng.standard_normal((len(target), DRAWS))]), sd)
+            draws = rng.standard_normal((len(target), DRAWS))
+            left = beside.left(np.column_stack([target, draws]), self._taking_part(beside))
             used = len(target) - float(np.mean(np.sum(left[:, 1:] ** 2, axis=0)))
-            runs = [left[rows, 0] for rows in self.channel.kept_blocks] if ordered else [left[:, 0]]
-            found = noise_of(runs, used)
-            found = found if ordered else Noise(found.sigma, 1.0)
-            before, about = about, max(found.effective, QUIETEST * self.channel.size)
-            if abs(about - before) < SETTLED * about:
+            innovation = float(np.sqrt(np.sum(left[:, 0] ** 2) / max(len(target) - used, 1.0)))
+            before, found = self.noise, self.noise.with_innovation(max(innovation, least))
+            if self.channel.time is not None and not white:
+                found = self._colour_of(left, draws, stretches, found)
+            self._take(found)
+            if _alike(found, before):
                 break
-        return Noise(max(found.sigma, QUIETEST * self.channel.size), found.correlation_samples)
+        return self.noise
+
+    def log_likelihood(self) -> float:
+        """Log likelihood of the kept rows under the base and this noise alone, but for what is the same for every noise."""
+        target, innovation = self.target, self.noise.innovation
+        rest = target - self.base @ self.base_values(np.zeros(len(self.channel.residual)))
+        seen = np.linalg.svd(self.base / innovation, compute_uv=False)
+        seen = seen[seen > RANK * seen[:1]]
+        spent = 0.0 if self.noise.is_white else float(np.log(len(target)))  # two parameters [Schwarz 1978]
+        squares = 0.5 * float(rest @ rest) / innovation**2
+        return -len(target) * float(np.log(innovation)) - squares - float(np.log(seen).sum()) - spent
+
+    def _colour_of(
+        self, left: NDArray[np.float64], draws: NDArray[np.float64], stretches: Sequence[slice], level: Coloured
+    ) -> Coloured:
+        """Noise whose spectrum is that of whitened rows, what columns take out of draws put back; at a level if alike."""
+        bands = bands_of(left[:, 0], stretches)
+        if bands is None:
+            return level
+        taken = np.zeros(len(bands.count))
+        for k in range(draws.shape[1]):
+            whole, rest = bands_of(draws[:, k], stretches), bands_of(left[:, 1 + k], stretches)
+            if whole is not None and rest is not None:
+                taken += (rest.log_power - whole.log_power) / draws.shape[1]
+        colour = np.log(self.noise.gain(bands.frequency))
+        found = coloured_noise(replace(bands, log_power=bands.log_power - taken - colour))
+        # Squares say the level best once the colour is right.
+        return level if _alike(found.with_innovation(level.innovation), level) else found
+
+    def _taking_part(self, beside: BesideBase) -> NDArray[np.float64]:
+        """Prior standard deviations of all columns that noise is measured beside, zero for the others."""
+        scan = beside.comparison(self.target).scan((), self.causes)
+        sd = np.zeros(self._columns.count)
+        for cause, worth in zip(scan.causes, scan.log_factor, strict=True):
+            pattern = self.patterns.get(cause.name)
+            if pattern is not None and pattern.family in LOOKED_FOR and worth + cause.log_prior_odds <= 0.0:
+                continue
+            for variant in cause.variants:
+                sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
+        return sd
+
+    def _take(self, noise: Coloured) -> None:
+        """Whiten all columns for a noise."""
+        same = (noise.share, noise.decay) == (self.noise.share, self.noise.decay)
+        self.noise = noise
+        if same:
+            return
+        self.whitening = noise.whitening(self.channel.stretches)
+        self._columns = CauseColumns(self.whitened(self.channel.base.samples))
+        if self._everywhere:
+            self._columns.add(self.whitened(np.hstack(self._everywhere)))
+
+    def whitened(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Kept ones of all rows, shape (n, ...), with their noise made white."""
+        kept = rows[self.channel.kept]
+        return kept if self.whitening is None else np.asarray(self.whitening @ kept)
+
+    @property
+    def target(self) -> NDArray[np.float64]:
+        """Residual of the kept rows, its noise made white, shape (m,)."""
+        return self.whitened(self.channel.residual)
+
+    @property
+    def base(self) -> NDArray[np.float64]:
+        """Columns of the base over the kept rows, whitened, shape (m, k)."""
+        return self._columns.base
+
+    def base_values(self, effect: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of the base columns beside an effect over all rows, shape (k,)."""
+        target = self.whitened(self.channel.residual - effect)
+        block = compress(np.arange(self.base.shape[1]), self.base, target)
+        return solve([block], self.channel.known, self.noise.innovation, self.channel.held).x
 
     def refine(self, name: str, nonlinear: tuple[float, ...], amplitudes: NDArray[np.float64]) -> None:
         """Lay out a law at values of all its parameters, with tangents and slack.
@@ -215,7 +288,8 @@ class Bank:
     def _cause(self, pattern: Pattern, own: NDArray[np.int64], plausible: float) -> Cause:
         size = np.full(len(own), plausible)
         variants = tuple(
-            Variant(own[:count], size[:count], label=str(count), log_weight=weight) for count, weight in pattern.choices
+            Variant(own[list(part)], size[list(part)], label=label, log_weight=weight)
+            for part, weight, label in pattern.choices
         )
         if pattern.family is Family.BLOCKS:
             variants = self._blocks(own, size)
@@ -240,14 +314,23 @@ class Bank:
 
     def _add(self, samples: NDArray[np.float64]) -> NDArray[np.int64]:
         self._everywhere.append(samples)
-        return self._columns.add(samples[self.channel.kept])
+        return self._columns.add(self.whitened(samples))
 
 
-NOISE_ROUNDS = 4
+def _alike(one: Coloured, other: Coloured) -> bool:
+    """Whether two noises are the same for anything that is compared."""
+    pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
+    return all(abs(a - b) < SETTLED * max(a, b) for a, b in pairs)
+
+
+NOISE_ROUNDS = 5
 """Times that the noise is measured, each time beside what the last level lets in."""
 
-SETTLED = 0.02
-"""Change of the noise that is none."""
+RANK = 1e-9
+"""Share of the largest singular value of the base below which a direction says nothing."""
+
+SETTLED = 0.03
+"""Change of the noise that is none: its spectrum is hardly known better."""
 
 
 def spacing_of(grid: Sequence[float], value: float) -> float:

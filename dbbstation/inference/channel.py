@@ -164,6 +164,14 @@ class Channel:
         return [slice(int(a), int(b)) for a, b in pairwise(counts) if b > a]
 
     @property
+    def stretches(self) -> list[slice]:
+        """Kept rows that follow one another without a gap, as slices of the kept rows."""
+        rows = np.flatnonzero(self.kept)
+        block = np.searchsorted([b.stop for b in self.blocks], rows, side="right")
+        edges = np.flatnonzero((np.diff(rows) != 1) | (np.diff(block) != 0)) + 1
+        return [slice(int(a), int(b)) for a, b in pairwise([0, *edges, len(rows)])]
+
+    @property
     def _about(self) -> float:
         """A first idea of the noise: the spread of the residual."""
         return max(float(np.std(self.target)), 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300)

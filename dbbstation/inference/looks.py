@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 STRONGEST = 2
 """Forms of each kind over each variable that are kept."""
 
+STRONGEST_COLOURED = 6
+"""The same where noise is not white: a first look does not know there how much of each form whitening leaves."""
+
 PIECES = 2048
 """Of a variable, at the most."""
 
@@ -69,18 +72,19 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
         if pieces < 2 * PIECES_PER_WAVE:
             continue
         sums = Sums.over(left, values, pieces)
-        found += _waves(variable, sums, size, pieces)
+        most = STRONGEST if left.whitening is None else STRONGEST_COLOURED
+        found += _waves(variable, sums, size, pieces, most)
         finer = [n for n in FINER_CURVES if n * PIECES_PER_WAVE <= pieces]
         found += [
             _pattern(variable, Family.CURVE, Spline(variable.low, variable.high, n), 1.0, f"{n} points") for n in finer
         ]
         if variable.kind is not Kind.TIME:
-            found += _best(variable, Family.BUMP, sums, _bumps(variable, pieces), size, 3.0)
-            found += _best(variable, Family.STEP, sums, _steps(variable), size, 1.0)
+            found += _best(variable, Family.BUMP, sums, _bumps(variable, pieces), size, 3.0, most)
+            found += _best(variable, Family.STEP, sums, _steps(variable), size, 1.0, most)
     return found
 
 
-def _waves(variable: Variable, sums: Sums, size: float, pieces: int) -> list[Pattern]:
+def _waves(variable: Variable, sums: Sums, size: float, pieces: int, strongest: int) -> list[Pattern]:
     """Waves of all periods from twice the range to four pieces, made finer about the best."""
     extent = variable.extent
     most = min(MOST_CYCLES, pieces / PIECES_PER_WAVE)
@@ -91,7 +95,7 @@ def _waves(variable: Variable, sums: Sums, size: float, pieces: int) -> list[Pat
         [sums.explained(_cosines(sums.at, part), size) for part in np.array_split(grid, 1 + len(grid) // 128)]
     )
     found: list[tuple[float, Wave]] = []
-    for k in peaks(explained, 2 * STRONGEST):
+    for k in peaks(explained, 2 * strongest):
         best = grid[k]
         top = float(explained[k])
         for step in FINER:
@@ -101,18 +105,39 @@ def _waves(variable: Variable, sums: Sums, size: float, pieces: int) -> list[Pat
             best, top = near[int(by_near.argmax())], float(by_near.max())
         found.append((top, Wave(float(best))))
     found.sort(key=lambda one: -one[0])
-    return [_pattern(variable, Family.WAVE, wave, len(grid) / 2.0) for _, wave in found[:STRONGEST]]
+    return [_pattern(variable, Family.WAVE, wave, len(grid) / 2.0) for _, wave in found[:strongest]]
 
 
 def _best(
-    variable: Variable, family: Family, sums: Sums, forms: Sequence[Form], size: float, apart: float
+    variable: Variable, family: Family, sums: Sums, forms: Sequence[Form], size: float, apart: float, strongest: int
 ) -> list[Pattern]:
     """Forms that explain more than their neighbours in the list; only every so many-th counts as another try."""
     if not forms:
         return []
-    curves = np.stack([form.columns(sums.at) for form in forms], axis=1)
     tried = max(len(forms) / apart, 1.0)
-    return [_pattern(variable, family, forms[k], tried) for k in peaks(sums.explained(curves, size), STRONGEST)]
+    found = []
+    for k in peaks(_explained(sums, forms, size), strongest):
+        near = _near(forms[k])
+        best = near[int(_explained(sums, near, size).argmax())]
+        found.append(_pattern(variable, family, best, tried))
+    return found
+
+
+def _explained(sums: Sums, forms: Sequence[Form], size: float) -> NDArray[np.float64]:
+    return sums.explained(np.stack([form.columns(sums.at) for form in forms], axis=1), size)
+
+
+def _near(form: Form) -> list[Form]:
+    """Forms between a form of the list and its neighbours."""
+    if isinstance(form, Bump):
+        return [
+            Bump(form.centre + away * form.width, form.width * wider)
+            for wider in (0.6, 0.7, 0.84, 1.0, 1.19, 1.41, 1.7)
+            for away in np.arange(-0.5, 0.55, 0.1)
+        ]
+    if isinstance(form, Step):
+        return [Step(form.at + away * form.width, form.width) for away in np.arange(-4.0, 4.1, 0.5)]
+    return [form]
 
 
 def _pattern(variable: Variable, family: Family, form: Form, tried: float, label: str = "") -> Pattern:

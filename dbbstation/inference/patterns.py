@@ -38,10 +38,6 @@ DISTINCT = 5
 WAVE_SHARE = 0.15
 """Share of a turn that an angle must cover for a wave of one turn to differ from a straight line by more than a hundredth."""
 
-CONTINUOUS = 0.1
-"""Share of its range that a variable that is sampled along a path changes from one row to the next, at the most, half of the time;
-one that jumps from pose to pose has no speed."""
-
 
 class Family(StrEnum):
     """Kinds of effects without physics."""
@@ -82,7 +78,8 @@ class Pattern:
         per: by what each amplitude is to be divided for that, shape (p,).
         label: what tells it from others of its family over the same variables.
         tried: how many independent forms it was picked from.
-        choices: of one pattern with several sizes, how many of the columns each takes, each with its log probability.
+        choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
+            from the others.
     """
 
     family: Family
@@ -93,7 +90,7 @@ class Pattern:
     per: tuple[float, ...] = ()
     label: str = ""
     tried: float = 1.0
-    choices: tuple[tuple[int, float], ...] = ()
+    choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
 
     @property
     def name(self) -> str:
@@ -133,9 +130,9 @@ def patterns(
         for variable in usable:
             if variable.kind in TRAVELS:
                 found += _by_direction(variable, blocks)
-        paths = [v for v in usable if v.kind in TRAVELS and _is_path(v, blocks)]
+        paths = [v for v in usable if v.kind in TRAVELS and v.is_path(blocks)]
         found += [_speed(v, time, blocks, Family.SPEED) for v in paths]
-        if simulated is not None and _is_path(simulated, blocks):
+        if simulated is not None and simulated.is_path(blocks):
             found.append(_speed(simulated, time, blocks, Family.LAG))
     found += [_product(a, b) for a, b in combinations(usable, 2) if Kind.TIME not in (a.kind, b.kind)]
     if len(blocks) > 1:
@@ -179,18 +176,56 @@ def _by_direction(variable: Variable, blocks: Sequence[slice]) -> list[Pattern]:
     sign = variable.directions(blocks)
     if not (sign > 0.0).any() or not (sign < 0.0).any():
         return []
-    found = [Pattern(Family.HYSTERESIS, (variable,), sign[:, None], Sign(), ("",), (1.0,))]
+    found = [_hysteresis(variable, blocks, sign)]
     if len(np.unique(variable.values)) >= DISTINCT:
         spline = Spline(variable.low, variable.high, CURVES)
         found.append(Pattern(Family.BY_DIRECTION, (variable,), spline.columns(variable.values) * sign[:, None], spline))
     return found
 
 
-def _is_path(variable: Variable, blocks: Sequence[slice]) -> bool:
-    """Whether it moves on from row to row, as along a path, rather than from pose to pose."""
-    steps = [np.abs(np.diff(variable.values[rows])) for rows in blocks]
-    every = np.concatenate([np.zeros(0), *steps])
-    return len(every) > 0 and float(np.median(every)) < CONTINUOUS * variable.extent
+def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: NDArray[np.float64]) -> Pattern:
+    """Plus one way and minus the other way; it turns at once, or over a way after each reversal, as play does."""
+    widths = [share * variable.extent for share in TRANSITS]
+    # A row at which it turns may belong to either way: as it came there, or as it goes on.
+    arriving = variable.arriving(blocks)
+    leaving = np.concatenate([np.append(arriving[rows][1:], arriving[rows][-1:]) for rows in blocks])
+    samples = np.column_stack([sign, arriving, leaving, *(play(variable.values, blocks, width) for width in widths)])
+    labels = (
+        "at once",
+        "at once, a row later",
+        "at once, a row earlier",
+        *(f"over {width:.3g} {variable.unit}".strip() for width in widths),
+    )
+    weight = -float(np.log(len(labels)))
+    choices = tuple(((k,), weight, label) for k, label in enumerate(labels))
+    width = len(labels)
+    return Pattern(Family.HYSTERESIS, (variable,), samples, Sign(), ("",) * width, (1.0,) * width, choices=choices)
+
+
+TRANSITS = (0.003, 0.01, 0.03, 0.1)
+"""Ways after a reversal over which hysteresis turns to its other side, in shares of the range."""
+
+
+def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> NDArray[np.float64]:
+    """Where a thing is within a play, from -1 to 1, as it is pushed to and fro, shape (n,).
+
+    [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]
+
+    Args:
+        values: where it is pushed to.
+        blocks: rows of each; each begins in the middle.
+        width: of the play, in the unit of the values.
+    """
+    found = np.empty(len(values))
+    for rows in blocks:
+        own = values[rows]
+        inside = np.empty(len(own))
+        last = 0.0
+        for k, change in enumerate(np.diff(own, prepend=own[:1]).tolist()):
+            last = min(max(last + 2.0 * change / width, -1.0), 1.0)
+            inside[k] = last
+        found[rows] = inside
+    return found
 
 
 def _speed(variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], family: Family) -> Pattern:

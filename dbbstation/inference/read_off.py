@@ -117,6 +117,7 @@ class _Judge:
     def __init__(self, settled: Settled) -> None:
         self._settled, self._best = settled, settled.best
         self._members = {member.cause.name: member for member in self._best.members}
+        self._without = settled.bank.base_values(np.zeros(len(settled.channel.residual)))
         self._classes = {name: self._class(member) for name, member in self._members.items()}
         estimates = settled.comparison.estimates(self._best.members) if self._members else None
         self._values: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
@@ -150,9 +151,9 @@ class _Judge:
             values, covariance = found.values[:own], found.covariance[:own, :own]
         else:
             values, covariance = self._values[cause.name]
-        rms, sigmas = self._size(shown, values, covariance)
+        sigmas = self._sigmas(shown, values, covariance)
         effect = self._settled.bank.samples(shown.columns) @ values
-        whole, confounded = self._confounded(shown, values, effect)
+        whole, rms, confounded = self._concealed(effect)
         verdict, others, text = self._verdict(cause, member, probability, sigmas)
         variables = pattern.variables if pattern else ()
         there = verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS} and member is not None
@@ -217,34 +218,28 @@ class _Judge:
         if base:
             products = self._settled.comparison.beside(others, variant.columns)
         else:
-            samples = self._settled.bank.fitted(variant.columns) / self._settled.noise.effective
+            samples = self._settled.bank.fitted(variant.columns) / self._settled.noise.innovation
             products = samples.T @ samples
         scaled = variant.plausible[:, None] * products * variant.plausible
         return float(np.median(np.sqrt(np.maximum(np.linalg.eigvalsh(scaled), 0.0))))
 
-    def _size(
-        self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
-    ) -> tuple[float, float]:
-        """Root mean square of an effect beside the base, and by how many standard deviations it is out."""
+    def _sigmas(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+        """By how many standard deviations the norm of an effect beside the base is out."""
         products = self._settled.comparison.beside((), member.columns)
         norm = float(np.sqrt(np.maximum(values @ products @ values, 0.0)))
         if norm == 0.0:
-            return 0.0, 0.0
+            return 0.0
         slope = products @ values / norm
-        sigma = float(np.sqrt(np.maximum(slope @ covariance @ slope, 1e-300)))
-        rows = float(self._settled.channel.kept.sum())
-        return norm * self._settled.noise.effective / float(np.sqrt(rows)), norm / sigma
+        return norm / float(np.sqrt(np.maximum(slope @ covariance @ slope, 1e-300)))
 
-    def _confounded(
-        self, member: Member, values: NDArray[np.float64], effect: NDArray[np.float64]
-    ) -> tuple[float, float]:
-        """Root mean square of an effect about its mean, and the share of it that the base can take up."""
-        products = self._settled.comparison.beside((), member.columns)
-        rest = float(values @ products @ values) * self._settled.noise.effective**2
+    def _concealed(self, effect: NDArray[np.float64]) -> tuple[float, float, float]:
+        """Root mean square of an effect about its mean, that of what the base leaves of it, and the share that this takes up."""
         kept = effect[self._settled.channel.kept]
-        whole = float(np.sum((kept - kept.mean()) ** 2))
-        share = 1.0 - rest / whole if whole > 0.0 else 0.0
-        return float(np.sqrt(whole / len(kept))), float(np.clip(share, 0.0, 1.0))
+        whole = _rms(kept - kept.mean())
+        fitted = self._settled.bank.base_values(-effect) - self._without
+        rest = _rms(kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept])
+        share = 1.0 - (rest / whole) ** 2 if whole > 0.0 else 0.0
+        return whole, rest, float(np.clip(share, 0.0, 1.0))
 
     def _named_values(
         self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
@@ -265,7 +260,7 @@ class _Judge:
             return found
         pattern = self._settled.bank.patterns[member.cause.name]
         unit = self._settled.channel.unit
-        if len(pattern.per) != width:
+        if len(pattern.per) < width:
             return {}
         names = _NAMES.get(str(pattern.family), tuple(f"amplitude {k + 1}" for k in range(width)))[:width]
         names = ("slope",) if pattern.family in {"linear", "drift"} else names

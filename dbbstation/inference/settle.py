@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.channel import Channel, Law
+    from dbbstation.inference.coloured import Coloured
     from dbbstation.inference.hypotheses import Posterior
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
-    from dbbstation.inference.noise import Noise
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.projection import BesideBase
 
@@ -62,7 +62,7 @@ class Settled:
 
     channel: Channel
     bank: Bank
-    noise: Noise
+    noise: Coloured
     comparison: ModelComparison
     posterior: Posterior
     refused: Mapping[str, str] = field(default_factory=dict)
@@ -76,6 +76,11 @@ class Settled:
     def causes(self) -> tuple[Cause, ...]:
         """That were compared."""
         return tuple(cause for cause in self.bank.causes if cause.name not in self.refused)
+
+    @property
+    def log_probability(self) -> float:
+        """Log probability of noise and best hypothesis together, but for what is the same for all of this channel."""
+        return self.bank.log_likelihood() + self.best.log_posterior
 
     def effect(self, names: Sequence[str] | None = None) -> NDArray[np.float64]:
         """What members of the best hypothesis do, over all rows, in the unit of the residual, shape (n,).
@@ -93,9 +98,7 @@ class Settled:
 
     def base_values(self, effect: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Values of the base columns beside an effect, that of all members if None, shape (k,)."""
-        effect = self.effect() if effect is None else effect
-        channel = self.channel
-        return channel.fitted((channel.residual - effect)[channel.kept], self.noise.effective).x
+        return self.bank.base_values(self.effect() if effect is None else effect)
 
     def predicted(self) -> NDArray[np.float64]:
         """What base and members say of the residual, over all rows, shape (n,)."""
@@ -124,29 +127,65 @@ def settle(
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
         progress: told what is being done.
     """
+    options = _Options(look=look, static=static, most_expanded=most_expanded)
+    found = _settled(_begun(channel, options), (), options, progress)
+    if found.noise.is_white or not look:
+        return found
+    # What lasts for a while and is not yet known looks like noise whose neighbours resemble each other, and that noise then
+    # hides it: the other way round, first everything that stands out of white noise, may end at something more probable.
+    bank = _begun(channel, options)
+    bank.measure_noise(white=True)
+    members = _looked(bank, (), {}, progress, white=True)
+    bank.measure_noise()
+    comparison = bank.beside().comparison(bank.target)
+    members = grown(comparison, bank.causes, members)
+    odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
+    if bank.log_likelihood() + comparison.log_evidence(members) + odds < found.log_probability:
+        return found
+    other = _settled(bank, members, options, progress)
+    return max((found, other), key=lambda settled: settled.log_probability)
+
+
+@dataclass(frozen=True)
+class _Options:
+    look: bool
+    static: bool
+    most_expanded: int
+
+
+def _begun(channel: Channel, options: _Options) -> Bank:
     bank = Bank(channel)
-    if static:
+    if options.static:
         bank.add(patterns(channel.variables, channel.blocks, channel.time, channel.simulated))
-    target, ordered = channel.target, channel.time is not None
-    about = channel.size
-    best: tuple[Member, ...] = ()
+    return bank
+
+
+def _settled(bank: Bank, best: tuple[Member, ...], options: _Options, progress: Callable[[str], None]) -> Settled:
+    """Look, compare, lay out anew, until nothing changes.
+
+    Args:
+        bank: of columns; they become more.
+        best: members to begin with.
+        options: of `settle`.
+        progress: told what is being done.
+    """
+    channel, look = bank.channel, options.look
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     laid_out: set[str] = set()
     refused: dict[str, str] = {}
     looked: set[frozenset[str]] = set()
     for number in range(MOST_ROUNDS):
+        bank.measure_noise()
         if look:
-            best = _looked(bank, best, about, refused, progress)
-        noise = bank.noise(target, about, ordered=ordered)
-        about = noise.effective
+            best = _looked(bank, best, refused, progress)
         progress(f"sets of causes, round {number + 1}")
-        beside = bank.beside(about)
-        comparison = beside.comparison(target)
+        beside = bank.beside()
+        comparison = beside.comparison(bank.target)
         causes = bank.but_for(refused)
         start = [grown(comparison, causes, best), *seeds.values()]
-        posterior = search(comparison, causes, start, most_expanded)
+        posterior = search(comparison, causes, start, options.most_expanded)
         seeds |= {h.names: h.members for h in posterior.hypotheses[:SEEDS]}
-        settled = Settled(channel, bank, noise, comparison, posterior, dict(refused))
+        settled = Settled(channel, bank, bank.noise, comparison, posterior, dict(refused))
         best = posterior.best.members
         if rough := [m for m in _laws_of(settled) if m.cause.name not in laid_out]:
             for member in rough:
@@ -163,15 +202,19 @@ def settle(
 
 
 def _looked(
-    bank: Bank, members: tuple[Member, ...], about: float, refused: Mapping[str, str], progress: Callable[[str], None]
+    bank: Bank,
+    members: tuple[Member, ...],
+    refused: Mapping[str, str],
+    progress: Callable[[str], None],
+    *,
+    white: bool = False,
 ) -> tuple[Member, ...]:
     """Look at what is left, take in what is worth it, and look again beside that, until nothing more stands out."""
-    target, ordered = bank.channel.target, bank.channel.time is not None
     for number in range(MOST_LOOKS):
-        new = bank.add(_seen(bank, members, about))
-        progress(f"look {number + 1}: {len(members)} causes, noise about {about:.3g}")
-        about = bank.noise(target, about, ordered=ordered).effective
-        comparison = bank.beside(about).comparison(target)
+        new = bank.add(_seen(bank, members))
+        noise = bank.measure_noise(white=white)
+        progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
+        comparison = bank.beside().comparison(bank.target)
         members = grown(comparison, bank.but_for(refused), members)
         taken = {member.cause.name for member in members}
         bank.drop(set(new) - taken)
@@ -220,20 +263,20 @@ def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[
     return tuple(members)
 
 
-def _seen(bank: Bank, members: Sequence[Member], noise: float) -> list[Pattern]:
+def _seen(bank: Bank, members: Sequence[Member]) -> list[Pattern]:
     """Patterns that stand out of what base and members leave."""
     channel = bank.channel
     known, held = channel.known, channel.held
     fixed = np.flatnonzero(~known.random)
     random = np.flatnonzero(known.random)
-    base = channel.base.samples[channel.kept]
+    base = bank.base
     columns = [base[:, fixed] @ free_directions(known, fixed, held), base[:, random]]
     sd = [np.full(columns[0].shape[1], np.inf), known.prior[random]]
     for member in members:
         columns.append(bank.fitted(member.columns))
         sd.append(member.sd)
-    left = Left.of(channel.target, np.hstack(columns), np.concatenate(sd), noise)
-    size = channel.size / noise
+    left = Left.of(bank.target, np.hstack(columns), np.concatenate(sd), bank.noise, bank.whitening)
+    size = channel.size / left.noise
     found = looked_for(left, channel.variables, channel.kept, size)
     if channel.time is not None:
         stretch = stretches(left, channel.blocks, channel.kept, size)
@@ -258,7 +301,7 @@ def _laws_of(settled: Settled) -> list[Member]:
 
 def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, member: Member) -> None:
     """Lay out a law at its best values in the best hypothesis, or beside it in the place of what it competes with."""
-    target, law = bank.channel.target, bank.laws[member.cause.name]
+    target, law = bank.target, bank.laws[member.cause.name]
     others = best.without(member.cause.name)
     for _ in range(STEPS if law.grids else 1):
         values = beside.comparison(target).estimates([member, *others]).values[: len(member.columns)]

@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.inference.coloured import Coloured
     from dbbstation.inference.pieces import Left
 
 PIECES = 4096
-"""Pieces of rows, at the most."""
+"""Pieces of rows that a stretch may begin and end at, at the most, in the first look."""
 
 LENGTHS_PER_OCTAVE = 2
 """Lengths that are tried from one to twice its length."""
@@ -73,7 +74,10 @@ def stretches(
     width = len(found)
     # A pattern of k stretches is one of tried**k / k! [k places, in whatever order].
     sizes = sorted({1, 2, 3, 4, 6, 9, 13, 19, 28, width} & set(range(1, width + 1)))
-    choices = tuple((k, float(gammaln(k + 1) - (k - 1) * np.log(look.tried) - np.log(len(sizes)))) for k in sizes)
+    choices = tuple(
+        (tuple(range(k)), float(gammaln(k + 1) - (k - 1) * np.log(look.tried) - np.log(len(sizes))), f"{k} of them")
+        for k in sizes
+    )
     label = f"rows {first[0]} to {last[0]}" + (f" and {width - 1} more" if width > 1 else "")
     samples = form.columns(np.arange(len(kept), dtype=np.float64))
     return Pattern(
@@ -82,90 +86,113 @@ def stretches(
 
 
 class _Look:
-    """Sums over windows of pieces of rows, block by block."""
+    """Sums over windows of rows: first over pieces, then every row of the best one's ends by itself."""
 
     def __init__(
         self, left: Left, blocks: Sequence[slice], kept: NDArray[np.bool_], size: float, shortest: int
     ) -> None:
-        rows = np.flatnonzero(kept)
-        per_piece = max(1, shortest, int(np.ceil(len(rows) / PIECES)))
-        self._size = size
-        starts: list[int] = []
-        edges: list[tuple[int, int]] = []
-        for block in blocks:
-            own = np.flatnonzero((rows >= block.start) & (rows < block.stop))
-            if len(own) < 2 * per_piece:
-                continue
-            first = len(starts)
-            starts += [int(own[0]) + k for k in range(0, len(own) - per_piece + 1, per_piece)]
-            edges.append((first, len(starts)))
-        self._edges, self._rows = edges, rows
-        stops = [*starts[1:], len(rows)]
-        for first, last in edges:
-            block_rows = np.flatnonzero((rows >= rows[starts[first]]) & (rows < self._end(blocks, rows[starts[first]])))
-            stops[last - 1] = int(block_rows[-1]) + 1
-        self._starts, self._stops = np.array(starts, dtype=np.int64), np.array(stops, dtype=np.int64)
-        self._axes = left.axes
-        self._rest = left.rest.copy()
+        self._left, self._size, self._shortest = left, size, shortest
+        self._rows = np.flatnonzero(kept)
+        ends = np.searchsorted(self._rows, [[b.start, b.stop] for b in blocks])
+        self._blocks = [(int(a), int(b)) for a, b in ends if b - a >= 2 * shortest]
+        self._axes, self._rest = left.axes, left.rest
+        self._total = _cumulative(left.towards)
         self._windows = self._all_windows()
-        self._own = self._own_of(left.axes)
-        self.tried = max(float(len(self._windows)) / 4.0, 1.0)
-
-    @staticmethod
-    def _end(blocks: Sequence[slice], row: int) -> int:
-        return next(block.stop for block in blocks if block.start <= row < block.stop)
+        self._squares = _squares_of_stretches(left.coloured, len(self._rows))
+        self._own = self._squares[self._windows[:, 1] - self._windows[:, 0]]
+        self._along_axes: list[NDArray[np.float64]] = []
+        for part in range(left.beside.shape[1]):
+            self._beside(left.beside[:, part])
+        self.tried = max(float(len(self._windows)) / INDEPENDENT, 1.0)
 
     def _all_windows(self) -> NDArray[np.int64]:
-        """First and last piece of each window, shape (w, 2)."""
+        """First row of each window and the one behind its last, shape (w, 2)."""
+        per = max(1, int(np.ceil(len(self._rows) / PIECES)))
         found = [np.zeros((0, 2), dtype=np.int64)]
-        for first, last in self._edges:
-            many = last - first
-            octaves = int(np.floor(np.log2(max(many, 1)) * LENGTHS_PER_OCTAVE)) + 1
+        for first, last in self._blocks:
+            many = (last - first) // per
+            octaves = int(np.log2(max(many, 1)) * LENGTHS_PER_OCTAVE) + 1
             lengths = np.unique(np.round(2.0 ** (np.arange(octaves) / LENGTHS_PER_OCTAVE)).astype(np.int64))
-            for length in lengths[lengths < many]:
-                apart = max(1, int(length) // 8)
-                begin = np.arange(first, last - length + 1, apart)
-                found.append(np.column_stack([begin, begin + length - 1]))
-            # To the end of the block: a step.
-            begin = np.arange(first + 1, last)
-            found.append(np.column_stack([begin, np.full(len(begin), last - 1)]))
-        return np.unique(np.vstack(found), axis=0)
+            for length in lengths[(lengths * per >= self._shortest) & (lengths < many)]:
+                begin = np.arange(0, many - length + 1, max(1, int(length) // 8)) * per + first
+                found.append(np.column_stack([begin, begin + length * per]))
+            # To the end of the block, and to the end of all: a step.
+            begin = np.arange(first, last - self._shortest + 1, per)
+            found += [np.column_stack([begin, np.full(len(begin), end)]) for end in (last, len(self._rows))]
+        every = np.unique(np.vstack(found), axis=0)
+        return every[every[:, 1] - every[:, 0] < len(self._rows)]
 
-    def _over(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sums of rows over all windows."""
-        total = np.concatenate([np.zeros((1, *rows.shape[1:])), np.cumsum(rows, axis=0)])
-        return np.asarray(
-            total[self._stops[self._windows[:, 1]]] - total[self._starts[self._windows[:, 0]]], dtype=np.float64
-        )
-
-    def _own_of(self, axes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Information that each window has beside what was fitted."""
-        count = (self._stops[self._windows[:, 1]] - self._starts[self._windows[:, 0]]).astype(np.float64)
-        for part in range(axes.shape[1]):
-            count = count - self._over(axes[:, part]) ** 2
-        return np.maximum(count, 0.0)
+    def _beside(self, axis: NDArray[np.float64]) -> None:
+        """Take what an axis that was fitted has of every window out of the window's own information."""
+        total = _cumulative(axis)
+        self._along_axes.append(total)
+        self._own = self._own - (total[self._windows[:, 1]] - total[self._windows[:, 0]]) ** 2
 
     def best(self) -> _Stretch | None:
-        """The window that stands out most, its edges moved to where it stands out more."""
+        """The window that stands out most, its ends moved to where it stands out more."""
         if not len(self._windows):
             return None
-        worth = self._worth(self._over(self._rest), self._own)
-        k = int(worth.argmax())
-        a, b = self._windows[k]
-        return _Stretch(int(self._rows[self._starts[a]]), int(self._rows[self._stops[b] - 1]), float(worth[k]))
+        along = self._total[self._windows[:, 1]] - self._total[self._windows[:, 0]]
+        first, last = (int(edge) for edge in self._windows[int(self._worth(along, self._own).argmax())])
+        for _ in range(ENDS_MOVED):
+            low, high = self._within(first, last)
+            ends = np.arange(first + self._shortest, high + 1)
+            last = int(ends[int(self._worth_of(np.full(len(ends), first), ends).argmax())])
+            starts = np.arange(low, last - self._shortest + 1)
+            first = int(starts[int(self._worth_of(starts, np.full(len(starts), last)).argmax())])
+        worth = float(self._worth_of(np.array([first]), np.array([last]))[0])
+        return _Stretch(int(self._rows[first]), int(self._rows[last - 1]), worth)
+
+    def _within(self, first: int, last: int) -> tuple[int, int]:
+        """Rows that a stretch may have: those of its block, or of all where it goes on into another one."""
+        for low, high in self._blocks:
+            if low <= first and last <= high:
+                return low, high
+        return 0, len(self._rows)
+
+    def _worth_of(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
+        own = self._squares[ends - starts]
+        for total in self._along_axes:
+            own = own - (total[ends] - total[starts]) ** 2
+        return self._worth(self._total[ends] - self._total[starts], own)
 
     def _worth(self, along: NDArray[np.float64], own: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log Bayes factor of each window, less what it costs to be picked from all of them."""
-        information = own + 1.0 / self._size**2
+        information = np.maximum(own, 0.0) + 1.0 / self._size**2
         occam = 0.5 * np.log(information * self._size**2)
         return np.asarray(0.5 * along**2 / information - occam - np.log(self.tried))
 
     def take(self, stretch: _Stretch) -> None:
         """Go on beside a stretch."""
         column = ((self._rows >= stretch.first) & (self._rows <= stretch.last)).astype(np.float64)
-        column -= self._axes @ (self._axes.T @ column)
-        norm = float(np.linalg.norm(column))
-        axis = column / max(norm, 1e-300)
+        column = self._left.whitened(column)
+        column = column - self._axes @ (self._axes.T @ column)
+        axis = column / max(float(np.linalg.norm(column)), 1e-300)
         self._axes = np.column_stack([self._axes, axis])
         self._rest = self._rest - axis * float(axis @ self._rest)
-        self._own = np.maximum(self._own - self._over(axis) ** 2, 0.0)
+        self._total = _cumulative(self._left.transposed(self._rest))
+        self._beside(self._left.transposed(axis))
+
+
+INDEPENDENT = 4.0
+"""Windows that are about the same: only every so many-th counts as another try."""
+
+ENDS_MOVED = 3
+"""Times that either end of the best window is moved to where it is best."""
+
+
+def _cumulative(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sums of all rows before each, and of all of them, shape (n + 1,)."""
+    return np.concatenate([[0.0], np.cumsum(rows)])
+
+
+def _squares_of_stretches(noise: Coloured, longest: int) -> NDArray[np.float64]:
+    """Sum of squares of a whitened stretch of ones by its length, 0 to `longest`, away from the ends of a block.
+
+    It goes on behind its end until the filter has forgotten it.
+    """
+    taps = noise.filter
+    step = np.concatenate([np.cumsum(taps), np.full(longest, taps.sum())])
+    inside = np.concatenate([[0.0], np.cumsum(step[:longest] ** 2)])
+    behind = [np.sum((step[k : k + len(taps)] - step[: len(taps)]) ** 2) for k in range(longest + 1)]
+    return np.asarray(inside + behind, dtype=np.float64)

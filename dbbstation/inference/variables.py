@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -32,6 +32,10 @@ class Kind(StrEnum):
 
 TRAVELS = frozenset({Kind.ANGLE, Kind.LENGTH, Kind.FORCE, Kind.ANY})
 """Kinds of which the direction of travel may matter: play, friction and hysteresis follow them."""
+
+CONTINUOUS = 0.1
+"""Share of its range that a variable that is sampled along a path changes from one row to the next, at the most, half of the time;
+one that jumps from pose to pose has no speed."""
 
 STILL = 1e-9
 """Share of its range by which a variable must change from one row to the next to have moved."""
@@ -80,22 +84,49 @@ class Variable:
         """What one unit of `scaled` is, in the unit of the variable."""
         return 0.5 * self.extent
 
-    def directions(self, blocks: Sequence[slice]) -> NDArray[np.float64]:
-        """Direction in which it arrived at each row: 1 up, -1 down, shape (n,).
+    def is_path(self, blocks: Sequence[slice]) -> bool:
+        """Whether it moves on from row to row, as along a path, rather than from pose to pose."""
+        steps = [np.abs(np.diff(self.values[rows])) for rows in blocks]
+        every = np.concatenate([np.zeros(0), *steps])
+        return len(every) > 0 and float(np.median(every)) < CONTINUOUS * self.extent
 
-        What rests keeps the direction in which it came; before the first move of a block it has none, 0.
+    def directions(self, blocks: Sequence[slice]) -> NDArray[np.float64]:
+        """Direction of travel at each row: 1 up, -1 down, shape (n,).
+
+        Along a path that of its speed there; from pose to pose that in which it arrived. What rests keeps the direction in which
+        it came; before the first move of a block it has that of the move.
         """
-        found = np.zeros(len(self.values))
-        for rows in blocks:
-            change = np.diff(self.values[rows], prepend=self.values[rows][:1])
-            moved = np.where(np.abs(change) > STILL * self.extent, np.sign(change), 0.0)
-            last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(moved)), 0))
-            found[rows] = moved[last]
-        return found
+        return _signs(self, blocks, _central if self.is_path(blocks) else _arriving)
+
+    def arriving(self, blocks: Sequence[slice]) -> NDArray[np.float64]:
+        """The same from the row before alone: near a turn, a row along a path may belong to either way."""
+        return _signs(self, blocks, _arriving)
 
     def rates(self, time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
         """Change per unit of time, central differences within blocks, shape (n,); zero where time does not run on."""
         return rates_of(self.values, time, blocks)
+
+
+def _arriving(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.diff(values, prepend=values[:1])
+
+
+def _central(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.gradient(values) if len(values) > 1 else np.zeros(len(values))
+
+
+def _signs(
+    variable: Variable, blocks: Sequence[slice], change_of: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Sign of a change by row, kept while nothing changes."""
+    found = np.zeros(len(variable.values))
+    for rows in blocks:
+        change = change_of(variable.values[rows])
+        moved = np.where(np.abs(change) > STILL * variable.extent, np.sign(change), 0.0)
+        first = int(np.argmax(moved != 0.0)) if moved.any() else 0
+        last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(moved)), first))
+        found[rows] = moved[last] if len(moved) else moved
+    return found
 
 
 def rates_of(values: NDArray[np.float64], time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:

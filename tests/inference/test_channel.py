@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
 from dbbstation.inference.read_off import Finding, read_off
@@ -64,6 +65,60 @@ def test_nothing_is_claimed_of_white_noise(seed: int) -> None:
     settled = settle(channel(table(seed)))
     assert not there(read_off(settled))
     assert settled.noise.sigma == pytest.approx(0.1, rel=0.06)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_is_claimed_of_noise_whose_neighbours_resemble_each_other(seed: int) -> None:
+    settled = settle(channel(table(seed, correlation=0.9)))
+    assert not there(read_off(settled))
+    # A first-order process of 0.9 counts as one independent row in 19 [(1 + 0.9) / (1 - 0.9)].
+    assert settled.noise.correlation_samples == pytest.approx(19.0, rel=0.5)
+
+
+def test_whitening_makes_noise_white_that_is_as_it_says() -> None:
+    noise = Coloured(2.0, share=0.8, decay=0.9)
+    lags = np.arange(200)
+    covariance = 4.0 * noise.autocorrelation(np.abs(lags[:, None] - lags))
+    whitening = noise.whitening([slice(0, 120), slice(120, 200)])
+    assert whitening is not None
+    for block in (slice(0, 120), slice(120, 200)):
+        white = (whitening @ np.eye(200))[block, block]
+        found = white @ covariance[block, block] @ white.T / noise.innovation**2
+        assert np.abs(found - np.eye(len(found))).max() < 0.01
+
+
+def test_an_effect_is_found_in_correlated_noise_with_an_honest_size() -> None:
+    away = []
+    for seed in range(4):
+        found = there(read_off(settle(channel(table(seed, EFFECTS["linear in temperature"], correlation=0.9)))))
+        value = found["linear in temperature"].values["slope"]
+        away.append((value.value - 0.15) / value.uncertainty)
+    assert np.abs(away).max() < 3.6
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_a_pulse_is_found_without_being_told_when(correlation: float) -> None:
+    data = table(8, lambda d: 0.4 * ((d.t >= 20.0) & (d.t < 23.0)), correlation=correlation)
+    (found,) = there(read_off(settle(channel(data)))).values()
+    (rows,) = found.rows
+    # A row in or out of it costs little where its noise is a quarter of the pulse.
+    assert abs(rows[0] - 400) <= 2
+    assert abs(rows[1] - 459) <= 2
+    assert next(iter(found.values.values())).value == pytest.approx(0.4, abs=0.1)
+
+
+def test_several_pulses_are_found() -> None:
+    starts = (100, 333, 512, 800, 1300)
+
+    def pulses(d: Table) -> NDArray[np.float64]:
+        row = np.arange(len(d.t))
+        return 0.3 * np.sum([(row >= k) & (row < k + 40) for k in starts], axis=0)
+
+    found = there(read_off(settle(channel(table(9, pulses))))).values()
+    assert {finding.family for finding in found} == {"pulses"}
+    rows = sorted(stretch for finding in found for stretch in finding.rows)
+    assert len(rows) == len(starts)
+    assert np.abs(np.array([first for first, _ in rows]) - starts).max() <= 3
 
 
 @pytest.mark.parametrize("name", EFFECTS)

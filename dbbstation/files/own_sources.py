@@ -12,7 +12,7 @@ import sys
 import traceback
 from inspect import getmembers, isabstract, isclass
 from types import MappingProxyType, ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.machine_file import read_machine
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.machine.geometry import Machine
+
+_Contract = TypeVar("_Contract")
 
 GROUP = "dbbstation.sources"
 """Entry points of this group name classes that derive from `ErrorSource`."""
@@ -80,7 +82,7 @@ def _installed(faults: list[Problem]) -> list[tuple[type[ErrorSource], Problem, 
         try:
             kind = point.load()
         except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
-            faults.append(Problem(place.file, 0, 0, f"cannot be loaded: {_said(error)}", remedy))
+            faults.append(Problem(place.file, 0, 0, f"cannot be loaded: {said_of(error)}", remedy))
             continue
         if isclass(kind) and issubclass(kind, ErrorSource):
             found.append((kind, place, remedy))
@@ -91,6 +93,20 @@ def _installed(faults: list[Problem]) -> list[tuple[type[ErrorSource], Problem, 
 
 def _of_files(files: Iterable[Path], faults: list[Problem]) -> list[tuple[type[ErrorSource], Problem, str]]:
     """Classes of Python files, each with its place and where to read what is asked of it."""
+    return [(kind, place, CONTRACT) for kind, place in classes_in(files, ErrorSource, CONTRACT, faults)]  # type: ignore[type-abstract]
+
+
+def classes_in(
+    files: Iterable[Path], base: type[_Contract], contract: str, faults: list[Problem]
+) -> list[tuple[type[_Contract], Problem]]:
+    """Classes of Python files that derive from a contract, each with its place.
+
+    Args:
+        files: run as Python code.
+        base: the contract.
+        contract: where to read it.
+        faults: gets every fault: not there, not Python, no such class in it.
+    """
     found = []
     for path in {path.resolve(): path for path in files}.values():
         tree = _parsed(path, faults)
@@ -100,13 +116,13 @@ def _of_files(files: Iterable[Path], faults: list[Problem]) -> list[tuple[type[E
         lines = {node.name: node.lineno for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
         own = [member for _, member in getmembers(module, isclass) if member.__module__ == module.__name__]
         # Names that begin with an underscore are other forms of a source.
-        kinds = [kind for kind in own if issubclass(kind, ErrorSource) and not kind.__name__.startswith("_")]
+        kinds = [kind for kind in own if issubclass(kind, base) and not kind.__name__.startswith("_")]
         if not kinds:
-            faults.append(Problem(str(path), 0, 0, "no class in it derives from ErrorSource", CONTRACT))
+            faults.append(Problem(str(path), 0, 0, f"no class in it derives from {base.__name__}", contract))
         for kind in kinds:
             others = any(issubclass(other, kind) for other in kinds if other is not kind)
             if not (isabstract(kind) and others):  # what others derive from may leave things to them
-                found.append((kind, Problem(str(path), lines.get(kind.__name__, 0), 0, ""), CONTRACT))
+                found.append((kind, Problem(str(path), lines.get(kind.__name__, 0), 0, "")))
     return found
 
 
@@ -135,8 +151,8 @@ def _run(path: Path, tree: ast.Module, faults: list[Problem]) -> ModuleType | No
         exec(compile(tree, str(path), "exec", dont_inherit=True), module.__dict__)  # noqa: S102 - asked for by name
     except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
         del sys.modules[module.__name__]
-        what = f"cannot be run: {_said(error)}"
-        faults.append(Problem(str(path), _line_in(error, str(path)), 0, what, "mend the line"))
+        what = f"cannot be run: {said_of(error)}"
+        faults.append(Problem(str(path), line_in(error, str(path)), 0, what, "mend the line"))
         return None
     return module
 
@@ -151,8 +167,8 @@ def _checked(
             source = kind()
             said = tried(source, machine)
         except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
-            said = [f"{_said(error)}, when it was tried on a circle"]
-            line = _line_in(error, place.file) or line
+            said = [f"{said_of(error)}, when it was tried on a circle"]
+            line = line_in(error, place.file) or line
         else:
             if not said:
                 return source
@@ -165,11 +181,12 @@ def _module_name(path: Path) -> str:
     return f"dbbstation_own_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:16]}"
 
 
-def _line_in(error: Exception, file: str) -> int:
+def line_in(error: Exception, file: str) -> int:
     """Return the last line of a file that an error came through; 0 where it did not."""
     frames = traceback.extract_tb(error.__traceback__)
     return next((frame.lineno or 0 for frame in reversed(frames) if frame.filename == file), 0)
 
 
-def _said(error: Exception) -> str:
+def said_of(error: Exception) -> str:
+    """Return kind and words of an error that the code of somebody else raised."""
     return f"{type(error).__name__}: {error}"

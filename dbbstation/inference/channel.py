@@ -106,6 +106,7 @@ class Channel:
         base: what is fitted anew with every hypothesis.
         laws: physical causes.
         time: of the rows, rising within blocks, shape (n,); None where their order means nothing.
+        time_unit: of it.
         simulated: the simulated value as a variable, to ask whether it is late; None: it is not asked.
         kept: rows that are fitted, shape (n,); all if not given.
     """
@@ -118,6 +119,7 @@ class Channel:
     base: Base
     laws: tuple[Law, ...] = ()
     time: NDArray[np.float64] | None = None
+    time_unit: str = "s"
     simulated: Variable | None = None
     kept: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 

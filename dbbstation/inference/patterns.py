@@ -16,7 +16,7 @@ import numpy as np
 
 from dbbstation.inference.curves import Power, Spline
 from dbbstation.inference.forms import Form, Sign, Wave
-from dbbstation.inference.variables import TRAVELS, Kind, rates_of
+from dbbstation.inference.variables import TRAVELS, Kind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -114,7 +114,11 @@ _JOIN = {
 
 
 def patterns(
-    variables: Sequence[Variable], blocks: Sequence[slice], time: NDArray[np.float64] | None, simulated: Variable | None
+    variables: Sequence[Variable],
+    blocks: Sequence[slice],
+    time: NDArray[np.float64] | None,
+    simulated: Variable | None,
+    time_unit: str = "s",
 ) -> list[Pattern]:
     """Patterns that need no look at the residual.
 
@@ -123,6 +127,7 @@ def patterns(
         blocks: rows of each, in time order.
         time: of the rows, shape (n,); None where their order is unknown: then nothing has a direction or a speed.
         simulated: what the simulation says; None where it is not asked whether it is late.
+        time_unit: of `time`.
     """
     usable = [v for v in variables if len(np.unique(v.values)) >= 2]  # noqa: PLR2004 - a constant has no effect
     found = [pattern for v in usable for pattern in _over(v)]
@@ -130,10 +135,12 @@ def patterns(
         for variable in usable:
             if variable.kind in TRAVELS:
                 found += _by_direction(variable, blocks)
-        paths = [v for v in usable if v.kind in TRAVELS and v.is_path(blocks)]
-        found += [_speed(v, time, blocks, Family.SPEED) for v in paths]
+        late = simulated.name if simulated is not None else ""
+        paths = [v for v in usable if v.kind in TRAVELS and v.name != late and v.is_path(blocks)]
+        found += [_speed(v, time, blocks, f"/({v.unit or v.name}/{time_unit})") for v in paths]
         if simulated is not None and simulated.is_path(blocks):
-            found.append(_speed(simulated, time, blocks, Family.LAG))
+            # What is late by T lags behind by T times its rate.
+            found.append(_speed(simulated, time, blocks, time_unit, Family.LAG))
     found += [_product(a, b) for a, b in combinations(usable, 2) if Kind.TIME not in (a.kind, b.kind)]
     if len(blocks) > 1:
         found.append(_of_blocks(blocks, len(usable[0].values) if usable else max(b.stop for b in blocks)))
@@ -228,13 +235,13 @@ def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> 
     return found
 
 
-def _speed(variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], family: Family) -> Pattern:
+def _speed(
+    variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], unit: str, family: Family = Family.SPEED
+) -> Pattern:
     """In proportion to how fast it changes; of the simulated value this is what a lag does."""
-    rate = rates_of(variable.values, time, blocks)
-    size = float(np.abs(rate).max(initial=0.0))
-    # What is late by T lags behind by T times its rate.
-    unit = "s" if family is Family.LAG else f" per {variable.unit or variable.name}/s"
-    return Pattern(family, (variable,), rate[:, None] / (size or 1.0), None, (unit,), (size or 1.0,))
+    rate = variable.rates(time, blocks)
+    size = float(np.abs(rate).max(initial=0.0)) or 1.0
+    return Pattern(family, (variable,), rate[:, None] / size, None, (unit,), (size,))
 
 
 def _product(one: Variable, other: Variable) -> Pattern:

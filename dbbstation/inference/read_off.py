@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.inference.hypotheses import Posterior
     from dbbstation.inference.model_comparison import Cause, Member
     from dbbstation.inference.patterns import Family
     from dbbstation.inference.settle import Settled
@@ -118,7 +119,9 @@ class _Judge:
         self._settled, self._best = settled, settled.best
         self._members = {member.cause.name: member for member in self._best.members}
         self._without = settled.bank.base_values(np.zeros(len(settled.channel.residual)))
+        self._inside, self._weights, self._place = _inclusions(settled.posterior)
         self._classes = {name: self._class(member) for name, member in self._members.items()}
+        self._unsure = {n: self._ambiguity(n) for n, equal in self._classes.items() if self._probability(equal) < SURE}
         estimates = settled.comparison.estimates(self._best.members) if self._members else None
         self._values: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
         first = 0
@@ -193,8 +196,8 @@ class _Judge:
         for name, equal in self._classes.items():
             if cause.name in equal:
                 return Verdict.AMBIGUOUS, (name,), f"Nothing measured here tells it from {name}."
-        for name in self._members:
-            if self._probability(self._classes[name]) < SURE and cause.name in self._ambiguity(name):
+        for name, others in self._unsure.items():
+            if cause.name in others:
                 return Verdict.AMBIGUOUS, (name,), f"These rows cannot tell it from {name}."
         return self._absent(cause, probability)
 
@@ -202,9 +205,10 @@ class _Judge:
         """The same of a cause that is rather not there."""
         seen = self._seen(cause, self._best.members)
         if seen < OUT:
-            for name in self._members:
-                if self._seen(cause, self._best.without(name)) >= OUT:
-                    return Verdict.NOT_TESTABLE, (), f"Beside {name} these rows would not show it."
+            if self._seen(cause, ()) >= OUT:
+                beside = next((n for n in self._members if self._seen(cause, self._best.without(n)) >= OUT), None)
+                what = beside or "what was found"
+                return Verdict.NOT_TESTABLE, (), f"Beside {what} these rows would not show it."
             if self._seen(cause, (), base=False) >= OUT:
                 return Verdict.NOT_TESTABLE, (), "The fitted parameters would take it up."
             return Verdict.NOT_TESTABLE, (), "These rows would not show it at its plausible size."
@@ -272,18 +276,22 @@ class _Judge:
         }
 
     def _probability(self, names: Iterable[str]) -> float:
-        return self._settled.posterior.probability(names)
+        """Probability that at least one of these causes is there."""
+        columns = [self._place[name] for name in names if name in self._place]
+        return float(self._weights @ self._inside[:, columns].any(axis=1)) if columns else 0.0
 
     def _ambiguity(self, name: str) -> tuple[str, ...]:
         """Causes of which one is there for sure, if not this one; none where there are none such."""
-        posterior, probable = self._settled.posterior, self._probability((name,))
         chosen = list(self._classes.get(name, (name,)))
-        alone: dict[str, float] = {}
-        for other in (cause.name for cause in self._settled.causes if cause.name not in chosen):
-            both = posterior.probability_of(lambda key, pair={name, other}: pair <= key)  # type: ignore[misc]
-            # What is there beside it anyway is no alternative to it.
-            if both < EVEN * probable:
-                alone[other] = self._probability((other,)) - both
+        own = self._inside[:, self._place[name]] if name in self._place else np.zeros(len(self._weights), dtype=bool)
+        both = (self._weights * own) @ self._inside
+        every = self._weights @ self._inside
+        # What is there beside it anyway is no alternative to it.
+        alone = {
+            other: float(every[k] - both[k])
+            for other, k in self._place.items()
+            if other not in chosen and both[k] < EVEN * self._probability((name,))
+        }
         for other in sorted(alone, key=lambda n: -alone[n]):
             if self._probability(chosen) >= SURE or len(chosen) > MOST_ALTERNATIVES:
                 break
@@ -311,6 +319,22 @@ class _Judge:
         a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
         cosines = np.linalg.svd(_inverse_root(a) @ across @ _inverse_root(b), compute_uv=False)
         return bool(len(cosines) and cosines.min() > EQUIVALENT)
+
+
+NEGLIGIBLE = 30.0
+"""Log odds against the best set of causes from which on a set counts for nothing, however many there are of them."""
+
+
+def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.float64], dict[str, int]]:
+    """Sets of causes that count, shape (s, c): which cause is in which; their probabilities, shape (s,); places of causes."""
+    top = max(posterior.weights.values())
+    sets = [(key, weight) for key, weight in posterior.weights.items() if weight > top - NEGLIGIBLE]
+    place = {name: k for k, name in enumerate(sorted(set().union(*(key for key, _ in sets))))}
+    inside = np.zeros((len(sets), len(place)), dtype=bool)
+    for row, (key, _) in enumerate(sets):
+        inside[row, [place[name] for name in key]] = True
+    weights = np.exp(np.array([weight for _, weight in sets]) - top)
+    return inside, weights / weights.sum(), place
 
 
 _NAMES = {

@@ -116,6 +116,7 @@ def settle(
     look: bool = True,
     static: bool = True,
     most_expanded: int = MOST_EXPANDED,
+    colours: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns on a channel.
@@ -125,11 +126,12 @@ def settle(
         look: look for waves, bumps, steps, and pulses in time that nobody named.
         static: compare with the patterns that need no look, too.
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
+        colours: where noise is not white, begin a second time as if it were; see below.
         progress: told what is being done.
     """
     options = _Options(look=look, static=static, most_expanded=most_expanded)
     found = _settled(_begun(channel, options), (), options, progress)
-    if found.noise.is_white or not look:
+    if found.noise.is_white or not (look and colours):
         return found
     # What lasts for a while and is not yet known looks like noise whose neighbours resemble each other, and that noise then
     # hides it: the other way round, first everything that stands out of white noise, may end at something more probable.
@@ -156,7 +158,7 @@ class _Options:
 def _begun(channel: Channel, options: _Options) -> Bank:
     bank = Bank(channel)
     if options.static:
-        bank.add(patterns(channel.variables, channel.blocks, channel.time, channel.simulated))
+        bank.add(patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit))
     return bank
 
 

@@ -84,9 +84,16 @@ class Variable:
         """What one unit of `scaled` is, in the unit of the variable."""
         return 0.5 * self.extent
 
+    def travel(self, rows: slice) -> NDArray[np.float64]:
+        """Values over rows that follow one another; an angle that is given within one turn goes on beyond it."""
+        own = self.values[rows]
+        if self.period is None or self.extent > self.period:
+            return own
+        return np.asarray(np.unwrap(own, period=self.period), dtype=np.float64)
+
     def is_path(self, blocks: Sequence[slice]) -> bool:
         """Whether it moves on from row to row, as along a path, rather than from pose to pose."""
-        steps = [np.abs(np.diff(self.values[rows])) for rows in blocks]
+        steps = [np.abs(np.diff(self.travel(rows))) for rows in blocks]
         every = np.concatenate([np.zeros(0), *steps])
         return len(every) > 0 and float(np.median(every)) < CONTINUOUS * self.extent
 
@@ -104,7 +111,12 @@ class Variable:
 
     def rates(self, time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
         """Change per unit of time, central differences within blocks, shape (n,); zero where time does not run on."""
-        return rates_of(self.values, time, blocks)
+        found = np.zeros(len(self.values))
+        for rows in blocks:
+            own, at = self.travel(rows), time[rows]
+            if len(own) > 1 and np.all(np.diff(at) > 0.0):
+                found[rows] = np.gradient(own, at)
+        return found
 
 
 def _arriving(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -121,19 +133,9 @@ def _signs(
     """Sign of a change by row, kept while nothing changes."""
     found = np.zeros(len(variable.values))
     for rows in blocks:
-        change = change_of(variable.values[rows])
+        change = change_of(variable.travel(rows))
         moved = np.where(np.abs(change) > STILL * variable.extent, np.sign(change), 0.0)
         first = int(np.argmax(moved != 0.0)) if moved.any() else 0
         last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(moved)), first))
         found[rows] = moved[last] if len(moved) else moved
-    return found
-
-
-def rates_of(values: NDArray[np.float64], time: NDArray[np.float64], blocks: Sequence[slice]) -> NDArray[np.float64]:
-    """Change of values per unit of time, central differences within blocks, shape (n,)."""
-    found = np.zeros(len(values))
-    for rows in blocks:
-        own, at = values[rows], time[rows]
-        if len(own) > 1 and np.all(np.diff(at) > 0.0):
-            found[rows] = np.gradient(own, at)
     return found

@@ -1,0 +1,249 @@
+"""`dbbstation mismatch`: any simulation against any recording, given as a table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dbbstation.cli.figure_option import figure_option, format_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from dbbstation.diagnosis.table.mismatch import Mismatch
+    from dbbstation.tabulated import Tabulated
+
+
+@click.command()
+@click.argument("data", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="DATA.csv...")
+@click.option("--measured", required=True, metavar="COLUMN", help="Column of the measured values.")
+@click.option("--simulated", required=True, metavar="COLUMN", help="Column of the simulated values.")
+@click.option(
+    "--variables",
+    metavar="A,B=UNIT,...",
+    help="Columns that the difference may follow, each with its unit or kind if its name does not say it [default: all].",
+)
+@click.option("--run", metavar="COLUMN", help="Column that tells runs apart; several files are several runs anyway.")
+@click.option(
+    "--time",
+    metavar="COLUMN",
+    help="Column that says when; `rows`: the rows stand in the order of measuring [default: guessed].",
+)
+@click.option(
+    "--source-file",
+    "source_files",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE.py",
+    help="Python file with physics of your own. It is executed. May be given more than once.",
+)
+@click.option("--no-held-out", is_flag=True, help="Leave out the held-out test, which takes most of the time.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the table here, with the corrected simulation as a further column.",
+)
+@figure_option("Draw what differs here")
+@click.option("--force", is_flag=True, help="Overwrite these files.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def mismatch(
+    data: tuple[Path, ...],
+    *,
+    measured: str,
+    simulated: str,
+    variables: str | None,
+    run: str | None,
+    time: str | None,
+    source_files: tuple[Path, ...],
+    no_held_out: bool,
+    out: Path | None,
+    figure: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    r"""Find where a simulation and a recording differ, in what form, and what was left out of the simulation.
+
+    A row of the table is one measured value beside the simulated one, with everything that was known then: joint angles,
+    positions, loads, temperatures, the time. Units stand at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in --variables.
+    Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
+
+    \b
+    Examples:
+      dbbstation mismatch run.csv --measured measured_mm --simulated model_mm
+      dbbstation mismatch day1.csv day2.csv --measured y_um --simulated y_sim_um --figure where.svg
+      dbbstation mismatch arm.csv --measured z_mm --simulated fk_mm --variables q1=deg,q2=deg,temperature --json
+    """
+    from dbbstation.cli.output import print_json, say
+    from dbbstation.diagnosis.table.mismatch import find_mismatch
+    from dbbstation.diagnosis.table.summary import mismatch_summary
+    from dbbstation.files.atomic import refuse_existing, write_bytes, write_text
+    from dbbstation.tabulated import Asked, load_sources, load_tables, stated_variables
+
+    for path in (out, figure):
+        if path is not None:
+            refuse_existing(path, force=force)
+    asked = Asked(measured, simulated, stated_variables(variables) if variables else None, run, time)
+    tabulated = load_tables(data, asked)
+    for note in tabulated.notes:
+        say(f"note: {note}")
+    sources, lacking = load_sources(source_files, tabulated.table)
+    for name, why in lacking.items():
+        say(f"note: {name} cannot be asked: {why}")
+    found = find_mismatch(
+        tabulated.table, sources, hold_out=not no_held_out, lacking=lacking, progress=lambda text: say(f"... {text}")
+    )
+    summary = mismatch_summary(found)
+    if out is not None:
+        write_text(out, _corrected(tabulated, found), force=force)
+        summary["out"] = str(out)
+    if figure is not None:
+        from dbbstation.report.mismatch_figure import mismatch_figure
+
+        write_bytes(figure, mismatch_figure(found, format_of(figure)), force=force)
+        summary["figure"] = str(figure)
+    if as_json:
+        print_json(summary)
+    else:
+        _print(summary)
+
+
+CORRECTED, LEFT = "corrected", "left"
+"""Columns that `--out` adds."""
+
+
+def _corrected(tabulated: Tabulated, found: Mismatch) -> str:
+    """Text of the table with the corrected simulation and what it leaves."""
+    from dbbstation.files.table_csv import table_csv
+
+    corrected = found.table.simulated + found.explained
+    unit = f"_{found.table.unit.replace('µ', 'u')}" if found.table.unit else ""
+    names = [*tabulated.names, f"{CORRECTED}{unit}", f"{LEFT}{unit}"]
+    columns = [tabulated.columns[name] for name in tabulated.names]
+    return table_csv(names, [*columns, corrected.tolist(), (found.table.measured - corrected).tolist()])
+
+
+def _print(summary: Mapping[str, Any]) -> None:
+    from dbbstation.cli.output import print_table
+
+    unit = summary["unit"]
+    print_table(
+        ["variable", "kind", "unit", "from", "to"],
+        [
+            [v["name"], v["kind"], v["unit"] or "none", f"{v['low']:.5g}", f"{v['high']:.5g}"]
+            for v in summary["variables"]
+        ],
+    )
+    click.echo()
+    _print_whether(summary)
+    there = [f for f in summary["findings"] if f["verdict"] in {"identified", "ambiguous"}]
+    if there:
+        click.echo()
+        _print_findings(there, unit)
+    _print_parameters(summary)
+    held_out = summary["held_out_rms"]
+    if held_out:
+        click.echo(
+            f"\nheld-out error: {held_out['before']:.3g} -> {held_out['after']:.3g} {unit} rms, over "
+            f"{len(held_out['folds'])} parts, everything chosen anew without each of them"
+        )
+    click.echo()
+    _print_left(summary)
+    for verdict in ("not-testable", "ruled-out"):
+        names = [f["name"] for f in summary["findings"] if f["verdict"] == verdict]
+        if names:
+            click.echo(f"{verdict}: {_few(names)}")
+    if summary["next"]:
+        click.echo("\nmeasure next:")
+        for step in summary["next"]:
+            click.echo(f"  {step['text']}")
+
+
+def _print_whether(summary: Mapping[str, Any]) -> None:
+    """Is there a mismatch, how large, beside which noise, led by which variable."""
+    unit, noise, rms = summary["unit"], summary["noise"], summary["residual_rms"]
+    offset = summary["offset"]
+    if offset["significant"]:
+        click.echo(f"Measured less simulated is {_number(offset)} on average; this is fitted and is not counted below.")
+    if not summary["mismatch"]:
+        click.echo(f"No mismatch: what differs, {rms['before']:.3g} {unit} rms, is noise.".replace("  ", " "))
+    else:
+        click.echo(
+            f"There is a mismatch: {rms['before']:.3g} {unit} rms, of which {rms['after']:.3g} {unit} is not explained."
+        )
+    told = (
+        ""
+        if noise["measured_in_order"]
+        else "; fitted jointly, since nothing says in which order the rows were measured"
+    )
+    alike = f", {noise['rows_as_one']:.3g} rows count as one" if noise["rows_as_one"] > 1.0 else ""
+    click.echo(f"noise of one row: {noise['sigma']:.3g} {unit}{alike}{told}")
+    if summary["led_by"]:
+        led = ", ".join(f"{s['variable']} {100 * s['share']:.0f} %" for s in summary["led_by"][:4])
+        click.echo(f"led by (what of the explanation is lost without it): {led}")
+
+
+def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
+    from dbbstation.cli.output import print_table
+
+    rows = [
+        [
+            f["name"],
+            f["verdict"],
+            f"{f['probability']:.3f}",
+            f"{f['log_bayes_factor']:.0f}",
+            f"{f['rms']:.2g}",
+            f"{100 * f['confounded']:.0f} %",
+        ]
+        for f in there
+    ]
+    print_table(["effect", "verdict", "probability", "log Bayes factor", f"{unit} rms".strip(), "concealed"], rows)
+    for f in there:
+        click.echo(f"\n{f['name']}")
+        values = ", ".join(f"{name} {_number(value)}" for name, value in f["values"].items())
+        if values and len(f["values"]) <= MOST_VALUES:
+            click.echo(f"  {values}")
+        click.echo(f"  {f['text']}")
+
+
+MOST_VALUES = 6
+"""Values of an effect that are printed; those of a curve say little by themselves, and are in the JSON."""
+
+
+def _print_parameters(summary: Mapping[str, Any]) -> None:
+    parameters = summary["parameters"][1:]
+    if not parameters:
+        return
+    click.echo("\nparameters of the simulation, fitted anew:")
+    for p in parameters:
+        before, after = _number(p["before"]), _number(p["after"])
+        click.echo(f"  {p['name']}: {before} alone, {after} beside what was found; R² {p['confounded']:.2f} with it")
+
+
+def _print_left(summary: Mapping[str, Any]) -> None:
+    left = summary["left"]
+    if left["is_noise"]:
+        click.echo("Nothing is left beyond noise.")
+    else:
+        worst = min(left["looks"], key=lambda look: look["probability"])
+        where = f", {worst['where']}" if worst["where"] else ""
+        click.echo(f"Something is left beyond noise: {worst['name']}{where}, {worst['rms']:.2g} {summary['unit']}.")
+    if not summary["second_start_agrees"]:
+        click.echo(
+            "A search that begins with nothing ends at another set of effects: more than one explains these rows."
+        )
+
+
+def _few(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:MOST_NAMES])
+    return shown if len(names) <= MOST_NAMES else f"{shown} and {len(names) - MOST_NAMES} more"
+
+
+MOST_NAMES = 6
+
+
+def _number(number: Mapping[str, Any]) -> str:
+    u = number["uncertainty"]
+    known = f"{number['value']:.4g} ± {u:.2g}" if u is not None else f"{number['value']:.4g}"
+    return f"{known} {number['unit']}".rstrip()

@@ -1,0 +1,47 @@
+"""The contract of physics of one's own on a table: columns from variables."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar
+
+from dbbstation.sources.contract import Parameter as Parameter  # noqa: PLC0414, TC001 - part of the contract
+from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class TableSource(ABC):
+    """One physical cause of a difference between measured and simulated values. Instances carry no state."""
+
+    name: ClassVar[str]
+    """Unique, in small letters with hyphens."""
+
+    needs: ClassVar[tuple[str, ...]]
+    """Columns of the table that it is computed from; a table without them is compared without it."""
+
+    texts: ClassVar[Texts]
+
+    form_uncertainty: ClassVar[float] = 0.02
+    """Share of its effect by which real objects depart from the formula, one standard deviation: 0.02 for springs and geometry,
+    0.1 to 0.3 for friction, play and warm-ups."""
+
+    follows: ClassVar[str] = ""
+    """Column along which they do; the first one that it needs if empty."""
+
+    @abstractmethod
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return its numbers: amplitudes, which the effect is proportional to, and those with a `shape`, which it is not."""
+
+    @abstractmethod
+    def columns(self, variables: Mapping[str, NDArray[np.float64]], shapes: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return what one of each amplitude adds to the measured value, shape (n, p), in its unit.
+
+        Args:
+            variables: columns that it needs, by name, shape (n,); rows of a run in time order.
+            shapes: values of the parameters that have a `shape`, by name.
+        """

@@ -1,0 +1,113 @@
+"""A table as it is compared: measured and simulated values, variables, derivatives, blocks; and the channel made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.variables import Kind, Variable
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.table.contract import TableSource
+
+OFFSET = "offset"
+"""Name of the base column that is the same for all rows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Rows of all blocks, one block after the other, each in time order.
+
+    Attributes:
+        measured: shape (n,).
+        simulated: shape (n,).
+        unit: of both; empty where none is known.
+        simulated_name: of the column.
+        variables: that the difference may follow.
+        derivatives: of the simulated value by parameters, by name of these, shape (n,).
+        columns: all numeric columns by name, for physics of one's own, shape (n,).
+        blocks: rows of each file or run.
+        names: of the blocks.
+        clock: variable that orders the rows; None where nothing does.
+        in_row_order: rows stand in the order in which they were measured, though no column says when.
+    """
+
+    measured: NDArray[np.float64]
+    simulated: NDArray[np.float64]
+    unit: str
+    simulated_name: str
+    variables: tuple[Variable, ...]
+    derivatives: Mapping[str, NDArray[np.float64]]
+    columns: Mapping[str, NDArray[np.float64]]
+    blocks: tuple[slice, ...]
+    names: tuple[str, ...]
+    clock: Variable | None
+    in_row_order: bool = False
+
+    def __len__(self) -> int:
+        return len(self.measured)
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether rows follow one another in time."""
+        return self.clock is not None or self.in_row_order
+
+    def channel(self, sources: Sequence[TableSource] = ()) -> Channel:
+        """Channel of measured less simulated.
+
+        Args:
+            sources: physics of the user's own; those that lack a column are left out by the caller.
+        """
+        samples = np.column_stack([np.ones(len(self)), *self.derivatives.values()])
+        simulated = Variable(self.simulated_name, self.unit, Kind.ANY, self.simulated)
+        time = None if self.clock is None else self.clock.values
+        if time is None and self.in_row_order:
+            time = np.arange(len(self), dtype=np.float64)
+        follows = self.variables
+        if np.ptp(self.simulated) > 0.0 and not any(np.array_equal(v.values, self.simulated) for v in follows):
+            follows = (*follows, simulated)
+        return Channel(
+            residual=self.measured - self.simulated,
+            unit=self.unit,
+            blocks=self.blocks,
+            names=self.names,
+            variables=follows,
+            base=Base.flat((OFFSET, *self.derivatives), samples),
+            laws=tuple(self._law(source) for source in sources),
+            time=time,
+            time_unit=self.clock.unit if self.clock is not None and self.clock.unit else "row",
+            simulated=simulated,
+        )
+
+    def _law(self, source: TableSource) -> Law:
+        parameters = source.parameters()
+        amplitudes = [p for p in parameters if not p.shape]
+        shaped = [p for p in parameters if p.shape]
+        given = {name: self.columns[name] for name in source.needs}
+        along = source.follows or (source.needs[0] if source.needs else "")
+        follows = next((v for v in self.variables if v.name == along), None)
+        if follows is None and along in self.columns:
+            follows = Variable(along, "", Kind.ANY, self.columns[along])
+
+        def columns(point: tuple[float, ...]) -> NDArray[np.float64]:
+            names = [p.name for p in shaped]
+            return np.asarray(source.columns(given, dict(zip(names, point, strict=True))), dtype=np.float64)
+
+        return Law(
+            name=source.name,
+            columns=columns,
+            plausible=np.array([p.plausible for p in amplitudes]),
+            parameters=tuple(p.name for p in (*amplitudes, *shaped)),
+            units=tuple(p.unit for p in (*amplitudes, *shaped)),
+            grids=tuple(tuple(p.shape) for p in shaped),
+            positive=tuple(p.positive for p in amplitudes),
+            form_uncertainty=source.form_uncertainty,
+            follows=follows,
+        )

@@ -1,0 +1,251 @@
+"""Where a simulation and a recording differ: is there a mismatch, which variable leads it, which form it has, what is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.folds import held_out_error
+from dbbstation.inference.left_over import left_over
+from dbbstation.inference.patterns import covers_turns, turn
+from dbbstation.inference.read_off import OUT, read_off
+from dbbstation.inference.settle import settle
+from dbbstation.inference.square_root import compress, solve, with_random
+from dbbstation.inference.verdict import Value, Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.table.contract import TableSource
+    from dbbstation.diagnosis.table.data import Table
+    from dbbstation.inference.channel import Channel
+    from dbbstation.inference.folds import HeldOutError
+    from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.patterns import Pattern
+    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.settle import Settled
+
+FOLD_EXPANDED = 2
+"""Hypotheses whose neighbours are looked at in a search of rows that others are held back from: a quarter of the usual number. The
+selection is all repeated; it is searched less widely, which can only make its held-out error larger."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A base parameter before and after.
+
+    Attributes:
+        name: `offset`, or of the parameter.
+        before: with the base alone.
+        after: with what was found beside it.
+        confounded: share of what the parameter does that this can do as well, R².
+    """
+
+    name: str
+    before: Value
+    after: Value
+    confounded: float
+
+
+@dataclass(frozen=True)
+class Share:
+    """What of the mismatch follows one variable.
+
+    Attributes:
+        variable: name.
+        rms: of all effects over it, shared ones as well, in the unit of the table.
+        share: of the reduction of the weighted sum of squares that is lost without these.
+        terms: how many.
+    """
+
+    variable: str
+    rms: float
+    share: float
+    terms: int
+
+
+@dataclass(frozen=True, eq=False)
+class Mismatch:
+    """What is said of a table.
+
+    Attributes:
+        table: that was compared.
+        settled: what the comparison came to.
+        findings: what is said of each cause, those that are there first.
+        shares: of variables, largest first.
+        resembles: of smooth curves that are there, which named forms they follow: share of each, R², by name of finding.
+        fitted: base parameters.
+        left: tests of what is left.
+        held_out: error of rows that took no part; None where it was not asked for.
+        lacking: physics of the user's own that could not be asked, and why.
+    """
+
+    table: Table
+    settled: Settled
+    findings: tuple[Finding, ...]
+    shares: tuple[Share, ...]
+    resembles: dict[str, dict[str, float]]
+    fitted: tuple[Fitted, ...]
+    left: LeftOver
+    held_out: HeldOutError | None
+    lacking: dict[str, str]
+
+    @property
+    def there(self) -> tuple[Finding, ...]:
+        """Findings of what is there."""
+        return tuple(finding for finding in self.findings if finding.verdict is Verdict.IDENTIFIED)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether measured and simulated values differ beyond noise and what base parameters take up."""
+        return bool(self.settled.best.members) or not self.left.is_noise
+
+    @property
+    def offset_is_there(self) -> bool:
+        """Whether a constant lies between them that is none of chance."""
+        offset = self.fitted[0].before
+        return abs(offset.value) >= OUT * offset.uncertainty
+
+    @property
+    def explained(self) -> NDArray[np.float64]:
+        """What was found, base parameters included, over all rows, shape (n,)."""
+        return self.settled.predicted()
+
+    @property
+    def rms_before(self) -> float:
+        """Of the residual that base parameters leave, in the unit of the table."""
+        base = self.settled.channel.base.samples @ np.array([f.before.value for f in self.fitted])
+        return _rms(self.settled.channel.residual - base)
+
+    @property
+    def rms_after(self) -> float:
+        """Of what everything found leaves."""
+        return _rms(self.settled.channel.residual - self.explained)
+
+
+def find_mismatch(
+    table: Table,
+    sources: Sequence[TableSource] = (),
+    *,
+    hold_out: bool = True,
+    lacking: dict[str, str] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Mismatch:
+    """Compare measured with simulated values.
+
+    Args:
+        table: rows of all blocks.
+        sources: physics of the user's own that the table has the columns for.
+        hold_out: repeat everything for each held-out part; takes most of the time.
+        lacking: physics that could not be asked, and why.
+        progress: told what is being done.
+    """
+    channel = table.channel(sources)
+    settled = settle(channel, progress=progress)
+    findings = read_off(settled)
+    held_out = None
+    if hold_out:
+
+        def choose(part: Channel) -> Settled:
+            return settle(part, most_expanded=FOLD_EXPANDED, colours=False)
+
+        held_out = held_out_error(channel, choose, progress)
+    return Mismatch(
+        table=table,
+        settled=settled,
+        findings=findings,
+        shares=_shares(settled),
+        resembles=_resembles(settled),
+        fitted=_fitted(settled),
+        left=left_over(settled),
+        held_out=held_out,
+        lacking=lacking or {},
+    )
+
+
+def _shares(settled: Settled) -> tuple[Share, ...]:
+    """Variables by what of the explanation is lost without all that follows them."""
+    comparison, best, patterns = settled.comparison, settled.best, settled.bank.patterns
+    whole = comparison.explained(best.members) if best.members else 0.0
+    found = []
+    for variable in settled.channel.variables:
+        own = [
+            m.cause.name
+            for m in best.members
+            if m.cause.name in patterns and any(v.name == variable.name for v in patterns[m.cause.name].variables)
+        ]
+        if own:
+            rest = best.without(*own)
+            lost = 1.0 - (comparison.explained(rest) if rest else 0.0) / whole
+            found.append(Share(variable.name, _rms_about_mean(settled.effect(own)), max(lost, 0.0), len(own)))
+    return tuple(sorted(found, key=lambda share: -share.share))
+
+
+def _resembles(settled: Settled) -> dict[str, dict[str, float]]:
+    """Shares of curves that named forms of the same variable follow, alone and together."""
+    found = {}
+    for member in settled.best.members:
+        pattern = settled.bank.patterns.get(member.cause.name)
+        if pattern is None or len(pattern.variables) != 1 or pattern.samples.shape[1] < FLEXIBLE:
+            continue
+        effect = settled.effect([member.cause.name])
+        found[member.cause.name] = {name: _followed(effect, columns) for name, columns in _named_forms(pattern).items()}
+    return found
+
+
+FLEXIBLE = 5
+"""Amplitudes from which on an effect over one variable is a curve that may follow several named forms."""
+
+
+def _named_forms(pattern: Pattern) -> dict[str, NDArray[np.float64]]:
+    variable = pattern.variables[0]
+    forms = {"linear": variable.scaled[:, None], "parabola": np.column_stack([variable.scaled, variable.scaled**2])}
+    if covers_turns(variable):
+        once, twice = (turn(variable, order).columns(variable.values) for order in (1, 2))
+        forms |= {"once per turn": once, "twice per turn": twice, "once and twice per turn": np.hstack([once, twice])}
+    return forms
+
+
+def _followed(effect: NDArray[np.float64], columns: NDArray[np.float64]) -> float:
+    """Share of the variance of an effect that columns and a constant follow."""
+    both = np.column_stack([np.ones(len(effect)), columns])
+    values, *_ = np.linalg.lstsq(both, effect, rcond=None)
+    whole = float(np.sum((effect - effect.mean()) ** 2))
+    return 1.0 - float(np.sum((effect - both @ values) ** 2)) / whole if whole > 0.0 else 0.0
+
+
+def _fitted(settled: Settled) -> tuple[Fitted, ...]:
+    """Base parameters with the base alone, and beside everything that was found."""
+    channel, bank, members = settled.channel, settled.bank, settled.best.members
+    noise, known, size = settled.noise.innovation, channel.known, channel.base.samples.shape[1]
+    alone = solve([compress(np.arange(size), bank.base, bank.target)], known, noise, channel.held)
+    beside = alone
+    if members:
+        columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
+        both = with_random(known, np.concatenate([member.sd for member in members]))
+        block = compress(np.arange(columns.shape[1]), columns, bank.target)
+        beside = solve([block], both, noise, channel.held)
+    before, after = np.diag(alone.covariance), np.diag(beside.covariance)[:size]
+    units = ["" if k == 0 else "in its own unit" for k in range(size)]
+    units[0] = channel.unit
+    return tuple(
+        Fitted(
+            name,
+            Value(float(alone.x[k]), float(np.sqrt(max(before[k], 0.0))), units[k]),
+            Value(float(beside.x[k]), float(np.sqrt(max(after[k], 0.0))), units[k]),
+            float(np.clip(1.0 - before[k] / after[k], 0.0, 1.0)) if after[k] > 0.0 else 1.0,
+        )
+        for k, name in enumerate(channel.base.names)
+    )
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _rms_about_mean(values: NDArray[np.float64]) -> float:
+    return _rms(values - values.mean())

@@ -1,0 +1,119 @@
+"""What to measure next on a table: what would tell apart what these rows do not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.variables import TRAVELS
+from dbbstation.inference.verdict import Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dbbstation.diagnosis.table.mismatch import Mismatch
+
+ALIKE = 0.95
+"""Correlation of two variables from which on rows hardly tell which of them an effect follows: a tenth of its variance is left."""
+
+TAKEN_UP = 0.9
+"""Share of a parameter's effect that what was found can do as well, from which on its value rests on the choice of these."""
+
+MOST = 4
+"""Suggestions, at the most."""
+
+
+@dataclass(frozen=True)
+class Next:
+    """One thing to measure.
+
+    Attributes:
+        text: what to do, and what it would decide.
+        variables: that it concerns.
+    """
+
+    text: str
+    variables: tuple[str, ...]
+
+
+def next_measurements(found: Mismatch) -> tuple[Next, ...]:
+    """What would decide most, first."""
+    return tuple(list(_suggested(found))[:MOST])
+
+
+def _suggested(found: Mismatch) -> Iterator[Next]:
+    yield from _apart(found)
+    for parameter in found.fitted[1:]:
+        if parameter.confounded > TAKEN_UP:
+            text = f"Measure where {parameter.name} matters and what was found does not: {100 * parameter.confounded:.0f} % of it"
+            yield Next(f"{text} can be taken for these.", ())
+    if not found.table.is_ordered:
+        text = "Record the time of each row, or say `--time rows`: without order there is no drift, pulse, lag or direction."
+        yield Next(text, ())
+    yield from _denser(found)
+    yield from _rest_of_turns(found)
+    yield from _other_way(found)
+    if len(found.table.blocks) == 1:
+        yield Next(
+            "Repeat it on another day as a second file: what comes back is the object's, what does not is the day's.",
+            (),
+        )
+
+
+def _denser(found: Mismatch) -> Iterator[Next]:
+    """A place where something is left."""
+    worst = found.left.worst
+    if not found.left.is_noise and worst.name in {v.name for v in found.settled.channel.variables}:
+        yield Next(f"Measure more densely in {worst.name}, {worst.where}: something is left there.", (worst.name,))
+
+
+def _rest_of_turns(found: Mismatch) -> Iterator[Next]:
+    """Angles that what was found follows, and that did not turn all the way."""
+    led = {name for finding in found.there for name in finding.variables}
+    for variable in found.settled.channel.variables:
+        if variable.name in led and variable.period is not None and variable.extent < WHOLE * variable.period:
+            covered = 100.0 * variable.extent / variable.period
+            text = f"Measure the rest of the turn of {variable.name}: these rows cover {covered:.0f} % of it."
+            yield Next(text, (variable.name,))
+
+
+WHOLE = 0.95
+"""Share of a turn from which on all of it was measured."""
+
+
+def _other_way(found: Mismatch) -> Iterator[Next]:
+    """Variables that go one way only."""
+    table = found.table
+    for variable in found.settled.channel.variables if table.is_ordered else ():
+        if variable.kind in TRAVELS and variable.name != table.simulated_name:
+            sign = variable.directions(table.blocks)
+            if min((sign > 0).sum(), (sign < 0).sum()) < ONE_WAY * len(table):
+                text = f"Measure {variable.name} in both directions of travel: hysteresis cannot show one way."
+                yield Next(text, (variable.name,))
+
+
+ONE_WAY = 0.02
+"""Share of the rows in the rarer direction of travel below which a variable goes one way only."""
+
+
+def _apart(found: Mismatch) -> Iterator[Next]:
+    """Variables that move together, where what was found follows one of them."""
+    variables = [v for v in found.settled.channel.variables if v.name != found.table.simulated_name]
+    led = {name for finding in found.findings if finding.verdict in LIKELY for name in finding.variables}
+    values = np.array([v.scaled for v in variables])
+    if len(values) < 2:  # noqa: PLR2004 - a pair
+        return
+    alike = np.abs(np.corrcoef(values))
+    for a, one in enumerate(variables):
+        for b, other in enumerate(variables[:a]):
+            if alike[a, b] > ALIKE and led & {one.name, other.name}:
+                text = (
+                    f"Measure with {other.name} held while {one.name} moves: they move together here (correlation "
+                    f"{alike[a, b]:.3f}), and which of them the mismatch follows is not known."
+                )
+                yield Next(text, (other.name, one.name))
+
+
+LIKELY = frozenset({Verdict.IDENTIFIED, Verdict.AMBIGUOUS})

@@ -1,0 +1,103 @@
+"""The comparison of a table as plain numbers: what `--json` prints."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.diagnosis.table.next_measurement import next_measurements
+from dbbstation.diagnosis.table.words import sentence_of
+
+if TYPE_CHECKING:
+    from dbbstation.diagnosis.table.mismatch import Mismatch
+    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.verdict import Value
+
+
+def mismatch_summary(found: Mismatch) -> dict[str, Any]:
+    """Everything that is said."""
+    table, settled, noise = found.table, found.settled, found.settled.noise
+    ordered = settled.channel.time is not None
+    return {
+        "unit": table.unit,
+        "rows": len(table),
+        "blocks": list(table.names),
+        "variables": [
+            {
+                "name": v.name,
+                "kind": str(v.kind),
+                "unit": v.unit,
+                "period": v.period,
+                "low": v.low,
+                "high": v.high,
+            }
+            for v in table.variables
+        ],
+        "mismatch": found.is_there,
+        "offset": {**_value(found.fitted[0].before), "significant": found.offset_is_there},
+        "noise": {
+            "sigma": noise.sigma,
+            "rows_as_one": noise.correlation_samples,
+            "measured_in_order": ordered,
+        },
+        "residual_rms": {"before": found.rms_before, "after": found.rms_after},
+        "held_out_rms": None
+        if found.held_out is None
+        else {
+            "before": found.held_out.before,
+            "after": found.held_out.after,
+            "folds": [
+                {"name": f.name, "rows": f.rows, "before": f.before, "after": f.after} for f in found.held_out.folds
+            ],
+        },
+        "led_by": [{"variable": s.variable, "rms": s.rms, "share": s.share, "terms": s.terms} for s in found.shares],
+        "findings": [_finding(found, finding) for finding in found.findings],
+        "parameters": [
+            {
+                "name": p.name,
+                "before": _value(p.before),
+                "after": _value(p.after),
+                "shift": p.after.value - p.before.value,
+                "confounded": p.confounded,
+            }
+            for p in found.fitted
+        ],
+        "left": {
+            "is_noise": found.left.is_noise,
+            "probability": found.left.probability,
+            "looks": [
+                {"name": look.name, "probability": look.probability, "rms": look.rms, "where": look.where}
+                for look in found.left.looks
+            ],
+        },
+        "second_start_agrees": settled.second_start_agrees(),
+        "next": [{"text": step.text, "variables": list(step.variables)} for step in next_measurements(found)],
+        "not_asked": found.lacking,
+    }
+
+
+def _finding(found: Mismatch, finding: Finding) -> dict[str, Any]:
+    return {
+        "name": finding.name,
+        "verdict": str(finding.verdict),
+        "form": None if finding.family is None else str(finding.family),
+        "variables": list(finding.variables),
+        "probability": finding.probability,
+        "log_bayes_factor": finding.log_factor,
+        "rms": finding.rms,
+        "sigmas": finding.sigmas,
+        "confounded": finding.confounded,
+        "values": {name: _value(value) for name, value in finding.values.items()},
+        "spans": [{"variable": s.variable, "low": s.low, "high": s.high, "unit": s.unit} for s in finding.spans],
+        "rows": [list(rows) for rows in finding.rows],
+        "blocks": dict(zip(found.table.names, finding.blocks, strict=True)) if finding.blocks else {},
+        "equivalent": list(finding.equivalent),
+        "ambiguous_with": list(finding.ambiguous_with),
+        "resembles": found.resembles.get(finding.name, {}),
+        "text": sentence_of(found, finding),
+    }
+
+
+def _value(value: Value) -> dict[str, Any]:
+    known = math.isfinite(value.uncertainty)
+    return {"value": value.value, "uncertainty": value.uncertainty if known else None, "unit": value.unit}

@@ -1,0 +1,85 @@
+"""Units and kinds of the columns of a table, guessed from their names or stated."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from dbbstation.inference.variables import Kind
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a column is.
+
+    Attributes:
+        unit: as printed; empty where none is known.
+        kind: of the variable.
+        period: one turn of an angle, in its unit; None for all others.
+    """
+
+    unit: str
+    kind: Kind
+    period: float | None = None
+
+
+PLAIN = Meaning("", Kind.ANY)
+
+_LENGTHS = {"mm": "mm", "um": "µm", "µm": "µm", "nm": "nm", "cm": "cm", "m": "m", "inch": "inch"}
+_TIMES = {"s": "s", "ms": "ms", "us": "µs", "min": "min", "h": "h", "days": "days"}
+_FORCES = {"n": "N", "kn": "kN"}
+_OTHERS = {"a": "A", "v": "V", "bar": "bar", "pa": "Pa", "w": "W", "hz": "Hz", "kg": "kg", "percent": "%", "g": "g"}
+_TEMPERATURES = {"c": "degC", "degc": "degC", "celsius": "degC", "k": "K", "kelvin": "K"}
+
+UNITS: dict[str, Meaning] = {
+    **{name: Meaning(unit, Kind.LENGTH) for name, unit in _LENGTHS.items()},
+    **{name: Meaning(unit, Kind.TIME) for name, unit in _TIMES.items()},
+    **{name: Meaning(unit, Kind.FORCE) for name, unit in _FORCES.items()},
+    **{name: Meaning(unit, Kind.TEMPERATURE) for name, unit in _TEMPERATURES.items()},
+    **{name: Meaning(unit, Kind.ANY) for name, unit in _OTHERS.items()},
+    **{
+        f"{way}_{time}": Meaning(f"{unit}/{_TIMES[time]}", Kind.SPEED)
+        for way, unit in (*_LENGTHS.items(), ("deg", "deg"), ("rad", "rad"))
+        for time in ("s", "min")
+    },
+    "rpm": Meaning("rpm", Kind.SPEED),
+    "deg": Meaning("deg", Kind.ANGLE, 360.0),
+    "rad": Meaning("rad", Kind.ANGLE, 2.0 * math.pi),
+    "turns": Meaning("turns", Kind.ANGLE, 1.0),
+    "mrad": Meaning("mrad", Kind.ANGLE),
+    "urad": Meaning("µrad", Kind.ANGLE),
+    "arcsec": Meaning("arcsec", Kind.ANGLE),
+}
+"""What a name ends in, or what is stated, in small letters."""
+
+_CLOCKS = {"t", "time", "timestamp", "clock", "elapsed", "date"}
+_THERMOMETERS = ("temp", "temperature")
+_WORDS = re.compile(r"[^a-z0-9µ%]+")
+
+
+def meaning_of(name: str) -> Meaning:
+    """Guess from a name: `travel_mm`, `t_s`, `oil_temp_c`, `temperature`, `angle_deg`; `PLAIN` where it says nothing."""
+    words = [word for word in _WORDS.split(name.lower()) if word]
+    for count in (2, 1):
+        end = "_".join(words[-count:])
+        if len(words) > count and end in UNITS:
+            found = UNITS[end]
+            if found.kind is Kind.TIME and not _CLOCKS & set(words[:-count]):
+                return Meaning(found.unit, Kind.ANY)  # a duration, no clock
+            return found
+    if words and words[-1] in _CLOCKS:
+        return Meaning("", Kind.TIME)
+    if any(word.startswith(_THERMOMETERS) for word in words):
+        return Meaning("", Kind.TEMPERATURE)
+    return PLAIN
+
+
+def stated_meaning(text: str) -> Meaning | None:
+    """Meaning of a unit or kind that somebody states, such as `deg`, `mm/s` or `time`; None where it is neither."""
+    word = text.strip().lower().replace("/", "_").replace("°", "deg")
+    if word in UNITS:
+        return UNITS[word]
+    if word in set(Kind):
+        return Meaning("", Kind(word))
+    return None

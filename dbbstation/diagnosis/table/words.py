@@ -1,0 +1,80 @@
+"""Sentences about findings of a table, made from their typed values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.patterns import Family
+
+if TYPE_CHECKING:
+    from dbbstation.diagnosis.table.mismatch import Mismatch
+    from dbbstation.inference.read_off import Finding
+
+MEANINGS: dict[Family, str] = {
+    Family.LINEAR: "It grows in proportion: a scale, a stiffness or an expansion that the simulation has wrong or lacks.",
+    Family.ONCE: "It closes once per turn: something is off centre, or an axis is tilted.",
+    Family.TWICE: "It closes twice per turn: something is oval, or an axis wobbles.",
+    Family.HYSTERESIS: "It turns its sign with the direction of travel: play or friction.",
+    Family.SPEED: "It grows with the speed: viscous friction, or a delay of this variable.",
+    Family.LAG: "The measured value runs after the simulated one (negative: ahead of it).",
+    Family.DRIFT: "It grows with time: warming, wear, or a clock that runs at another rate.",
+    Family.PRODUCT: "It depends on both together: no curve over one of them alone shows it.",
+    Family.CURVE: "It follows this variable smoothly.",
+    Family.BY_DIRECTION: "It follows this variable with opposite signs in the two directions of travel.",
+    Family.WAVE: "It repeats: a pitch, a tooth, a pole or a ripple.",
+    Family.BUMP: "It is a bell over one place.",
+    Family.STEP: "It steps at one place.",
+    Family.PULSES: "It begins and ends in time: something came or went, a force or a state that the simulation does not have.",
+    Family.BLOCKS: "Runs differ by a constant: something was set up or reset between them.",
+}
+"""What each form may mean."""
+
+
+def sentence_of(found: Mismatch, finding: Finding) -> str:
+    """Where an effect is, what its form may mean, and what it resembles; one or more sentences."""
+    parts = [_where(found, finding)]
+    if finding.family is not None:
+        parts.append(MEANINGS[finding.family])
+    forms = found.resembles.get(finding.name, {})
+    if forms:
+        parts.append("Of it follow " + ", ".join(f"{name} {100 * share:.0f} %" for name, share in forms.items()) + ".")
+    if finding.confounded > CONFOUNDED:
+        parts.append(f"The fitted parameters conceal {100 * finding.confounded:.0f} % of it.")
+    if finding.equivalent:
+        parts.append(f"Nothing here tells it from {', '.join(finding.equivalent[1:])}.")
+    parts.append(finding.text)
+    return " ".join(part for part in parts if part)
+
+
+CONFOUNDED = 0.1
+"""Share of an effect that parameters conceal from which on this is said."""
+
+
+def _where(found: Mismatch, finding: Finding) -> str:
+    """Ranges, times and blocks."""
+    table = found.table
+    if finding.rows:
+        return "It is there " + "; ".join(_stretch(found, first, last) for first, last in finding.rows) + "."
+    spans = [f"{span.variable} {span.low:.4g} to {span.high:.4g} {span.unit}".strip() for span in finding.spans]
+    text = f"Largest at {', '.join(spans)}." if spans else ""
+    if len(finding.blocks) > 1:
+        worst = int(np.argmax(finding.blocks))
+        if finding.blocks[worst] > 2.0 * float(np.median(finding.blocks)):
+            text += f" Most in {table.names[worst]}."
+    return text
+
+
+def _stretch(found: Mismatch, first: int, last: int) -> str:
+    """A stretch of rows in the words of the clock."""
+    table = found.table
+    block = next(k for k, rows in enumerate(table.blocks) if rows.start <= first < rows.stop)
+    run = f" of {table.names[block]}" if len(table.blocks) > 1 else ""
+    onwards = last == len(table) - 1 or last == table.blocks[block].stop - 1
+    if table.clock is None:
+        first, last = first - table.blocks[block].start + 1, last - table.blocks[block].start + 1
+        return f"from row {first} on{run}" if onwards else f"from row {first} to {last}{run}"
+    at, until, unit = table.clock.values[first], table.clock.values[last], table.clock.unit
+    text = f"from {table.clock.name} {at:.4g} {unit}".rstrip()
+    return f"{text} on{run}" if onwards else f"{text} to {until:.4g} {unit}".rstrip() + run

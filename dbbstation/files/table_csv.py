@@ -1,0 +1,159 @@
+"""Tables of any columns: CSV with one line of names, `#` lines are comments; commas, semicolons or tabs between columns."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.source_text import decode, read_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+SEPARATORS = ",;\t"
+MOST_FAULTS = 20
+NO_NUMBER = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
+"""Cells that say that there is no number, in small letters."""
+
+
+@dataclass(frozen=True, eq=False)
+class TableFile:
+    """One file of columns.
+
+    Attributes:
+        file: as named in messages.
+        header: number of the line that names the columns.
+        names: of the columns, in order.
+        lines: number of the line of each row, shape (n,).
+        cells: texts by column, n each.
+        values: numbers by column, shape (n,): NaN where a cell says that there is none, and where it is no number.
+    """
+
+    file: str
+    header: int
+    names: tuple[str, ...]
+    lines: NDArray[np.int64]
+    cells: dict[str, tuple[str, ...]]
+    values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def faults_of(self, name: str) -> list[Problem]:
+        """Cells of a column that are neither a number nor say that there is none, with their lines."""
+        found = []
+        for line, cell, value in zip(self.lines.tolist(), self.cells[name], self.values[name], strict=True):
+            if not np.isfinite(value) and cell.lower() not in NO_NUMBER:
+                what = f"{name} is `{cell}`, not a finite number"
+                found.append(Problem(self.file, line, 0, what, "correct the cell, or leave it empty"))
+        return found
+
+    def is_text(self, name: str) -> bool:
+        """Whether a column has no number at all."""
+        return not np.isfinite(self.values[name]).any()
+
+
+def read_table(path: Path, needed: Iterable[str] = ()) -> TableFile:
+    """Read a table.
+
+    Args:
+        path: of the file.
+        needed: columns that must be there.
+
+    Raises:
+        InputError: it cannot be read, has no rows, lacks a column (and which it may be instead), or has lines of another width.
+    """
+    faults: list[Problem] = []
+    data = read_bytes(path, faults)
+    text = None if data is None else decode(data, str(path), faults)
+    if text is None:
+        raise InputError(faults)
+    return parse_table(text, str(path), needed)
+
+
+def parse_table(text: str, file: str, needed: Iterable[str] = ()) -> TableFile:
+    """Parse the text of a table.
+
+    Raises:
+        InputError: as `read_table`.
+    """
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise InputError([Problem(file, 0, 0, "the file has no columns and no rows", "begin with a line of names")])
+    header, head = lines[0]
+    separator = max(SEPARATORS, key=head.count)
+    names = [name.strip() for name in next(csv.reader([head], delimiter=separator))]
+    faults = _faults_of_names(names, needed, file, header)
+    if not faults and len(lines) == 1:
+        faults.append(Problem(file, header, 0, "there are no rows below this line"))
+    rows, numbers = [], []
+    for number, line in lines[1:]:
+        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+        if len(cells) != len(names):
+            what = f"{len(cells)} values in {len(names)} columns"
+            remedy = "compare the line with the header; the decimal sign is a dot"
+            faults.append(Problem(file, number, 0, what, remedy))
+            continue
+        rows.append(cells)
+        numbers.append(number)
+    if faults:
+        raise InputError(faults[:MOST_FAULTS])
+    columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(names)}
+    values = {name: _numbers(column) for name, column in columns.items()}
+    return TableFile(file, header, tuple(names), np.array(numbers, dtype=np.int64), columns, values)
+
+
+def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Problem:
+    """Fault of a column that is not there: which it may be, or which there are."""
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    remedy = f"did you mean `{near[0]}`?" if near else f"columns here: {', '.join(names)}"
+    return Problem(file, line, 0, f"there is no column `{name}`", remedy)
+
+
+def table_csv(names: Sequence[str], columns: Sequence[Sequence[object]]) -> str:
+    """CSV text of columns of one length; numbers with nine significant digits, texts as they are."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(names)
+    for row in zip(*columns, strict=True):
+        writer.writerow([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row])
+    return out.getvalue()
+
+
+def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: int) -> list[Problem]:
+    faults = [
+        Problem(file, line, 0, f"the column `{name}` stands here more than once", "rename one")
+        for name in sorted({name for name in names if name and names.count(name) > 1})
+    ]
+    if "" in names:
+        faults.append(Problem(file, line, 0, f"column {names.index('') + 1} has no name", "name it"))
+    faults += [missing_column(name, names, file, line) for name in dict.fromkeys(needed) if name not in names]
+    return faults
+
+
+def _numbers(cells: Sequence[str]) -> NDArray[np.float64]:
+    """Numbers of cells; NaN for those that are none."""
+    try:
+        return np.array(cells, dtype=np.float64)
+    except ValueError:
+        return np.array([_number(cell) for cell in cells])
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return float("nan")

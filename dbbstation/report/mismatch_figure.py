@@ -1,0 +1,104 @@
+"""Figure of a table's mismatch: what differs over each variable that leads it, before and after, and the held-out error."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
+from dbbstation.report.figure_format import FigureFormat, in_format
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.table.mismatch import Mismatch
+    from dbbstation.inference.variables import Variable
+
+MOST_POINTS = 2000
+"""Points of a cloud that are drawn: more make a large file and the same picture."""
+
+MOST_VARIABLES = 4
+BINS = 40
+FEWEST_IN_BIN = 3
+
+
+def mismatch_figure(found: Mismatch, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
+    """Draw measured less simulated over the variables that lead it, over the rows, and the held-out error of every part."""
+    names = [share.variable for share in found.shares[:MOST_VARIABLES]]
+    variables = [v for name in names for v in found.settled.channel.variables if v.name == name]
+    wide = max(len(variables), 2)
+    with in_style():
+        figure = Figure(figsize=(3.4 * wide, 6.4), layout="constrained")
+        grid = figure.add_gridspec(2, wide)
+        before, after = _residuals(found)
+        for k, variable in enumerate(variables):
+            _over(figure.add_subplot(grid[0, k]), variable, before, after, found.table.unit)
+        if not variables:
+            _histogram(figure.add_subplot(grid[0, :]), before, found.table.unit)
+        split = max(wide - 1, 1)
+        _over_rows(figure.add_subplot(grid[1, :split]), before, after, found)
+        _held_out(figure.add_subplot(grid[1, split:]), found)
+        return in_format(figure, wanted)
+
+
+def _residuals(found: Mismatch) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    channel = found.settled.channel
+    base = channel.base.samples @ np.array([f.before.value for f in found.fitted])
+    return channel.residual - base, channel.residual - found.explained
+
+
+def _over(axes: Axes, variable: Variable, before: NDArray[np.float64], after: NDArray[np.float64], unit: str) -> None:
+    step = max(len(before) // MOST_POINTS, 1)
+    axes.plot(variable.values[::step], before[::step], ".", color=MEASURED, markersize=1.2, alpha=0.5)
+    for values, colour, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
+        at, mean = _means(variable.values, values)
+        axes.plot(at, mean, color=colour, label=label, linewidth=1.2)
+    axes.set_xlabel(f"{variable.name}{f', {variable.unit}' if variable.unit else ''}")
+    axes.set_ylabel(f"measured less simulated{f', {unit}' if unit else ''}")
+    axes.legend(loc="upper right")
+
+
+def _means(at: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    edges = np.linspace(at.min(), at.max(), BINS + 1)
+    place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, BINS - 1)
+    counts = np.bincount(place, minlength=BINS)
+    means = np.bincount(place, values, minlength=BINS) / np.maximum(counts, 1)
+    return 0.5 * (edges[1:] + edges[:-1]), np.where(counts >= FEWEST_IN_BIN, means, np.nan)
+
+
+def _histogram(axes: Axes, before: NDArray[np.float64], unit: str) -> None:
+    axes.hist(before, BINS, color=MEASURED)
+    axes.set_xlabel(f"measured less simulated{f', {unit}' if unit else ''}")
+    axes.set_ylabel("rows")
+    axes.set_title("nothing was found that it follows")
+
+
+def _over_rows(axes: Axes, before: NDArray[np.float64], after: NDArray[np.float64], found: Mismatch) -> None:
+    step = max(len(before) // MOST_POINTS, 1)
+    rows = np.arange(len(before))[::step]
+    axes.plot(rows, before[::step], color=BEFORE, linewidth=0.5, label="before")
+    axes.plot(rows, after[::step], color=AFTER, linewidth=0.5, label="after")
+    for block in found.table.blocks[1:]:
+        axes.axvline(block.start, color=MEASURED, linewidth=0.5, linestyle=":")
+    axes.set_xlabel("row" + (" (dotted: runs)" if len(found.table.blocks) > 1 else ""))
+    axes.set_ylabel(f"measured less simulated{f', {found.table.unit}' if found.table.unit else ''}")
+    axes.legend(loc="upper right")
+
+
+def _held_out(axes: Axes, found: Mismatch) -> None:
+    if found.held_out is None:
+        axes.set_axis_off()
+        return
+    folds = found.held_out.folds
+    at = np.arange(len(folds))
+    pairs: Any = (("before", BEFORE, [f.before for f in folds]), ("after", AFTER, [f.after for f in folds]))
+    for k, (label, colour, values) in enumerate(pairs):
+        axes.bar(at + 0.4 * k, values, 0.4, color=colour, label=label)
+    axes.set_xticks(at + 0.2, [str(k + 1) for k in at])
+    axes.set_xlabel("part held out")
+    axes.set_ylabel(f"rms error{f', {found.table.unit}' if found.table.unit else ''}")
+    axes.set_title(f"held out: {found.held_out.before:.3g} -> {found.held_out.after:.3g} {found.table.unit}".rstrip())
+    axes.legend(loc="upper right")

@@ -1,0 +1,319 @@
+"""Tables of measured and simulated values, from their files to what is compared: one way in for command and studies."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.table.contract import TableSource
+from dbbstation.diagnosis.table.data import Table
+from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_meaning
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.table_csv import MOST_FAULTS, TableFile, read_table
+from dbbstation.files.table_sources import own_table_sources
+from dbbstation.inference.variables import Kind, Variable
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+FEWEST_ROWS = 30
+"""Rows that a comparison needs at the least: with fewer, a curve of seven functions beside noise says nothing."""
+
+DERIVATIVE = "d_"
+"""How columns begin that hold the derivative of the simulated value by a parameter."""
+
+ROWS = "rows"
+"""What to say for the time where rows stand in the order in which they were measured and no column says when."""
+
+SAME = 1e-10
+"""Share of a column's variance that a straight line in measured and simulated value leaves, from which on it is one of these."""
+
+MOST_RESETS = 30
+"""Rows that a run has on average, at the least, where a clock that starts again is taken for the beginning of a new run."""
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is asked of the files.
+
+    Attributes:
+        measured: name of the column.
+        simulated: name of the column.
+        variables: meaning by name of the columns that the difference may follow; None: all that qualify.
+        run: column that tells runs apart; None where there is none.
+        time: column that says when, `ROWS` for the order of the rows; None: it is guessed.
+    """
+
+    measured: str
+    simulated: str
+    variables: Mapping[str, Meaning | None] | None = None
+    run: str | None = None
+    time: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Tabulated:
+    """Files read.
+
+    Attributes:
+        table: as it is compared.
+        names: of the columns that all files have.
+        columns: texts by name, rows as they are in `table`.
+        notes: what was left out, and why.
+    """
+
+    table: Table
+    names: tuple[str, ...]
+    columns: Mapping[str, tuple[str, ...]]
+    notes: tuple[str, ...]
+
+
+def stated_variables(text: str) -> dict[str, Meaning | None]:
+    """Variables as the option gives them: `q1=deg,temperature`; None where the meaning is to be guessed.
+
+    Raises:
+        InputError: a unit or kind that is not known.
+    """
+    found: dict[str, Meaning | None] = {}
+    faults = []
+    for part in (part.strip() for part in text.split(",")):
+        name, has, unit = (piece.strip() for piece in part.partition("="))
+        meaning = stated_meaning(unit) if has else None
+        if not name or (has and meaning is None):
+            remedy = f"a unit such as mm, deg, s, degC, N, or one of {', '.join(Kind)}"
+            faults.append(
+                Problem("--variables", 0, 0, f"`{part}` is not understood", f"write NAME or NAME=UNIT, {remedy}")
+            )
+        found[name] = meaning
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def load_tables(paths: Sequence[Path], asked: Asked) -> Tabulated:
+    """Read tables and put them together.
+
+    Raises:
+        InputError: every fault of every file with its line; measured and simulated values in different units; too few rows.
+    """
+    needed = [asked.measured, asked.simulated, *(asked.variables or ())]
+    needed += [name for name in (asked.run, asked.time) if name is not None and name != ROWS]
+    faults: list[Problem] = []
+    files: list[TableFile] = []
+    for path in paths:
+        try:
+            files.append(read_table(path, needed))
+        except InputError as error:
+            faults += error.problems
+    units = {name: meaning_of(name).unit for name in (asked.measured, asked.simulated)}
+    if len({unit for unit in units.values() if unit}) > 1:
+        said = " and ".join(f"`{name}` in {unit}" for name, unit in units.items())
+        faults.append(Problem(str(paths[0]), 0, 0, f"{said} cannot be compared", "give both in one unit"))
+    if asked.measured == asked.simulated:
+        what = f"`{asked.measured}` is named for measured and for simulated values"
+        faults.append(Problem(str(paths[0]), 0, 0, what, "name the column of the simulation"))
+    certain = [asked.measured, asked.simulated, *(asked.variables or ())]
+    faults += [fault for file in files for name in dict.fromkeys(certain) for fault in file.faults_of(name)]
+    if faults:
+        raise InputError(faults[:MOST_FAULTS])
+    return _Reader(files, asked, units[asked.measured] or units[asked.simulated]).read()
+
+
+def load_sources(files: Sequence[Path], table: Table) -> tuple[list[TableSource], dict[str, str]]:
+    """Physics of one's own that a table has the columns for, and why the others cannot be asked, by name.
+
+    Raises:
+        InputError: faults of the files.
+    """
+    usable: list[TableSource] = []
+    lacking = {}
+    for source in own_table_sources(files, TableSource):  # type: ignore[type-abstract]
+        missing = [name for name in source.needs if name not in table.columns]
+        if missing:
+            lacking[source.name] = f"the table has no column {', '.join(missing)}"
+        else:
+            usable.append(source)
+    return usable, lacking
+
+
+class _Reader:
+    """Puts files together, column by column."""
+
+    def __init__(self, files: Sequence[TableFile], asked: Asked, unit: str) -> None:
+        self._files, self._asked, self._unit = files, asked, unit
+        self._notes: list[str] = []
+        self._names = [name for name in files[0].names if all(name in file.names for file in files)]
+        elsewhere = dict.fromkeys(name for file in files for name in file.names if name not in self._names)
+        if elsewhere:
+            self._notes.append(f"not in every file and left out: {', '.join(elsewhere)}")
+
+    def read(self) -> Tabulated:
+        """All of it."""
+        asked = self._asked
+        values = {name: np.concatenate([file.values[name] for file in self._files]) for name in self._names}
+        chosen, derivatives = self._chosen(values), self._derivatives(values)
+        clock = self._clock(chosen)
+        used = [asked.measured, asked.simulated, *chosen, *derivatives, *([clock] if clock else [])]
+        rows, blocks, names = self._order(values, used, clock)
+        if len(rows) < FEWEST_ROWS:
+            file = self._files[0]
+            what = f"{len(rows)} rows with all values are too few to compare, {FEWEST_ROWS} are needed"
+            raise InputError([Problem(file.file, file.header, 0, what, "record more")])
+        kept = {name: column[rows] for name, column in values.items()}
+        variables = [self._variable(name, kept[name]) for name in chosen]
+        varying = [v for v in variables if v is not None and not self._is_the_difference(v, kept)]
+        at = self._variable(clock, kept[clock], quiet=True) if clock else None
+        others = [v for v in varying if clock is None or v.name != clock]
+        cells = {name: [cell for file in self._files for cell in file.cells[name]] for name in self._names}
+        table = Table(
+            measured=kept[asked.measured],
+            simulated=kept[asked.simulated],
+            unit=self._unit,
+            simulated_name=asked.simulated,
+            variables=tuple([at, *others] if at is not None else others),
+            derivatives={name.removeprefix(DERIVATIVE): kept[name] for name in derivatives if kept[name].any()},
+            columns={name: column for name, column in kept.items() if np.isfinite(column).all()},
+            blocks=blocks,
+            names=names,
+            clock=at,
+            in_row_order=asked.time == ROWS,
+        )
+        texts = {name: tuple(column[k] for k in rows.tolist()) for name, column in cells.items()}
+        return Tabulated(table, tuple(self._names), texts, tuple(self._notes))
+
+    def _derivatives(self, values: Mapping[str, NDArray[np.float64]]) -> list[str]:
+        found = [name for name in self._names if name.startswith(DERIVATIVE) and len(name) > len(DERIVATIVE)]
+        return [name for name in found if self._is_numeric(name, values[name])]
+
+    def _chosen(self, values: Mapping[str, NDArray[np.float64]]) -> list[str]:
+        """Columns that the difference may follow: those that were named, or all that are no other thing."""
+        asked = self._asked
+        if asked.variables is not None:
+            return list(asked.variables)
+        taken = {asked.measured, asked.simulated, asked.run}
+        others = [name for name in self._names if name not in taken and not name.startswith(DERIVATIVE)]
+        siblings = [name for name in others if self._is_another_pair(name)]
+        if siblings:
+            self._notes.append(f"measured or simulated themselves and left out: {', '.join(siblings)}")
+        return [name for name in others if name not in siblings and self._is_numeric(name, values[name])]
+
+    def _is_another_pair(self, name: str) -> bool:
+        """Whether a column belongs to another pair of measured and simulated values, by the word that tells these apart."""
+        measured, simulated = (set(_words(one)) for one in (self._asked.measured, self._asked.simulated))
+        marks = (measured - simulated, simulated - measured)
+        words = _words(name)
+        for own, other in (marks, marks[::-1]):
+            if own & set(words) and len(other) == 1:
+                partner = [next(iter(other)) if word in own else word for word in words]
+                if any(_words(one) == partner for one in self._names if one != name):
+                    return True
+        return False
+
+    def _is_numeric(self, name: str, column: NDArray[np.float64]) -> bool:
+        """Whether a column that nobody named can be used; says why not."""
+        bad = sum(len(file.faults_of(name)) for file in self._files)
+        if all(file.is_text(name) for file in self._files):
+            self._notes.append(f"`{name}` has no numbers and is left out")
+            return False
+        missing = int((~np.isfinite(column)).sum())
+        if bad or missing > len(column) // 10:
+            first = next((fault for file in self._files for fault in file.faults_of(name)), None)
+            where = f", the first in line {first.line} of {first.file}" if first else ""
+            self._notes.append(f"`{name}` lacks a number in {missing} of {len(column)} rows{where}, and is left out")
+            return False
+        return True
+
+    def _clock(self, chosen: Sequence[str]) -> str | None:
+        """Column that says when: the one that was named, or the first that is one."""
+        asked = self._asked
+        if asked.time is not None:
+            return None if asked.time == ROWS else asked.time
+        return next((name for name in chosen if self._meaning(name).kind is Kind.TIME), None)
+
+    def _order(
+        self, values: Mapping[str, NDArray[np.float64]], used: Sequence[str], clock: str | None
+    ) -> tuple[NDArray[np.int64], tuple[slice, ...], tuple[str, ...]]:
+        """Rows that have all values, block by block in time order; the blocks and their names."""
+        good = np.all([np.isfinite(values[name]) for name in dict.fromkeys(used)], axis=0)
+        if not good.all():
+            self._notes.append(f"{int((~good).sum())} of {len(good)} rows lack a number and are left out")
+        order: list[NDArray[np.int64]] = []
+        names: list[str] = []
+        first = 0
+        sorted_blocks = 0
+        for file in self._files:
+            for name, own in self._runs(file):
+                rows = first + own
+                rows = rows[good[rows]]
+                if not len(rows):
+                    continue
+                parts = [rows] if clock is None else _by_clock(rows, values[clock])
+                for k, part in enumerate(parts):
+                    if clock is not None and np.any(np.diff(values[clock][part]) < 0.0):
+                        sorted_blocks += 1
+                        part = part[np.argsort(values[clock][part], kind="stable")]  # noqa: PLW2901 - put in order
+                    order.append(part)
+                    names.append(f"{name} part {k + 1}" if len(parts) > 1 else name)
+            first += len(file)
+        if sorted_blocks:
+            self._notes.append(f"rows were put in the order of `{clock}`")
+        ends = np.cumsum([0, *(len(part) for part in order)])
+        blocks = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        return np.concatenate([np.zeros(0, dtype=np.int64), *order]), blocks, tuple(names)
+
+    def _runs(self, file: TableFile) -> list[tuple[str, NDArray[np.int64]]]:
+        """Rows of each run of a file, with its name."""
+        stem = re.sub(r"^.*[/\\]", "", file.file)
+        if self._asked.run is None:
+            return [(stem, np.arange(len(file)))]
+        cells = file.cells[self._asked.run]
+        several = len(self._files) > 1
+        return [
+            (f"{stem} {label}" if several else label, np.flatnonzero([cell == label for cell in cells]))
+            for label in dict.fromkeys(cells)
+        ]
+
+    def _meaning(self, name: str) -> Meaning:
+        stated = (self._asked.variables or {}).get(name)
+        found = stated or meaning_of(name)
+        return Meaning(found.unit, Kind.TIME) if name == self._asked.time else found
+
+    def _variable(self, name: str, values: NDArray[np.float64], *, quiet: bool = False) -> Variable | None:
+        """Return a variable; None where it is the same in all rows."""
+        meaning = self._meaning(name)
+        if np.ptp(values) == 0.0:
+            if not quiet:
+                self._notes.append(f"`{name}` is the same in all rows and is left out")
+            return None
+        meaning = meaning if meaning.unit or meaning.kind is not Kind.ANY else PLAIN
+        return Variable(name, meaning.unit, meaning.kind, values, meaning.period)
+
+    def _is_the_difference(self, variable: Variable, kept: Mapping[str, NDArray[np.float64]]) -> bool:
+        """Whether a column is made of measured and simulated value, such as their difference."""
+        asked = self._asked
+        both = np.column_stack([np.ones(len(variable.values)), kept[asked.measured], kept[asked.simulated]])
+        values, *_ = np.linalg.lstsq(both, variable.values, rcond=None)
+        left = variable.values - both @ values
+        if float(left @ left) > SAME * float(np.sum((variable.values - variable.values.mean()) ** 2)):
+            return False
+        self._notes.append(f"`{variable.name}` is measured and simulated value over again, and is left out")
+        return True
+
+
+def _by_clock(rows: NDArray[np.int64], clock: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+    """Parts of rows, where a clock begins anew only a few times; else all rows as one part."""
+    back = np.flatnonzero(np.diff(clock[rows]) < 0.0) + 1
+    if len(back) and len(rows) >= MOST_RESETS * (len(back) + 1):
+        return np.split(rows, back)
+    return [rows]
+
+
+def _words(name: str) -> list[str]:
+    return [word for word in re.split(r"[^A-Za-z0-9µ]+", name.lower()) if word]

@@ -137,7 +137,9 @@ def _print(summary: Mapping[str, Any]) -> None:
     )
     click.echo()
     _print_whether(summary)
-    there = [f for f in summary["findings"] if f["verdict"] in {"identified", "ambiguous"}]
+    there = [f for f in summary["findings"] if f["verdict"] == "identified"]
+    likely = [f for f in summary["findings"] if f["verdict"] == "ambiguous" and f["probability"] >= LIKELY]
+    there += likely
     if there:
         click.echo()
         _print_findings(there, unit)
@@ -180,8 +182,17 @@ def _print_whether(summary: Mapping[str, Any]) -> None:
     alike = f", {noise['rows_as_one']:.3g} rows count as one" if noise["rows_as_one"] > 1.0 else ""
     click.echo(f"noise of one row: {noise['sigma']:.3g} {unit}{alike}{told}")
     if summary["led_by"]:
-        led = ", ".join(f"{s['variable']} {100 * s['share']:.0f} %" for s in summary["led_by"][:4])
-        click.echo(f"led by (what of the explanation is lost without it): {led}")
+        led = ", ".join(
+            f"{s['variable']} {100 * s['share']:.0f} % ({100 * s['lost']:.0f} %)"
+            for s in summary["led_by"][:MOST_LEADING]
+        )
+        click.echo(
+            f"led by (of all that is explained, what follows it alone; in brackets what is lost without it): {led}"
+        )
+
+
+MOST_LEADING = 4
+"""Variables that are said to lead a mismatch, at the most."""
 
 
 def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
@@ -200,12 +211,20 @@ def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
     ]
     print_table(["effect", "verdict", "probability", "log Bayes factor", f"{unit} rms".strip(), "concealed"], rows)
     for f in there:
+        if f["verdict"] == "ambiguous" and len(there) > MOST_TOLD:
+            continue
         click.echo(f"\n{f['name']}")
         values = ", ".join(f"{name} {_number(value)}" for name, value in f["values"].items())
         if values and len(f["values"]) <= MOST_VALUES:
             click.echo(f"  {values}")
         click.echo(f"  {f['text']}")
 
+
+LIKELY = 0.5
+"""Probability from which on an effect that is not certain is printed; all of them are in the JSON."""
+
+MOST_TOLD = 12
+"""Effects from which on only those that are certain are told in full."""
 
 MOST_VALUES = 6
 """Values of an effect that are printed; those of a curve say little by themselves, and are in the JSON."""

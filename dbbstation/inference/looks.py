@@ -150,7 +150,7 @@ def _pattern(variable: Variable, family: Family, form: Form, tried: float, label
         form,
         ("",) * width,
         (1.0,) * width,
-        label or form.text(variable.unit).strip(),
+        label or " ".join(form.text(variable.unit).split()).replace(" ,", ","),
         tried,
     )
 

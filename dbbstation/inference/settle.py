@@ -107,7 +107,7 @@ class Settled:
 
     def second_start_agrees(self) -> bool:
         """Whether a search that begins with nothing comes to the same most probable set of causes."""
-        return search(self.comparison, self.causes).best.names == self.best.names
+        return search(self.comparison, self.causes, (), MOST_EXPANDED).best.names == self.best.names
 
 
 def settle(

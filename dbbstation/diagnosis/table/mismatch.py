@@ -58,13 +58,15 @@ class Share:
     Attributes:
         variable: name.
         rms: of all effects over it, shared ones as well, in the unit of the table.
-        share: of the reduction of the weighted sum of squares that is lost without these.
+        share: of the reduction of the weighted sum of squares, what these bring alone.
+        lost: what of it is lost without them, since others make up for part of them.
         terms: how many.
     """
 
     variable: str
     rms: float
     share: float
+    lost: float
     terms: int
 
 
@@ -168,7 +170,7 @@ def find_mismatch(
 
 
 def _shares(settled: Settled) -> tuple[Share, ...]:
-    """Variables by what of the explanation is lost without all that follows them."""
+    """Variables by what of the explanation all that follows them brings alone."""
     comparison, best, patterns = settled.comparison, settled.best, settled.bank.patterns
     whole = comparison.explained(best.members) if best.members else 0.0
     found = []
@@ -179,9 +181,11 @@ def _shares(settled: Settled) -> tuple[Share, ...]:
             if m.cause.name in patterns and any(v.name == variable.name for v in patterns[m.cause.name].variables)
         ]
         if own:
+            alone = [m for m in best.members if m.cause.name in own]
             rest = best.without(*own)
-            lost = 1.0 - (comparison.explained(rest) if rest else 0.0) / whole
-            found.append(Share(variable.name, _rms_about_mean(settled.effect(own)), max(lost, 0.0), len(own)))
+            share = comparison.explained(alone) / whole
+            lost = max(1.0 - (comparison.explained(rest) if rest else 0.0) / whole, 0.0)
+            found.append(Share(variable.name, _rms_about_mean(settled.effect(own)), share, lost, len(own)))
     return tuple(sorted(found, key=lambda share: -share.share))
 
 

@@ -50,7 +50,10 @@ def mismatch_summary(found: Mismatch) -> dict[str, Any]:
                 {"name": f.name, "rows": f.rows, "before": f.before, "after": f.after} for f in found.held_out.folds
             ],
         },
-        "led_by": [{"variable": s.variable, "rms": s.rms, "share": s.share, "terms": s.terms} for s in found.shares],
+        "led_by": [
+            {"variable": s.variable, "rms": s.rms, "share": s.share, "lost": s.lost, "terms": s.terms}
+            for s in found.shares
+        ],
         "findings": [_finding(found, finding) for finding in found.findings],
         "parameters": [
             {

@@ -39,7 +39,12 @@ def sentence_of(found: Mismatch, finding: Finding) -> str:
         parts.append(MEANINGS[finding.family])
     forms = found.resembles.get(finding.name, {})
     if forms:
-        parts.append("Of it follow " + ", ".join(f"{name} {100 * share:.0f} %" for name, share in forms.items()) + ".")
+        name, share = max(forms.items(), key=lambda form: form[1])
+        simple = next((one for one in forms.items() if one[1] > share - AS_GOOD), (name, share))
+        if share > HALF:
+            parts.append(f"{100 * simple[1]:.0f} % of it is {simple[0]}.")
+        else:
+            parts.append(f"No named form follows half of it; nearest, with {100 * share:.0f} %, is {name}.")
     if finding.confounded > CONFOUNDED:
         parts.append(f"The fitted parameters conceal {100 * finding.confounded:.0f} % of it.")
     if finding.equivalent:
@@ -47,6 +52,12 @@ def sentence_of(found: Mismatch, finding: Finding) -> str:
     parts.append(finding.text)
     return " ".join(part for part in parts if part)
 
+
+HALF = 0.5
+"""Share of a curve that a named form must follow to be said to be most of it."""
+
+AS_GOOD = 0.05
+"""Share by which a form with more amplitudes must follow a curve better than one with fewer."""
 
 CONFOUNDED = 0.1
 """Share of an effect that parameters conceal from which on this is said."""

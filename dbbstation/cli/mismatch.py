@@ -138,7 +138,9 @@ def _print(summary: Mapping[str, Any]) -> None:
     click.echo()
     _print_whether(summary)
     there = [f for f in summary["findings"] if f["verdict"] == "identified"]
+    told = {name for f in there for name in f["equivalent"]}
     likely = [f for f in summary["findings"] if f["verdict"] == "ambiguous" and f["probability"] >= LIKELY]
+    likely = [f for f in likely if f["name"] not in told]
     there += likely
     if there:
         click.echo()
@@ -249,8 +251,9 @@ def _print_left(summary: Mapping[str, Any]) -> None:
         where = f", {worst['where']}" if worst["where"] else ""
         click.echo(f"Something is left beyond noise: {worst['name']}{where}, {worst['rms']:.2g} {summary['unit']}.")
     if not summary["second_start_agrees"]:
+        odds = summary["second_start_log_odds"]
         click.echo(
-            "A search that begins with nothing ends at another set of effects: more than one explains these rows."
+            f"A search that begins with nothing ends at another set of effects, of log odds {odds:+.0f} to this one."
         )
 
 

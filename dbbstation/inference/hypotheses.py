@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 PAIRS = 3
 """Best pairs of named causes that are looked at together."""
 
+MOST_PAIRED = 60
+"""Named causes of which all pairs are looked at, at the most: those that are worth most alone."""
+
 LIKELY = 8.0
 """Log odds against the best hypothesis within which the neighbours of another one are looked at: what is less likely has a
 probability of 3e-4."""
@@ -204,6 +207,9 @@ class _Search:
             for member in (*scan.best, *scan.narrow)
             if member is not None and member.cause.named
         ]
+        if len(named) > MOST_PAIRED:
+            worth = dict(zip((c.name for c in scan.causes), scan.log_factor.tolist(), strict=True))
+            named = sorted(named, key=lambda member: -worth[member.cause.name])[:MOST_PAIRED]
         evidences = self._comparison.log_evidence_of_pairs(members, named)
         both = [
             (evidence + named[a].cause.log_prior_odds + named[b].cause.log_prior_odds, a, b)

@@ -60,7 +60,17 @@ class Family(StrEnum):
 
 
 NAMED = frozenset(
-    {Family.LINEAR, Family.ONCE, Family.TWICE, Family.HYSTERESIS, Family.SPEED, Family.LAG, Family.DRIFT, Family.BLOCKS}
+    {
+        Family.LINEAR,
+        Family.ONCE,
+        Family.TWICE,
+        Family.HYSTERESIS,
+        Family.SPEED,
+        Family.LAG,
+        Family.DRIFT,
+        Family.PRODUCT,
+        Family.BLOCKS,
+    }
 )
 """Those that a search tries in pairs: each may show only beside the other."""
 
@@ -245,12 +255,20 @@ def _speed(
 
 
 def _product(one: Variable, other: Variable) -> Pattern:
-    """Product of two variables; of angles, products of their cosines and sines: waves of their sum and difference."""
+    """Product of two variables; of angles, products of their cosines and sines: waves of their sum and difference.
+
+    Where a variable has its zero nobody knows: beside the product about the middle of both there is a form with both of them.
+    """
     a, b = (
         turn(v, 1).columns(v.values) if covers_turns(v) else Power(v.low, v.high).columns(v.values)
         for v in (one, other)
     )
-    return Pattern(Family.PRODUCT, (one, other), (a[:, :, None] * b[:, None, :]).reshape(len(a), -1))
+    samples = (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)
+    both = samples.shape[1]
+    weight = float(np.log(0.5))
+    every = np.hstack([samples, a, b])
+    choices = ((tuple(range(both)), weight, ""), (tuple(range(every.shape[1])), weight, "with both of them"))
+    return Pattern(Family.PRODUCT, (one, other), every, choices=choices)
 
 
 def _of_blocks(blocks: Sequence[slice], rows: int) -> Pattern:

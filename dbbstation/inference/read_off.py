@@ -189,13 +189,13 @@ class _Judge:
             if sigmas >= OUT:
                 return Verdict.IDENTIFIED, (), ""
             return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
+        for name, equal in self._classes.items():
+            if cause.name in equal and name != cause.name:
+                return Verdict.AMBIGUOUS, (name,), f"Nothing measured here tells it from {name}."
         if probability >= EVEN or member is not None:
             others = self._ambiguity(cause.name)
             text = f"These rows cannot tell it from {', '.join(others)}." if others else "These rows do not decide it."
             return Verdict.AMBIGUOUS, others, text
-        for name, equal in self._classes.items():
-            if cause.name in equal:
-                return Verdict.AMBIGUOUS, (name,), f"Nothing measured here tells it from {name}."
         for name, others in self._unsure.items():
             if cause.name in others:
                 return Verdict.AMBIGUOUS, (name,), f"These rows cannot tell it from {name}."

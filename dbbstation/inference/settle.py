@@ -105,9 +105,9 @@ class Settled:
         effect = self.effect()
         return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)
 
-    def second_start_agrees(self) -> bool:
-        """Whether a search that begins with nothing comes to the same most probable set of causes."""
-        return search(self.comparison, self.causes, (), MOST_EXPANDED).best.names == self.best.names
+    def second_start(self) -> Hypothesis:
+        """The most probable hypothesis that a search comes to that begins with nothing."""
+        return search(self.comparison, self.causes, (), MOST_EXPANDED).best
 
 
 def settle(
@@ -178,14 +178,18 @@ def _settled(bank: Bank, best: tuple[Member, ...], options: _Options, progress: 
     looked: set[frozenset[str]] = set()
     for number in range(MOST_ROUNDS):
         bank.measure_noise()
+        lasting: tuple[Member, ...] = ()
+        if look and not number:
+            # Stretches of time can stand for whatever has a history. So effects that follow variables have a start of their own.
+            lasting = _looked(bank, _grown_in(bank), refused, progress, in_time=False)
         if look:
             best = _looked(bank, best, refused, progress)
         progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
         causes = bank.but_for(refused)
-        start = [grown(comparison, causes, best), *seeds.values()]
-        posterior = search(comparison, causes, start, options.most_expanded)
+        start = [grown(comparison, causes, members) for members in (lasting, best)]
+        posterior = search(comparison, causes, [*start, *seeds.values()], options.most_expanded)
         seeds |= {h.names: h.members for h in posterior.hypotheses[:SEEDS]}
         settled = Settled(channel, bank, bank.noise, comparison, posterior, dict(refused))
         best = posterior.best.members
@@ -210,10 +214,20 @@ def _looked(
     progress: Callable[[str], None],
     *,
     white: bool = False,
+    in_time: bool = True,
 ) -> tuple[Member, ...]:
-    """Look at what is left, take in what is worth it, and look again beside that, until nothing more stands out."""
+    """Look at what is left, take in what is worth it, and look again beside that, until nothing more stands out.
+
+    Args:
+        bank: of columns; they become more.
+        members: to begin with.
+        refused: laws that cannot be what they would have to be.
+        progress: told what is being done.
+        white: take noise for white.
+        in_time: look for steps and pulses in time, too.
+    """
     for number in range(MOST_LOOKS):
-        new = bank.add(_seen(bank, members))
+        new = bank.add(_seen(bank, members, in_time=in_time))
         noise = bank.measure_noise(white=white)
         progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
         comparison = bank.beside().comparison(bank.target)
@@ -265,7 +279,12 @@ def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[
     return tuple(members)
 
 
-def _seen(bank: Bank, members: Sequence[Member]) -> list[Pattern]:
+def _grown_in(bank: Bank) -> tuple[Member, ...]:
+    """Members that are worth it of what is in a bank."""
+    return grown(bank.beside().comparison(bank.target), bank.causes)
+
+
+def _seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Pattern]:
     """Patterns that stand out of what base and members leave."""
     channel = bank.channel
     known, held = channel.known, channel.held
@@ -280,7 +299,7 @@ def _seen(bank: Bank, members: Sequence[Member]) -> list[Pattern]:
     left = Left.of(bank.target, np.hstack(columns), np.concatenate(sd), bank.noise, bank.whitening)
     size = channel.size / left.noise
     found = looked_for(left, channel.variables, channel.kept, size)
-    if channel.time is not None:
+    if in_time and channel.time is not None:
         stretch = stretches(left, channel.blocks, channel.kept, size)
         found += [stretch] if stretch is not None else []
     return bank.worthy(left, found)

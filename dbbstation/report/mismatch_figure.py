@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.table.mismatch import Mismatch
     from dbbstation.inference.variables import Variable
 
-MOST_POINTS = 2000
+MOST_POINTS = 500
 """Points of a cloud that are drawn: more make a large file and the same picture."""
 
 MOST_VARIABLES = 4

@@ -71,7 +71,7 @@ class Table:
         if time is None and self.in_row_order:
             time = np.arange(len(self), dtype=np.float64)
         follows = self.variables
-        if np.ptp(self.simulated) > 0.0 and not any(np.array_equal(v.values, self.simulated) for v in follows):
+        if np.ptp(self.simulated) > 0.0 and not any(_is_same(v.values, self.simulated) for v in follows):
             follows = (*follows, simulated)
         return Channel(
             residual=self.measured - self.simulated,
@@ -111,3 +111,12 @@ class Table:
             form_uncertainty=source.form_uncertainty,
             follows=follows,
         )
+
+
+def _is_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether two columns are one but for scale, origin and a thousandth."""
+    return abs(float(np.corrcoef(one, other)[0, 1])) > SAME
+
+
+SAME = 1.0 - 1e-6
+"""Correlation from which on the simulated value is a variable over again, which then stands for both."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.left_over import left_over
-from dbbstation.inference.patterns import covers_turns, turn
+from dbbstation.inference.patterns import Family, covers_turns, turn
 from dbbstation.inference.read_off import OUT, read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.square_root import compress, solve, with_random
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.read_off import Finding
     from dbbstation.inference.settle import Settled
+    from dbbstation.texts import Texts
 
 FOLD_EXPANDED = 2
 """Hypotheses whose neighbours are looked at in a search of rows that others are held back from: a quarter of the usual number. The
@@ -84,6 +85,8 @@ class Mismatch:
         left: tests of what is left.
         held_out: error of rows that took no part; None where it was not asked for.
         lacking: physics of the user's own that could not be asked, and why.
+        texts: of that which was asked, by name.
+        second_start: log odds of what a search that begins with nothing ends at, over what was found; zero where both are the same.
     """
 
     table: Table
@@ -95,6 +98,8 @@ class Mismatch:
     left: LeftOver
     held_out: HeldOutError | None
     lacking: dict[str, str]
+    texts: dict[str, Texts]
+    second_start: float = 0.0
 
     @property
     def there(self) -> tuple[Finding, ...]:
@@ -166,7 +171,17 @@ def find_mismatch(
         left=left_over(settled),
         held_out=held_out,
         lacking=lacking or {},
+        texts={source.name: source.texts for source in sources},
+        second_start=_second_start(settled, findings),
     )
+
+
+def _second_start(settled: Settled, findings: Sequence[Finding]) -> float:
+    """Log odds of another end of the search, zero where it is the same but for names that nothing here tells apart."""
+    classes = {name: finding.name for finding in findings for name in finding.equivalent}
+    other = settled.second_start()
+    same = {classes.get(name, name) for name in other.names} == {classes.get(n, n) for n in settled.best.names}
+    return 0.0 if same else other.log_posterior - settled.best.log_posterior
 
 
 def _shares(settled: Settled) -> tuple[Share, ...]:
@@ -194,15 +209,11 @@ def _resembles(settled: Settled) -> dict[str, dict[str, float]]:
     found = {}
     for member in settled.best.members:
         pattern = settled.bank.patterns.get(member.cause.name)
-        if pattern is None or len(pattern.variables) != 1 or pattern.samples.shape[1] < FLEXIBLE:
+        if pattern is None or pattern.family is not Family.CURVE:
             continue
         effect = settled.effect([member.cause.name])
         found[member.cause.name] = {name: _followed(effect, columns) for name, columns in _named_forms(pattern).items()}
     return found
-
-
-FLEXIBLE = 5
-"""Amplitudes from which on an effect over one variable is a curve that may follow several named forms."""
 
 
 def _named_forms(pattern: Pattern) -> dict[str, NDArray[np.float64]]:

@@ -73,7 +73,8 @@ def mismatch_summary(found: Mismatch) -> dict[str, Any]:
                 for look in found.left.looks
             ],
         },
-        "second_start_agrees": settled.second_start_agrees(),
+        "second_start_agrees": found.second_start == 0.0,
+        "second_start_log_odds": found.second_start,
         "next": [{"text": step.text, "variables": list(step.variables)} for step in next_measurements(found)],
         "not_asked": found.lacking,
     }

@@ -37,6 +37,9 @@ def sentence_of(found: Mismatch, finding: Finding) -> str:
     parts = [_where(found, finding)]
     if finding.family is not None:
         parts.append(MEANINGS[finding.family])
+    if finding.name in found.texts:
+        texts = found.texts[finding.name]
+        parts += [texts.what, texts.confirm]
     forms = found.resembles.get(finding.name, {})
     if forms:
         name, share = max(forms.items(), key=lambda form: form[1])

@@ -26,6 +26,7 @@ class Truth:
         pulse_um: height of a pulse of four seconds.
         lag_ms: delay of the reading.
         expansion_um_k: by kelvin of the oil.
+        screw_um_m_k: expansion of the screw, held where the place is -100 mm, by metre and kelvin of the oil beyond 22 degC.
         drift_um_min: by minute.
         stiffness_um: error of the simulation's parameter `stiffness`, which the derivative column offers.
         noise_um: standard deviation of one row.
@@ -39,6 +40,7 @@ class Truth:
     pulse_um: float = 0.0
     lag_ms: float = 0.0
     expansion_um_k: float = 0.0
+    screw_um_m_k: float = 0.0
     drift_um_min: float = 0.0
     stiffness_um: float = 0.0
     noise_um: float = 2.0
@@ -52,9 +54,10 @@ class Recording:
     columns: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def csv(self) -> str:
+        """Text of the file."""
         names = ",".join(self.columns)
         rows = zip(*self.columns.values(), strict=True)
-        return "\n".join([names, *(",".join(f"{value:.9g}" for value in row) for row in rows)]) + "\n"
+        return "\n".join([names, *(",".join(f"{value:.7g}" for value in row) for row in rows)]) + "\n"
 
     def write(self, path: Path) -> Path:
         path.write_text(self.csv(), encoding="utf-8")
@@ -86,6 +89,7 @@ def record(truth: Truth, seed: int = 1, *, seconds: float = 75.0, derivative: bo
         + truth.pulse_um * ((t >= PULSE_S[0]) & (t < PULSE_S[1]))
         - truth.lag_ms * velocity
         + truth.expansion_um_k * (oil - 22.0)
+        + truth.screw_um_m_k * 1e-3 * (place + 100.0) * (oil - 22.0)
         + truth.drift_um_min * t / 60.0
         + truth.stiffness_um * load / 400.0
     )

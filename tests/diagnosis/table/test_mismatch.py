@@ -23,7 +23,11 @@ FOUND = {
     "twice": (Truth(twice_um=3.0), {"twice per turn of screw_deg"}, None),
     "lag": (Truth(lag_ms=0.3), {"lag of simulated_mm", "speed of place_mm"}, ("delay", -0.3e-3)),
     "temperature": (Truth(expansion_um_k=1.5), {"linear in oil_temp_c"}, ("slope", 1.5e-3)),
-    "product": (Truth(load_by_place_um=6.0), {"product of place_mm and load_n", "product of load_n and simulated_mm"}, None),
+    "product": (
+        Truth(load_by_place_um=6.0),
+        {"product of place_mm and load_n", "product of load_n and simulated_mm"},
+        None,
+    ),
     "drift": (Truth(drift_um_min=8.0), {"drift with t_s"}, ("slope", 8e-3 / 60.0)),
 }
 

@@ -11,7 +11,7 @@ from dbbstation.files.table_csv import parse_table, table_csv
 
 def test_comments_separators_and_quotes():
     for separator in (",", ";", "\t"):
-        text = f"# a\n\nx_mm{separator}run\n1.5{separator}\"a b\"\n# c\n2{separator}b\n"
+        text = f'# a\n\nx_mm{separator}run\n1.5{separator}"a b"\n# c\n2{separator}b\n'
         table = parse_table(text, "x.csv")
         assert table.names == ("x_mm", "run")
         assert table.values["x_mm"].tolist() == [1.5, 2.0]

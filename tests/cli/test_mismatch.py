@@ -1,0 +1,155 @@
+"""`dbbstation mismatch` as a person or a program calls it."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+
+from dbbstation.cli import DONE, FAILED
+from dbbstation.files.shipped import shipped_folder
+from tests.diagnosis.table.plant import Truth, record
+
+COLUMNS = ("--measured", "measured_mm", "--simulated", "simulated_mm")
+QUICK = (*COLUMNS, "--no-held-out")
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory):
+    """An axis that grows with the temperature of its oil."""
+    return record(Truth(expansion_um_k=1.5)).write(tmp_path_factory.mktemp("table") / "warm.csv")
+
+
+def rows_of(text):
+    return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
+
+
+def test_a_person_reads_whether_where_and_what_form(run, warm):
+    outcome = run("mismatch", warm, *QUICK)
+    assert outcome.code == DONE
+    assert "oil_temp_c  temperature  degC" in outcome.out
+    assert "screw_deg   angle        deg" in outcome.out
+    assert "There is a mismatch" in outcome.out
+    assert "linear in oil_temp_c  identified" in outcome.out
+    assert "slope 0.001" in outcome.out
+    assert "Nothing is left beyond noise." in outcome.out
+
+
+def test_a_program_reads_the_same_and_the_files_hold_it(run, warm, tmp_path):
+    out, figure = tmp_path / "out.csv", tmp_path / "figure.svg"
+    outcome = run("mismatch", warm, *QUICK, "--json", "--out", out, "--figure", figure)
+    assert outcome.code == DONE
+    data = outcome.data
+    assert data["mismatch"] is True
+    assert data["held_out_rms"] is None
+    (finding,) = [f for f in data["findings"] if f["verdict"] == "identified"]
+    assert (finding["form"], finding["variables"]) == ("linear", ["oil_temp_c"])
+    slope = finding["values"]["slope"]
+    assert slope["unit"] == "mm/degC"
+    assert abs(slope["value"] - 1.5e-3) < 4.0 * slope["uncertainty"]
+    written, given = rows_of(out.read_text()), rows_of(warm.read_text())
+    assert [row["place_mm"] for row in written] == [row["place_mm"] for row in given]
+    left = np.array([float(row["measured_mm"]) - float(row["corrected_mm"]) for row in written])
+    assert np.allclose(left, [float(row["left_mm"]) for row in written], atol=1e-6)
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(data["residual_rms"]["after"], rel=1e-3)
+    assert figure.read_bytes().count(b"<svg") == 1
+    again = run("mismatch", warm, *QUICK, "--out", out)
+    assert again.code == FAILED
+    assert "--force" in again.err
+    assert run("mismatch", warm, *QUICK, "--out", out, "--force").code == DONE
+
+
+def test_units_may_be_stated_and_variables_chosen(run, warm, tmp_path):
+    path = tmp_path / "bare.csv"
+    path.write_text(warm.read_text().replace("oil_temp_c", "oil").replace("screw_deg", "screw"))
+    bare = run("mismatch", path, *QUICK, "--json").data
+    kinds = {v["name"]: (v["kind"], v["unit"]) for v in bare["variables"]}
+    assert kinds["screw"] == ("any", "")
+    assert kinds["oil"] == ("any", "")
+    stated = run("mismatch", path, *QUICK, "--variables", "screw=deg,oil=temperature", "--json").data
+    kinds = {v["name"]: (v["kind"], v["unit"]) for v in stated["variables"]}
+    assert kinds == {"screw": ("angle", "deg"), "oil": ("temperature", "")}
+    assert stated["variables"][0]["period"] == 360.0
+
+
+def test_physics_of_ones_own(run):
+    folder = shipped_folder("fixtures")
+    source = ("--source-file", folder / "sources" / "screw_expansion.py")
+    data = run("mismatch", folder / "tables" / "axis.csv", *QUICK, *source, "--json").data
+    (own,) = [f for f in data["findings"] if f["name"] == "screw-expansion"]
+    assert own["verdict"] == "identified"
+    alpha = own["values"]["alpha"]
+    assert alpha["unit"] == "µm/(m K)"
+    assert abs(alpha["value"] - 12.0) < 4.0 * alpha["uncertainty"]
+    assert "The screw grows" in own["text"]
+
+
+def test_physics_that_lacks_a_column_is_said(run, warm, tmp_path):
+    path = tmp_path / "bare.csv"
+    path.write_text(warm.read_text().replace("oil_temp_c", "oil"))
+    source = shipped_folder("fixtures") / "sources" / "screw_expansion.py"
+    outcome = run("mismatch", path, *QUICK, "--source-file", source, "--json")
+    assert "screw-expansion cannot be asked: the table has no column oil_temp_c" in outcome.err
+    assert "screw-expansion" in outcome.data["not_asked"]
+
+
+def test_runs_are_told_apart_by_a_column(run, warm, tmp_path):
+    lines = warm.read_text().splitlines()
+    text = [f"{lines[0]},day", *(f"{line},{'mon' if k < 300 else 'tue'}" for k, line in enumerate(lines[1:]))]
+    path = tmp_path / "days.csv"
+    path.write_text("\n".join(text) + "\n")
+    assert run("mismatch", path, *QUICK, "--run", "day", "--json").data["blocks"] == ["mon", "tue"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ("--measured", "measured", "--simulated", "simulated_mm"),
+            "x.csv:1: there is no column `measured`; did you mean",
+        ),
+        (("--measured", "measured_mm", "--simulated", "measured_mm"), "is named for measured and for simulated values"),
+        (("--measured", "measured_mm", "--simulated", "other_um"), "cannot be compared; give both in one unit"),
+        ((*COLUMNS, "--variables", "place_mm=furlong"), "`place_mm=furlong` is not understood"),
+        ((*COLUMNS, "--variables", "palce_mm"), "there is no column `palce_mm`; did you mean `place_mm`?"),
+        ((*COLUMNS, "--run", "day"), "there is no column `day`"),
+        (COLUMNS, "x.csv:1: 4 rows with all values are too few to compare, 30 are needed"),
+    ],
+)
+def test_bad_input_is_answered(run, tmp_path, arguments, said):
+    path = tmp_path / "x.csv"
+    path.write_text("measured_mm,simulated_mm,place_mm,other_um\n" + "1,2,3,4\n2,3,5,5\n3,4,4,4\n4,6,6,6\n")
+    outcome = run("mismatch", path, *arguments)
+    assert outcome.code == FAILED
+    assert outcome.out == ""
+    assert said in outcome.err
+
+
+def test_a_cell_that_is_no_number_is_named_with_its_line(run, warm, tmp_path):
+    lines = warm.read_text().splitlines()
+    cells = lines[10].split(",")
+    lines[10] = ",".join([cells[0], "oops", *cells[2:]])
+    path = tmp_path / "x.csv"
+    path.write_text("\n".join(lines) + "\n")
+    outcome = run("mismatch", path, *QUICK)
+    assert outcome.code == FAILED
+    assert "x.csv:11: measured_mm is `oops`, not a finite number" in outcome.err
+
+
+def test_what_cannot_be_used_is_left_out_and_said(run, warm, tmp_path):
+    lines = warm.read_text().splitlines()
+    text = [f"{lines[0]},constant,word,copy"]
+    for k, line in enumerate(lines[1:]):
+        cells = line.split(",")
+        cells[1] = "" if k == 5 else cells[1]
+        text.append(",".join([*cells, "7", "abc", str(2.0 * float(cells[2]) + (float(cells[1]) if k != 5 else 0.0))]))
+    path = tmp_path / "x.csv"
+    path.write_text("\n".join(text) + "\n")
+    outcome = run("mismatch", path, *QUICK, "--json")
+    assert outcome.code == DONE
+    assert "1 of 1500 rows lack a number and are left out" in outcome.err
+    assert "`constant` is the same in all rows and is left out" in outcome.err
+    assert "`word` has no numbers and is left out" in outcome.err
+    assert "`copy` is measured and simulated value over again, and is left out" in outcome.err
+    assert {v["name"] for v in outcome.data["variables"]} == {"t_s", "place_mm", "screw_deg", "load_n", "oil_temp_c"}

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.square_root import Solution
     from dbbstation.inference.variables import Variable
 
@@ -109,6 +110,8 @@ class Channel:
         time_unit: of it.
         simulated: the simulated value as a variable, to ask whether it is late; None: it is not asked.
         kept: rows that are fitted, shape (n,); all if not given.
+        apart: rows from one that is kept to the next one where none between them is held back.
+        static: patterns that need no look, where they are known already; None: they are made.
     """
 
     residual: NDArray[np.float64]
@@ -122,6 +125,8 @@ class Channel:
     time_unit: str = "s"
     simulated: Variable | None = None
     kept: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    apart: int = 1
+    static: tuple[Pattern, ...] | None = None
 
     def __post_init__(self) -> None:
         if not len(self.kept):
@@ -130,6 +135,16 @@ class Channel:
     def without(self, rows: NDArray[np.bool_]) -> Channel:
         """The same with some rows held back, shape (n,)."""
         return replace(self, kept=self.kept & ~rows)
+
+    def thinned(self, most: int) -> Channel:
+        """The same with so many kept rows at the most, evenly spaced in each block."""
+        apart = int(np.ceil(self.kept.sum() / most))
+        if apart <= 1:
+            return self
+        grid = np.zeros(len(self.kept), dtype=bool)
+        for rows in self.blocks:
+            grid[rows.start : rows.stop : apart] = True
+        return replace(self, kept=self.kept & grid, apart=apart)
 
     @property
     def target(self) -> NDArray[np.float64]:
@@ -170,7 +185,7 @@ class Channel:
         """Kept rows that follow one another without a gap, as slices of the kept rows."""
         rows = np.flatnonzero(self.kept)
         block = np.searchsorted([b.stop for b in self.blocks], rows, side="right")
-        edges = np.flatnonzero((np.diff(rows) != 1) | (np.diff(block) != 0)) + 1
+        edges = np.flatnonzero((np.diff(rows) != self.apart) | (np.diff(block) != 0)) + 1
         return [slice(int(a), int(b)) for a, b in pairwise([0, *edges, len(rows)])]
 
     @property

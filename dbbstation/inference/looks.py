@@ -87,13 +87,9 @@ def looked_for(left: Left, variables: Sequence[Variable], kept: NDArray[np.bool_
 def _waves(variable: Variable, sums: Sums, size: float, pieces: int, strongest: int) -> list[Pattern]:
     """Waves of all periods from twice the range to four pieces, made finer about the best."""
     extent = variable.extent
-    most = min(MOST_CYCLES, pieces / PIECES_PER_WAVE)
-    grid = np.arange(0.5, most, 0.5) / extent
+    grid, explained = sums.explained_by_waves(min(MOST_CYCLES, pieces / PIECES_PER_WAVE), size)
     if not len(grid):
         return []
-    explained = np.concatenate(
-        [sums.explained(_cosines(sums.at, part), size) for part in np.array_split(grid, 1 + len(grid) // 128)]
-    )
     found: list[tuple[float, Wave]] = []
     for k in peaks(explained, 2 * strongest):
         best = grid[k]

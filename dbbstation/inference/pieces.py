@@ -88,12 +88,16 @@ class Sums:
 
     Attributes:
         at: mean of the variable in each piece, shape (b,).
+        place: number of each piece, counted from the least value on, shape (b,).
+        width: of a piece, in the unit of the variable.
         squares: gain times gain, shape (b,).
         rest: gain times what a fit leaves, shape (b,).
         axes: gain times what it can do, shape (b, k).
     """
 
     at: NDArray[np.float64]
+    place: NDArray[np.int64]
+    width: float
     squares: NDArray[np.float64]
     rest: NDArray[np.float64]
     axes: NDArray[np.float64]
@@ -105,7 +109,7 @@ class Sums:
         """Add up over so many equal pieces of a variable, shape (n,), where each row answers with a gain, shape (n,)."""
         low, high = float(values.min()), float(values.max())
         place = np.minimum(((values - low) / max(high - low, 1e-300) * pieces).astype(np.int64), pieces - 1)
-        _, number, count = np.unique(place, return_inverse=True, return_counts=True)
+        own, number, count = np.unique(place, return_inverse=True, return_counts=True)
         order = np.argsort(number, kind="stable")
         starts = np.concatenate([[0], np.cumsum(count)[:-1]])
 
@@ -117,7 +121,8 @@ class Sums:
         if left.whitening is not None:
             # How much whitening leaves of a curve depends on how fast it changes; for a first look, as of the noise itself.
             squares, beside = squares * (left.coloured.innovation / left.coloured.sigma) ** 2, beside[:, :0]
-        return cls(added(values) / count, squares, added(one * left.towards), added(beside))
+        at, width = added(values) / count, max(high - low, 1e-300) / pieces
+        return cls(at, own, width, squares, added(one * left.towards), added(beside))
 
     def explained(self, curves: NDArray[np.float64], size: float) -> NDArray[np.float64]:
         """Sum of squares that curves explain, less what their sizes cost, shape (m,).
@@ -135,6 +140,39 @@ class Sums:
         )
         normal = normal + np.eye(count) / size**2
         return np.asarray(np.einsum("mp,mp->m", rest, np.linalg.solve(normal, rest[:, :, None])[:, :, 0]))
+
+    def explained_by_waves(self, most: float, size: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Frequencies of waves, half a period over the range apart, and the sum of squares that each explains, shape (m,).
+
+        By Fourier transformation of the sums, as if every piece lay in its middle.
+
+        Args:
+            most: periods over the range, at the most.
+            size: standard deviation of amplitudes, in units of noise.
+        """
+        length = 2 * (int(self.place[-1]) + 1)
+        last = min(int(2.0 * most), length // 4)
+
+        def transformed(values: NDArray[np.float64], step: int) -> NDArray[np.complex128]:
+            wide = np.zeros((length, values.shape[1]))
+            wide[self.place] = values
+            return np.asarray(np.fft.rfft(wide, axis=0)[step : step * last : step])
+
+        rest = _sides(transformed(self.rest[:, None], 1))[:, :, 0]
+        side = _sides(transformed(self.axes, 1)) if self.axes.shape[1] else np.zeros((len(rest), 2, 0))
+        twice, mean = transformed(self.squares[:, None], 2)[:, 0], float(self.squares.sum())
+        normal = np.empty((len(rest), 2, 2))
+        # cos² = (1 + cos 2x) / 2, sin² = (1 - cos 2x) / 2, sin cos = sin 2x / 2; a transform has exp(-ix).
+        normal[:, 0, 0], normal[:, 1, 1] = (mean + twice.real) / 2.0, (mean - twice.real) / 2.0
+        normal[:, 0, 1] = normal[:, 1, 0] = -twice.imag / 2.0
+        normal = normal - side @ side.transpose(0, 2, 1) + np.eye(2) / size**2
+        explained = np.einsum("mp,mp->m", rest, np.linalg.solve(normal, rest[:, :, None])[:, :, 0])
+        return np.arange(1, last) / (length * self.width), np.asarray(explained)
+
+
+def _sides(transform: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Sums with cosine and with sine, shape (m, 2, ...)."""
+    return np.stack([transform.real, -transform.imag], axis=1)
 
 
 def peaks(explained: NDArray[np.float64], most: int) -> NDArray[np.int64]:

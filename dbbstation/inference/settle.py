@@ -155,10 +155,16 @@ class _Options:
     most_expanded: int
 
 
+def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
+    """Patterns of a channel that need no look; the same whatever rows are held back."""
+    return tuple(patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit))
+
+
 def _begun(channel: Channel, options: _Options) -> Bank:
     bank = Bank(channel)
     if options.static:
-        bank.add(patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit))
+        ready = channel.static
+        bank.add(static_patterns(channel) if ready is None else ready)
     return bank
 
 

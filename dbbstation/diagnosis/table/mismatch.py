@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.patterns import Family, covers_turns, turn
 from dbbstation.inference.read_off import OUT, read_off
-from dbbstation.inference.settle import settle
+from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.square_root import compress, solve, with_random
 from dbbstation.inference.verdict import Value, Verdict
 
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 FOLD_EXPANDED = 2
 """Hypotheses whose neighbours are looked at in a search of rows that others are held back from: a quarter of the usual number. The
 selection is all repeated; it is searched less widely, which can only make its held-out error larger."""
+
+
+FOLD_ROWS = 3000
+"""Rows that a selection for a held-out part is made from, at the most, evenly spaced: fewer rows can only make its error larger."""
 
 
 @dataclass(frozen=True)
@@ -152,13 +156,14 @@ def find_mismatch(
         progress: told what is being done.
     """
     channel = table.channel(sources)
+    channel = replace(channel, static=static_patterns(channel))
     settled = settle(channel, progress=progress)
     findings = read_off(settled)
     held_out = None
     if hold_out:
 
         def choose(part: Channel) -> Settled:
-            return settle(part, most_expanded=FOLD_EXPANDED, colours=False)
+            return settle(part.thinned(FOLD_ROWS), most_expanded=FOLD_EXPANDED, colours=False)
 
         held_out = held_out_error(channel, choose, progress)
     return Mismatch(

@@ -310,7 +310,9 @@ class Bank:
         """Log prior odds: a family's, shared by its members over all variables and by the forms that were tried."""
         every = (*self.patterns.values(), pattern)
         over = {tuple(v.name for v in p.variables) for p in every if p.family is pattern.family}
-        return log_odds(len(over), pattern.tried)
+        names = [variable.name for variable in self.channel.variables]
+        rank = sum(names.index(variable.name) for variable in pattern.variables if variable.name in names)
+        return log_odds(len(over), pattern.tried) - TIE * rank
 
     def _add(self, samples: NDArray[np.float64]) -> NDArray[np.int64]:
         self._everywhere.append(samples)
@@ -325,6 +327,9 @@ def _alike(one: Coloured, other: Coloured) -> bool:
 
 NOISE_ROUNDS = 5
 """Times that the noise is measured, each time beside what the last level lets in."""
+
+TIE = 1e-3
+"""Log odds by which a variable is less probable than the one before it in the table: of two that say the same, the first is named."""
 
 RANK = 1e-9
 """Share of the largest singular value of the base below which a direction says nothing."""

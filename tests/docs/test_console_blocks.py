@@ -39,7 +39,10 @@ EXEMPT = {
 }
 """Commands whose output is shown and not compared, by document and beginning of the line, with the reason."""
 
-SLOW = {("docs/diagnosis.md", "dbbstation study concealed-gravity")}
+SLOW = {
+    ("docs/diagnosis.md", "dbbstation study concealed-gravity"),
+    ("docs/mismatch.md", "dbbstation mismatch fixtures/tables/axis.csv"),
+}
 """Those that take about ten seconds."""
 
 

@@ -66,7 +66,7 @@ UNITS = {
     "angle since the start": "turns",
     "position of the platform": "mm",
     "tilt of the platform": "deg",
-    "distance from a place": "mm",
+    "position of the platform towards a place": "mm",
 }
 """Variables that an error may follow, and their units. Printed names begin with them: what kind of curve, and what
 moves where it is no strut, come behind."""
@@ -161,7 +161,7 @@ BEHIND = {
     TABLE: " of the table",
     TOOL: " of the ball on the tool",
     PULL: " with a pull on it",
-    TOWARDS: " that pulls on the platform",
+    TOWARDS: " that pulls on it",
 }
 """How a printed name ends, by what moves; nothing for struts."""
 
@@ -214,7 +214,7 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
     found["position of the platform"] = motion.poses[:, :2]
     found["tilt of the platform"] = motion.poses[:, 3:5]
     frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-    found["distance from a place"] = np.linalg.norm(_hoses(frames, machine), axis=2)
+    found["position of the platform towards a place"] = np.linalg.norm(_hoses(frames, machine), axis=2)
     if motion.setup is not None:
         away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]
         angle = np.unwrap(np.arctan2(away[:, 1], away[:, 0]))
@@ -341,7 +341,14 @@ def shapes(extent: Ranges) -> list[Shape]:
     found.append(Shape("tilt of the platform", "", None, TOOL, Plane(10.0, 2)))
     found.append(Shape("position of the platform", "", None, PULL, Plane(100.0, 2, constant=True)))
     found += [
-        Shape("distance from a place", "", None, TOWARDS, Spring(way, AWAY_MM), tried=float(len(WAYS_DEG)))
+        Shape(
+            "position of the platform towards a place",
+            "",
+            None,
+            TOWARDS,
+            Spring(way, AWAY_MM),
+            tried=float(len(WAYS_DEG)),
+        )
         for way in WAYS_DEG
     ]
     if "angle" in extent.low:

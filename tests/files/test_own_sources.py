@@ -8,7 +8,7 @@ import textwrap
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.machine_file import read_machine
+from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.own_sources import every_source, sources_of
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.sources.contract import Owner

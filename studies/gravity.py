@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.calibration.checks.observability import setup_of
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, calibrate
 from dbbstation.model.compensation import compensated, shifted
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.model.simulation import simulate_circle
+from dbbstation.model.simulation import setup_of, simulate_circle
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import sources_named
 from dbbstation.trace.analysis import best_circle, figures

@@ -18,7 +18,7 @@ from dbbstation.inference.square_root import Block, Columns, Solution, compress,
 from dbbstation.machine.compiled import in_parallel
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.motors import motor_currents
-from dbbstation.sources.causes.drive_friction import PER_MOTOR, driven_directions
+from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN, PER_MOTOR, driven_directions
 from dbbstation.trace.average import averaged
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ def current_start(layout: Layout, channel: Channel | None) -> dict[str, NDArray[
     x = layout.nominal.copy()
     for term in layout.terms:
         if term.source.of_currents:
-            gains = [p.plausible if p.name.endswith(PER_MOTOR[0]) else 0.0 for p in term.parameters]
+            gains = [p.plausible if p.name in MOTOR_OF_GAIN else 0.0 for p in term.parameters]
             x[term.columns] = gains
     for _ in range(MOST_STEPS):
         columns, solution = by_themselves(current_blocks(layout, channel, x), layout.known)

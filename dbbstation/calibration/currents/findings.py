@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.currents.channel import by_themselves, linearised, motor_noise
-from dbbstation.sources.causes.drive_friction import PER_MOTOR
+from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -138,8 +138,8 @@ def _doubts(layout: Layout, x: NDArray[np.float64], solution: Solution, held: fr
     doubts = []
     sigma = np.sqrt(np.diag(solution.covariance))
     for column, (source, _, name) in enumerate(layout.names):
-        if source in _drives(layout) and name.endswith(PER_MOTOR[0]) and name not in held:
-            motor = name.split("_")[1]
+        if source in _drives(layout) and name in MOTOR_OF_GAIN and name not in held:
+            motor = MOTOR_OF_GAIN[name]
             if x[column] < -SURE * sigma[column]:
                 doubts.append(f"motor {motor}: its current falls where its load grows; is its sign turned round?")
             elif x[column] < SURE * sigma[column]:

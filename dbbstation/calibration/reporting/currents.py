@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import GRAVITY_M_S2
-from dbbstation.sources.causes.drive_friction import PER_MOTOR
+from dbbstation.sources.causes.drive_friction import PER_MOTOR, of_motor
 from dbbstation.sources.laws.weights import platform_masses
 
 if TYPE_CHECKING:
@@ -56,9 +56,9 @@ def _motor(calibration: Calibration, found: MotorFindings, motor: int) -> dict[s
     units = {p.name: p.unit for p in term.parameters}
     said: dict[str, Any] = {"motor": motor + 1}
     for kind in PER_MOTOR:
-        name = f"motor_{motor + 1}_{kind}"
+        name = of_motor(motor + 1, kind)
         said[kind] = None if name in found.held else _number(*numbers[name], units[name])
-    gain, gain_u = numbers[f"motor_{motor + 1}_{PER_MOTOR[0]}"]
+    gain, gain_u = numbers[of_motor(motor + 1, PER_MOTOR[0])]
     told = said[PER_MOTOR[0]] is not None and gain != 0.0
     force, force_u = (N_PER_KN / gain, N_PER_KN * gain_u / gain**2) if told else (0.0, 0.0)
     said["force_per_current"] = _number(force, force_u, "N/A") if told else None

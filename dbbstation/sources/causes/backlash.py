@@ -10,13 +10,14 @@ from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
-from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Texts, of_each_strut
 from dbbstation.sources.laws.play_ends import first_side
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
 
 MM_PER_UM = 1e-3
 
@@ -53,10 +54,7 @@ class Backlash(ErrorSource):
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         """Six plays, full width."""
-        return tuple(
-            Parameter(f"strut_{i + 1}_um", "µm", 3.0, f"play of strut {i + 1}, whole width; positive: it stays behind")
-            for i in range(STRUTS)
-        )
+        return of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: it stays behind")
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Lag of each strut.

@@ -46,7 +46,7 @@ class BarDrift(ErrorSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         """Drift in the end, time constant, what pauses take back."""
         meaning = "reading minus true distance, from the first sample to the end of warm-up"
-        return warm_up_parameters(Parameter("drift_um", "µm", 2.0, meaning), 1800.0)
+        return warm_up_parameters(Parameter("drift_um", "µm", 2.0, meaning), "pause_loss_um", 1800.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Drift of the reading.

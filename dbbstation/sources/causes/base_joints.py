@@ -43,6 +43,7 @@ class BaseJoints(LinearSource):
                 plausible=stated or USUAL_MM,
                 meaning=f"base joint {i + 1} actual minus nominal {axis.upper()}",
                 tolerance=stated,
+                strut=i + 1,
             )
             for i in range(STRUTS)
             for axis in "xyz"

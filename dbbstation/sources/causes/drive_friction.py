@@ -30,6 +30,15 @@ PER_MOTOR = ("gain_a_kn", "coulomb_n", "viscous_ns_mm", "load_share_n_kn", "asym
 """Parameters of a motor, in their order."""
 
 
+def of_motor(motor: int, kind: str) -> str:
+    """Return the name of a parameter of one motor, 1 to 6; `kind` is of `PER_MOTOR`."""
+    return f"motor_{motor}_{kind}"
+
+
+MOTOR_OF_GAIN = {of_motor(motor, PER_MOTOR[0]): motor for motor in range(1, STRUTS + 1)}
+"""Motor, 1 to 6, by the name of its gain."""
+
+
 class DriveFriction(ErrorSource):
     """A motor holds its strut's load with a current, and friction of its drive helps or hinders it.
 
@@ -86,7 +95,7 @@ class DriveFriction(ErrorSource):
                     f"friction of drive {motor} growing less that shrinking, half of it, or zero of the current",
                 ),
             )
-            found += [Parameter(f"motor_{motor}_{name}", *kind) for name, kind in zip(PER_MOTOR, kinds, strict=True)]
+            found += [Parameter(of_motor(motor, name), *kind) for name, kind in zip(PER_MOTOR, kinds, strict=True)]
         return tuple(found)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:

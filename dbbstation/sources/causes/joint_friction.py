@@ -11,7 +11,7 @@ from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import stretch_mm, strut_tensions, transverse_load
 from dbbstation.sources.causes.backlash import follow
-from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Need, Owner, Texts, of_each_strut
 from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Hexapod, Machine
     from dbbstation.machine.kinematics import Struts
+    from dbbstation.sources.contract import Parameter
 
 LEVER_MM = 1000.0
 """Arm at which the parameter is a force: 1 N there is a moment of 1 N m."""
@@ -66,17 +67,8 @@ class JointFriction(LinearSource):
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         """Friction of six joints."""
-        counted = for_such_struts(machine)
-        return tuple(
-            Parameter(
-                f"strut_{i + 1}_n",
-                "N",
-                10.0,
-                f"force that swings strut {i + 1}, 1 m from its base joint; {counted}",
-                positive=True,
-            )
-            for i in range(STRUTS)
-        )
+        meaning = f"force that swings strut {{}}, 1 m from its base joint; {for_such_struts(machine)}"
+        return of_each_strut("strut_{}_n", "N", 10.0, meaning, positive=True)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Stretch of all struts per friction of each joint.

@@ -75,10 +75,12 @@ class JointRunout(LinearSource):
             of = f"strut_{i + 1}"
             for end in ENDS:
                 found += [
-                    Parameter(f"{of}_{end}_{way}_um", "µm", USUAL_UM, towards.format(end, swings[way])) for way in WAYS
+                    Parameter(f"{of}_{end}_{way}_um", "µm", USUAL_UM, towards.format(end, swings[way]), strut=i + 1)
+                    for way in WAYS
                 ]
             found += [
-                Parameter(f"{of}_platform_across_{way}_um", "µm", USUAL_UM, across.format(way)) for way in WAYS[:2]
+                Parameter(f"{of}_platform_across_{way}_um", "µm", USUAL_UM, across.format(way), strut=i + 1)
+                for way in WAYS[:2]
             ]
         return tuple(found)
 

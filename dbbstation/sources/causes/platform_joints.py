@@ -42,7 +42,11 @@ class PlatformJoints(LinearSource):
         usual = machine.joint_tolerance_mm or 0.2
         return tuple(
             Parameter(
-                f"joint_{i + 1}_{axis}_mm", "mm", usual, f"platform joint {i + 1} actual minus nominal, platform {axis}"
+                f"joint_{i + 1}_{axis}_mm",
+                "mm",
+                usual,
+                f"platform joint {i + 1} actual minus nominal, platform {axis}",
+                strut=i + 1,
             )
             for i in range(STRUTS)
             for axis in "xyz"

@@ -11,7 +11,17 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
-from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import (
+    SMOOTH_MM,
+    Effect,
+    ErrorSource,
+    Motion,
+    Need,
+    Owner,
+    Parameter,
+    Texts,
+    of_each_strut,
+)
 from dbbstation.sources.laws.play_ends import first_side
 from dbbstation.sources.laws.weights import platform_masses
 
@@ -69,10 +79,7 @@ class Play(ErrorSource):
             ModelError: the machine file has no masses.
         """
         platform_masses(self.name, machine)
-        plays = tuple(
-            Parameter(f"strut_{i + 1}_um", "µm", 3.0, f"play of strut {i + 1}, whole width; positive: load closes it")
-            for i in range(STRUTS)
-        )
+        plays = of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: load closes it")
         meaning = "force in a strut below which friction holds it, all struts alike"
         return (*plays, Parameter("friction_n", "N", 100.0, meaning, FRICTION_N))
 

@@ -10,7 +10,17 @@ from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
-from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import (
+    SMOOTH_MM,
+    Effect,
+    ErrorSource,
+    Motion,
+    Need,
+    Owner,
+    Parameter,
+    Texts,
+    of_each_strut,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,12 +77,7 @@ class ReversalSpike(ErrorSource):
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         """Six heights and one decay length."""
-        heights = tuple(
-            Parameter(
-                f"strut_{i + 1}_um", "µm", 2.0, f"height of the spike of strut {i + 1}; positive: it stays behind"
-            )
-            for i in range(STRUTS)
-        )
+        heights = of_each_strut("strut_{}_um", "µm", 2.0, "height of the spike of strut {}; positive: it stays behind")
         meaning = "travel of a strut over which its spike falls to 37 %, all struts alike"
         return (*heights, Parameter("decay_mm", "mm", 0.02, meaning, DECAY_MM))
 

@@ -50,7 +50,13 @@ class ScrewCyclic(LinearSource):
         """
         lead_mm = screw_lead_mm(self.name, machine)
         return tuple(
-            Parameter(f"strut_{i + 1}_{wave}_um", "µm", 2.0, f"{wave} of strut {i + 1} with period {lead_mm:g} mm")
+            Parameter(
+                f"strut_{i + 1}_{wave}_um",
+                "µm",
+                2.0,
+                f"{wave} of strut {i + 1} with period {lead_mm:g} mm",
+                strut=i + 1,
+            )
             for i in range(STRUTS)
             for wave in ("sine", "cosine")
         )

@@ -9,12 +9,13 @@ import numpy as np
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
-from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Texts, of_each_strut
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
 
 MM_PER_UM_M = 1e-6
 """One µm/m in mm/mm."""
@@ -46,7 +47,7 @@ class ScrewLead(LinearSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
         """Six lead errors; the usual one is that of a screw of tolerance grade 3, 12 µm over 300 mm [ISO 3408-3]."""
         zero = f"strut {{}} travels more than counted; zero at {_middle_mm(machine):g} mm"
-        return tuple(Parameter(f"strut_{i + 1}_um_m", "µm/m", 40.0, zero.format(i + 1)) for i in range(STRUTS))
+        return of_each_strut("strut_{}_um_m", "µm/m", 40.0, zero)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each strut answers to its own lead."""

@@ -8,13 +8,14 @@ import numpy as np
 
 from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Texts, of_each_strut
 from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
 
 S_PER_MS = 1e-3
 
@@ -59,10 +60,7 @@ class ServoLag(ErrorSource):
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         """Six times."""
-        return tuple(
-            Parameter(f"strut_{i + 1}_ms", "ms", 1.0, f"time by which strut {i + 1} is late; negative: it is ahead")
-            for i in range(STRUTS)
-        )
+        return of_each_strut("strut_{}_ms", "ms", 1.0, "time by which strut {} is late; negative: it is ahead")
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Lag of each strut.

@@ -58,7 +58,7 @@ class SpindleGrowth(ErrorSource):
         growth = Parameter("growth_um", "µm", 10.0, "way of the tool tip out of the spindle, from the first sample on")
         before = "growth before the first sample, of that after it; -100 where a warm spindle cools"
         begun = Parameter("begun_percent", "percent", 40.0, before, BEGUN_PERCENT, newer=True)
-        return (*warm_up_parameters(growth, 1800.0), begun)
+        return (*warm_up_parameters(growth, "pause_loss_um", 1800.0), begun)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Shift of the tool tip.

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Texts, of_each_strut
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
 
 
 class StrutReferenceLength(LinearSource):
@@ -32,10 +33,7 @@ class StrutReferenceLength(LinearSource):
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         """Six length errors."""
-        return tuple(
-            Parameter(f"strut_{i + 1}_mm", "mm", 0.2, f"strut {i + 1} actual minus driven length")
-            for i in range(STRUTS)
-        )
+        return of_each_strut("strut_{}_mm", "mm", 0.2, "strut {} actual minus driven length")
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each strut its own parameter."""

@@ -49,7 +49,7 @@ class ThermalFrame(ErrorSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         """Growth in the end, time constant, what pauses take back."""
         meaning = "growth of the base from the first sample to the end of warm-up"
-        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 15.0, meaning), 7200.0)
+        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 15.0, meaning), "pause_loss_um_m", 7200.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Shift of each base joint.

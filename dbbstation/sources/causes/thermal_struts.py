@@ -53,7 +53,7 @@ class ThermalStruts(ErrorSource):
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
         """Growth in the end, time constant, what pauses take back."""
         meaning = "growth of all struts from the first sample to the end of warm-up"
-        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 30.0, meaning), 3600.0)
+        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 30.0, meaning), "pause_loss_um_m", 3600.0)
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Growth of each strut.

@@ -38,21 +38,21 @@ EQUATION = "a (1 - exp(-t / tau)) - b p(t), t since the session's first sample; 
 ORIGIN = "linear expansion of a body of one time constant (Newton's law of cooling), heated while the machine works"
 
 
-def warm_up_parameters(growth: Parameter, usual_s: float) -> tuple[Parameter, ...]:
+def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tuple[Parameter, ...]:
     """Parameters of the law: the growth given, its time constant, and what a pause takes back.
 
     Args:
-        growth: what is still to grow at the first sample; its name ends in its unit, as in `growth_um_m`.
+        growth: what is still to grow at the first sample.
+        pause_loss: name of what a pause takes back; its unit is that of the growth.
         usual_s: usual time constant [s].
     """
-    unit = growth.name.partition("_")[2]
     meaning = "what a pause without end would take back; pauses count from ten minutes on"
     return (
         growth,
         Parameter(
             "time_constant_s", "s", usual_s, "time in which it comes to 63 % of what it will be", TIME_CONSTANTS_S
         ),
-        replace(growth, name=f"pause_loss_{unit}", meaning=meaning, newer=True),
+        replace(growth, name=pause_loss, meaning=meaning, newer=True),
     )
 
 

@@ -31,6 +31,7 @@ def values_at(points: NDArray[np.float64], unit: str) -> tuple[Parameter, ...]:
             PLAUSIBLE_UM,
             f"strut {i + 1} actual minus driven length at {place:g} {unit}, cause unknown",
             tolerance=TOLERANCE_UM,
+            strut=i + 1,
         )
         for i in range(STRUTS)
         for number, place in enumerate(points, start=1)

@@ -40,9 +40,10 @@ class UnexplainedWave(ErrorSource):
         for i in range(STRUTS):
             for wave in ("sine", "cosine"):
                 meaning = f"{wave} of strut {i + 1}, {middle}"
-                found += [Parameter(f"strut_{i + 1}_{wave}_um", "µm", PLAUSIBLE_UM, meaning, tolerance=TOLERANCE_UM)]
+                name = f"strut_{i + 1}_{wave}_um"
+                found += [Parameter(name, "µm", PLAUSIBLE_UM, meaning, tolerance=TOLERANCE_UM, strut=i + 1)]
             period = f"strut_{i + 1}_period_mm"
-            found += [Parameter(period, "mm", 20.0, f"period of the wave of strut {i + 1}", PERIODS_MM)]
+            found += [Parameter(period, "mm", 20.0, f"period of the wave of strut {i + 1}", PERIODS_MM, strut=i + 1)]
         return tuple(found)
 
     def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002

@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.calibration.checks.observability import STEP_DEG, plan_sensitivity, setup_of
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.model.simulation import setup_of
 from dbbstation.plan.plan import Plan
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import sources_named
+from tests.calibration.checks.sensitivity import STEP_DEG, plan_sensitivity
 
 SOURCES = sources_named(KINEMATIC_SOURCES)
 

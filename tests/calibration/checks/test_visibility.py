@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.calibration.checks.observability import plan_sensitivity
 from dbbstation.calibration.checks.visibility import indices, visibility
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.files.formats.machine import read_machine
@@ -14,6 +13,7 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.registry import sources_named
 from studies.virtual_session import draw_session
+from tests.calibration.checks.sensitivity import plan_sensitivity
 
 SAMPLES = 90
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.calibration.checks.observability import setup_of
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.model.simulation import setup_of
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources

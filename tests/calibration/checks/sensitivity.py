@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.sources.contract import Motion, Setup
+from dbbstation.model.simulation import setup_of
+from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,22 +82,6 @@ def plan_sensitivity(
         blocks.append(_without_centre(block, circle.theta_deg(phi)) if centred else block)
     names = tuple((source.name, p.name) for source in sources for p in source.parameters(machine))
     return PlanSensitivity(np.vstack(blocks), names)
-
-
-def setup_of(test: PlannedTest) -> Setup:
-    """Return the set-up that a planned test will have when it is mounted once."""
-    ball = test.ball
-    return Setup(
-        session="",
-        mounting=test.name,
-        ball=ball.name,
-        instrument="",
-        fixed_ball_mm=np.array(ball.centre_mm),
-        mounting_repeatability_mm=ball.repeatability_mm,
-        ball_uncertainty_mm=ball.uncertainty_mm,
-        bar_uncertainty_mm=0.0,
-        plate=ball.plate,
-    )
 
 
 def _circle_rows(

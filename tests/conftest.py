@@ -11,7 +11,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import pytest
 
-from dbbstation.files.machine_file import read_machine
+from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.machine.geometry import Machine
 

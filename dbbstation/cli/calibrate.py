@@ -82,16 +82,16 @@ def calibrate(
     With drive-friction among the sources, recorded motor currents are fitted too. They give gains and friction of the
     drives, and with cog-shift the centre of gravity.
     """
-    from dbbstation.calibration.evaluation import evaluate
-    from dbbstation.calibration.fit import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
-    from dbbstation.calibration.fit import calibrate as fit
-    from dbbstation.calibration.methods import Method, as_known
-    from dbbstation.calibration.outliers import calibrate_robust
-    from dbbstation.calibration.summary import calibration_summary, identified_model
+    from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
+    from dbbstation.calibration.fit.calibrate import calibrate as fit
+    from dbbstation.calibration.fit.methods import Method, as_known
+    from dbbstation.calibration.outliers.robust import calibrate_robust
+    from dbbstation.calibration.reporting.evaluation import evaluate
+    from dbbstation.calibration.reporting.summary import calibration_summary, identified_model
     from dbbstation.cli.output import print_json, say
     from dbbstation.errors import ModelError
     from dbbstation.files.atomic import refuse_existing, write_bytes
-    from dbbstation.files.models import write_model
+    from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source, sources_of
     from dbbstation.recorded import load_sessions
     from dbbstation.sources.registry import sources_named
@@ -259,7 +259,7 @@ def _following_thermometers(
 ) -> tuple[ErrorSource, ...]:
     """Sources that grow with time by their thermometers where those were logged; said, since it is another model."""
     from dbbstation.cli.output import say
-    from dbbstation.sources.by_temperature import following_thermometers
+    from dbbstation.sources.laws.by_temperature import following_thermometers
 
     forms = following_thermometers(fitted, [observation.motion() for observation in observations])
     for source, form in zip(fitted, forms, strict=True):

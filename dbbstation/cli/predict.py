@@ -32,9 +32,9 @@ def predict(*, model: Path, source_files: tuple[Path, ...], poses: Path, out: Pa
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
     from dbbstation.files.atomic import refuse_existing
-    from dbbstation.files.models import read_model
+    from dbbstation.files.formats.model import read_model
+    from dbbstation.files.formats.pose_table import read_poses, write_poses
     from dbbstation.files.own_sources import every_source
-    from dbbstation.files.pose_table import read_poses, write_poses
     from dbbstation.machine.travel import check_travel
     from dbbstation.model.uncertainty import position_uncertainty_mm
     from dbbstation.sources.contract import Motion

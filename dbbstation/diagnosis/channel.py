@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.fit import LISTED_WITHIN, SMALLEST_NOISE_MM
-from dbbstation.calibration.scatter import LEAST_STATED_MM
+from dbbstation.calibration.checks.scatter import LEAST_STATED_MM
+from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.inference.harmonics import Spectrum
     from dbbstation.inference.square_root import Columns
     from dbbstation.machine.geometry import Machine

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
-from dbbstation.calibration.fit import Calibration, calibrate, default_sources
-from dbbstation.calibration.missing_physics import misfit_of
-from dbbstation.calibration.outliers import MOST, calibrate_robust
-from dbbstation.calibration.scatter import seats_of
-from dbbstation.calibration.strange_runs import in_place_after_all
-from dbbstation.calibration.stray_balls import set_free
+from dbbstation.calibration.checks.missing_physics import misfit_of
+from dbbstation.calibration.checks.scatter import seats_of
+from dbbstation.calibration.fit.calibrate import Calibration, calibrate, default_sources
+from dbbstation.calibration.outliers.robust import MOST, calibrate_robust
+from dbbstation.calibration.outliers.strange_runs import in_place_after_all
+from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import Channel
 from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.outlier import Fit, Outlier
+    from dbbstation.calibration.outliers.outlier import Fit, Outlier
     from dbbstation.inference.harmonics import Misfit, Spectrum
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.projection import BesideBase

@@ -17,8 +17,8 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
-from dbbstation.sources.by_temperature import FOLLOWED_K, known_thermometers, logged_degc
 from dbbstation.sources.contract import Effect
+from dbbstation.sources.laws.by_temperature import FOLLOWED_K, known_thermometers, logged_degc
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,7 +9,6 @@ current.
 from __future__ import annotations
 
 import math
-import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import STRUTS
 from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
 
 if TYPE_CHECKING:
@@ -196,7 +196,8 @@ class Parameter:
             uncertainty, something else is at work.
         listed: True where only the values of `shape` are possible and nothing between them, as of a part that is bought.
         part: amplitudes with one label may be wrong alone, such as those of one order of a ball's form; empty for those of a
-            strut, which its name says, and for a source that has no parts.
+            strut, and for a source that has no parts.
+        strut: strut that it is of, 1 to 6; the amplitudes of one strut may be wrong alone. None where it is of none.
     """
 
     name: str
@@ -209,6 +210,7 @@ class Parameter:
     positive: bool = False
     listed: bool = False
     part: str = ""
+    strut: int | None = None
 
     @property
     def alone_with(self) -> str:
@@ -220,11 +222,23 @@ class Parameter:
         """Greatest size of a value that a model may have, in the parameter's unit."""
         return max(BEYOND_PLAUSIBLE * self.plausible, *(10.0 * abs(value) for value in self.shape), 0.0)
 
-    @property
-    def strut(self) -> int | None:
-        """Strut that it is of, 1 to 6, as `strut_3_um` and `joint_3_x_mm` say; None where it is of none."""
-        named = re.match(r"(?:strut|joint)_([1-6])_", self.name)
-        return int(named.group(1)) if named else None
+
+def of_each_strut(
+    name: str, unit: str, plausible: float, meaning: str, *, positive: bool = False
+) -> tuple[Parameter, ...]:
+    """Return one amplitude for each strut.
+
+    Args:
+        name: of the parameter; `{}` stands for the strut, 1 to 6.
+        unit: as printed.
+        plausible: usual size, one standard deviation, in that unit.
+        meaning: one line with the sign; `{}` stands for the strut.
+        positive: True for what cannot be negative.
+    """
+    return tuple(
+        Parameter(name.format(k), unit, plausible, meaning.format(k), positive=positive, strut=k)
+        for k in range(1, STRUTS + 1)
+    )
 
 
 @dataclass(frozen=True)
@@ -346,8 +360,10 @@ class ErrorSource(ABC):
         return None
 
     def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:  # noqa: ARG002
-        """Whether runs can show the effect at values of its parameters of shape, shape (s,); False where they show a part only
-        that anything may look like, so that a diagnosis must not look for it there."""
+        """Whether runs can show the effect at values of its parameters of shape, shape (s,).
+
+        False where they show only a part of it that anything may look like: a diagnosis must not look for it there.
+        """
         return True
 
     def by_temperature(self) -> ErrorSource | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
@@ -10,10 +11,30 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def read_bytes(path: Path, faults: list[Problem]) -> bytes | None:
-    """Return a file's bytes, or None with the reason added to `faults`."""
+LARGEST_BYTES = 2_000_000_000
+"""Largest file that is read: an hour at a hundred thousand readings a second makes about as much."""
+
+
+def read_bytes(path: Path, faults: list[Problem], largest: int = LARGEST_BYTES) -> bytes | None:
+    """Return a file's bytes, or None with the reason added to `faults`.
+
+    Regular files only: a pipe would be waited for and a device never ends.
+    """
     try:
-        return path.read_bytes()
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+            what = "this is a pipe or a device, a file is needed"
+            faults.append(Problem(str(path), 0, 0, what, "write it to a file first"))
+            return None
+        if found.st_size > largest:
+            what = f"the file has {found.st_size:,} bytes, at most {largest:,} are read"
+            faults.append(Problem(str(path), 0, 0, what, "check that it is the file you mean"))
+            return None
+        with path.open("rb") as file:
+            data = file.read(largest + 1)
+        if len(data) <= largest:
+            return data
+        faults.append(Problem(str(path), 0, 0, f"the file goes on beyond {largest:,} bytes", "check which file it is"))
     except FileNotFoundError:
         faults.append(Problem(str(path), 0, 0, "there is no such file", "check the path"))
     except IsADirectoryError:

@@ -19,6 +19,7 @@ from dbbstation.diagnosis.channel import Channel
 from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
+from dbbstation.inference.model_comparison import SCALES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -296,7 +297,14 @@ def _joint(channel: Channel, comparison: ModelComparison, best: Hypothesis) -> C
     for within in (None, GRID):
         # A shape that these runs hardly see, such as a decay shorter than their samples, runs away with its amplitude.
         try:
-            return calibrate(channel.machine, channel.observations, every, start, shapes_within=within)
+            return calibrate(
+                channel.machine,
+                channel.observations,
+                every,
+                start,
+                shapes_within=within,
+                amplitudes_within=float(SCALES[-1]),
+            )
         except (CalibrationError, KinematicsError):
             continue
     return None

@@ -21,7 +21,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -194,6 +194,7 @@ class Parameter:
         newer: True for one that the source had not always: models written before lack it, and it is zero there.
         positive: True for what cannot be negative, such as a compliance or a friction: where a fit says so beyond its
             uncertainty, something else is at work.
+        listed: True where only the values of `shape` are possible and nothing between them, as of a part that is bought.
         part: amplitudes with one label may be wrong alone, such as those of one order of a ball's form; empty for those of a
             strut, and for a source that has no parts.
         strut: strut that it is of, 1 to 6; the amplitudes of one strut may be wrong alone. None where it is of none.
@@ -207,6 +208,7 @@ class Parameter:
     tolerance: float | None = None
     newer: bool = False
     positive: bool = False
+    listed: bool = False
     part: str = ""
     strut: int | None = None
 
@@ -356,6 +358,13 @@ class ErrorSource(ABC):
         A stated size makes the set a random effect of the fit.
         """
         return None
+
+    def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:  # noqa: ARG002
+        """Whether runs can show the effect at values of its parameters of shape, shape (s,).
+
+        False where they show only a part of it that anything may look like: a diagnosis must not look for it there.
+        """
+        return True
 
     def by_temperature(self) -> ErrorSource | None:
         """Return the same cause in the form that follows logged temperatures; None where it knows none.

@@ -126,6 +126,7 @@ def calibrate(
     *,
     prescribe: Sequence[Name] | None = None,
     shapes_within: float | None = None,
+    amplitudes_within: float = np.inf,
 ) -> Calibration:
     """Fit error sources to raw circles.
 
@@ -144,6 +145,7 @@ def calibrate(
             sequence has them chosen among the base joints; None holds the directions themselves.
         shapes_within: share of their starting values to which parameters of shape are known; None where they are
             known to their usual sizes only.
+        amplitudes_within: plausible sizes to which amplitudes of sources with a start are known, one standard deviation.
 
     Raises:
         CalibrationError: centred circles, too few tests, parameters that cannot stand in for what is lost, or no
@@ -154,7 +156,7 @@ def calibrate(
     _check_enough(observations)
     layout = lay_out(machine, default_sources() if sources is None else sources, observations)
     if start:
-        layout = _near(layout, start, shapes_within)
+        layout = _near(layout, start, shapes_within, amplitudes_within)
     channel = current_channel(layout, observations)
     x = _start_values(layout, {**current_start(layout, channel), **(start or {})})
     noise = Noise(FIRST_NOISE_MM, 1.0)
@@ -271,18 +273,32 @@ def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64
     return float(np.clip(share / (1.0 - ratio), SMALLEST_SHARE, 1.0))
 
 
-def _near(layout: Layout, start: Mapping[str, NDArray[np.float64]], within: float | None) -> Layout:
-    """Layout whose parameters of shape are nominally those of the start, and known to a share of them."""
+def _near(
+    layout: Layout, start: Mapping[str, NDArray[np.float64]], within: float | None, amplitudes_within: float
+) -> Layout:
+    """Layout whose parameters of shape are nominally those of the start, and known to a share of them.
+
+    Amplitudes are known to so many plausible sizes: what the geometry conceals nearly whole has no other bound.
+    """
     nominal, prior = layout.nominal.copy(), layout.known.prior.copy()
     for term in layout.terms:
+        if term.source.name not in start:
+            continue
         for k, parameter in enumerate(term.parameters):
-            if parameter.shape and term.source.name in start:
-                column = term.columns.start + k
+            column = term.columns.start + k
+            if not parameter.shape:
+                prior[column] = min(prior[column], amplitudes_within * parameter.plausible)
+            else:
                 nominal[column] = start[term.source.name][k]
-                if within is not None:
+                if parameter.listed:
+                    prior[column] = LISTED_WITHIN * nominal[column]
+                elif within is not None:
                     prior[column] = within * max(abs(nominal[column]), SMALLEST_SHAPE * parameter.plausible)
     return replace(layout, nominal=nominal, known=replace(layout.known, prior=prior))
 
+
+LISTED_WITHIN = 1e-3
+"""Share to which a value that is one of a list is known: gratings are made to parts in ten thousand, and warm."""
 
 SMALLEST_SHAPE = 0.1
 """Of its plausible size: a parameter of shape that starts at less is known to no less than a share of this."""

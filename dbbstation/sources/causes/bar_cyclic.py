@@ -9,14 +9,16 @@ import numpy as np
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
 
 MM_PER_UM = 1e-3
 
-SIGNAL_PERIODS_UM = (2.0, 4.0, 10.0, 20.0, 40.0, 100.0)
-"""Signal periods of usual length encoders [µm]."""
+SIGNAL_PERIODS_UM = (2.0, 4.0, 8.0, 10.0, 16.0, 20.0, 40.0, 80.0, 100.0, 200.0)
+"""Signal periods of length encoders that are sold [µm]."""
 
 
 class BarCyclic(ErrorSource):
@@ -51,8 +53,20 @@ class BarCyclic(ErrorSource):
         return (
             Parameter("sine_um", "µm", 0.2, "sine of the reading's error along the encoder's scale"),
             Parameter("cosine_um", "µm", 0.2, "cosine of the reading's error along the encoder's scale"),
-            Parameter("signal_period_um", "µm", 20.0, "signal period of the bar's encoder", shape=SIGNAL_PERIODS_UM),
+            Parameter(
+                "signal_period_um",
+                "µm",
+                20.0,
+                "signal period of the bar's encoder",
+                shape=SIGNAL_PERIODS_UM,
+                listed=True,
+            ),
         )
+
+    def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:
+        """Whether half of the runs sweep a signal period: a part of one wave follows the reading's own error."""
+        swept = [np.ptp(m.reading_mm[m.kept]) for m in motions if m.reading_mm is not None]
+        return bool(np.median(swept) >= MM_PER_UM * nonlinear[0])
 
     def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Wave in the reading.

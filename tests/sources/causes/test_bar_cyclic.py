@@ -124,3 +124,10 @@ def test_noise_of_the_readings_is_not_taken_for_a_wave(rng):
     # Of size one for waves that know nothing of the noise; the sine of the readings themselves has 20 and more.
     assert np.abs(np.mean(alike, axis=0)).max() < 3.0
     assert np.std(alike, axis=0).max() < 3.0
+
+
+@pytest.mark.parametrize(("swept_um", "period_um", "shown"), [(50.0, 40.0, True), (50.0, 80.0, False)])
+def test_runs_must_sweep_a_signal_period_to_show_it(swept_um, period_um, shown):
+    x = 150.0 + 1e-3 * swept_um / 2.0 * np.cos(np.linspace(0.0, 2.0 * np.pi, 360))
+    motions = [replace(random_run(np.random.default_rng(k), len(x)), reading_mm=x) for k in range(3)]
+    assert CYCLIC.shows(motions, (period_um,)) is shown

@@ -16,8 +16,10 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.argument("program_file", type=_FILE, metavar="PROGRAM")
 @click.option("--model", "model_file", type=_FILE, required=True, help="Calibrated model.")
 @source_file_option
-@click.option("--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language to write.")
-@click.option("--from", "source", metavar="D", help="Language of PROGRAM [default: by its extension].")
+@click.option(
+    "--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language to write: a name, or FILE.py."
+)
+@click.option("--from", "source", metavar="D", help="Language of PROGRAM, likewise [default: by its extension].")
 @click.option("--out", type=_FILE, required=True, help="File to write.")
 @click.option("--start", metavar="X,Y,Z,A,B,C", help="Pose before the program, in mm and degrees.")
 @click.option(
@@ -65,14 +67,16 @@ def compensate(
     """
     from dbbstation.cli.programs import hashed, loaded_inverse, parsed_pose, print_programs, read_source
     from dbbstation.files.atomic import refuse_existing, write_text
+    from dbbstation.files.own_dialects import dialect_given
     from dbbstation.nc.export import compensated_program
-    from dbbstation.nc.registry import dialect_named, dialect_of_file
+    from dbbstation.nc.registry import dialect_of_file
 
     pose = None if start is None else parsed_pose(start)
     refuse_existing(out, force=force)
-    written_in = dialect_named(dialect)
-    reader = dialect_of_file(str(program_file)) if source is None else dialect_named(source)
-    path = reader.read(read_source(program_file), str(program_file), start=pose)
+    written_in = dialect_given(dialect)
+    text = read_source(program_file)
+    reader = dialect_of_file(str(program_file), text) if source is None else dialect_given(source)
+    path = reader.read(text, str(program_file), start=pose)
     done = compensated_program(
         path,
         written_in,

@@ -15,7 +15,9 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.command()
 @click.option("--plan", "plan_file", type=_FILE, required=True, help="Test plan.")
 @click.option("--machine", "machine_file", type=_FILE, required=True, help="Machine file.")
-@click.option("--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language of the control.")
+@click.option(
+    "--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language of the control: a name, or FILE.py."
+)
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
 @click.option("--model", "model_file", type=_FILE, help="Compensate with this calibrated model.")
 @source_file_option
@@ -74,11 +76,11 @@ def program(
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
+    from dbbstation.files.own_dialects import dialect_given
     from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.export import circle_programs
-    from dbbstation.nc.registry import dialect_named
 
-    written_in = dialect_named(dialect)
+    written_in = dialect_given(dialect)
     plan, machine = read_plan(plan_file), read_machine(machine_file)
     inverse = None if model_file is None else loaded_inverse(model_file, time_s, source_files, largest_mm)
     programs = circle_programs(

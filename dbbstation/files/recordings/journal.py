@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import OutputError
 from dbbstation.files.atomic import sync_folder
-from dbbstation.files.recordings import run_columns as columns
 from dbbstation.files.recordings.run_csv import PART
+from dbbstation.trace import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

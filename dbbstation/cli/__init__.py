@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 DONE, FAILED, USAGE = 0, 1, 2
 """Exit codes."""
 
-_DEBUG = "--debug"
+_DEBUG, _SETTINGS = "--debug", "--settings"
 
 COMMANDS = {
     "calibrate": "Fit the machine's errors to recorded sessions.",
@@ -37,6 +37,7 @@ COMMANDS = {
     "predict": "Actual poses for commanded ones, under a model.",
     "program": "NC programs of a plan's circles, nominal or compensated.",
     "replay": "Send a byte log through an instrument's driver.",
+    "settings": "What the shop has set, and where each value comes from.",
     "session": "Runs of a session afterwards: list, accept, reject, seal.",
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",
     "sources": "The causes of error that are known, and how to confirm them.",
@@ -53,8 +54,13 @@ COMMANDS = {
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 @click.version_option(__version__, prog_name="dbbstation")
+@click.option(
+    _SETTINGS,
+    metavar="FILE",
+    help="Read the shop's settings from this file alone; may stand anywhere on the line.",
+)
 @click.option(_DEBUG, is_flag=True, help="Show the traceback of an error; may stand anywhere on the line.")
-def cli(*, debug: bool) -> None:
+def cli(*, settings: str | None, debug: bool) -> None:
     """Measure a hexapod machine tool with a double ball bar, calibrate it, find what its model lacks.
 
     \b
@@ -72,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = _DEBUG in given
     # The option is the program's, but people put it where they notice that they need it: at the end.
-    given = [argument for argument in given if argument != _DEBUG]
+    given = _settings_first([argument for argument in given if argument != _DEBUG])
     try:
         code = cli.main(given, prog_name="dbbstation", standalone_mode=False)
         sys.stdout.flush()
@@ -98,3 +104,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         click.echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _settings_first(given: list[str]) -> list[str]:
+    """Return the arguments with `--settings FILE` or `--settings=FILE`, wherever it stands, before the command."""
+    for k, argument in enumerate(given):
+        if argument == _SETTINGS:
+            return given[k : k + 2] + given[:k] + given[k + 2 :]
+        if argument.startswith(f"{_SETTINGS}="):
+            return [argument, *given[:k], *given[k + 1 :]]
+    return given

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.correction import largest_correction_option
+from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
@@ -16,12 +17,20 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.argument("program_file", type=_FILE, metavar="PROGRAM")
 @click.option("--model", "model_file", type=_FILE, required=True, help="Calibrated model.")
 @source_file_option
-@click.option("--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language to write.")
+@shop_option(
+    "--dialect",
+    setting="program.dialect",
+    metavar="D",
+    default="linuxcnc",
+    show_default=True,
+    help="Language to write.",
+)
 @click.option("--from", "source", metavar="D", help="Language of PROGRAM [default: by its extension].")
 @click.option("--out", type=_FILE, required=True, help="File to write.")
 @click.option("--start", metavar="X,Y,Z,A,B,C", help="Pose before the program, in mm and degrees.")
-@click.option(
+@shop_option(
     "--chord-um",
+    setting="program.chord_um",
     type=click.FloatRange(0.001, 1000.0),
     default=0.1,
     show_default=True,

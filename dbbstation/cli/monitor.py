@@ -9,20 +9,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.instrument_options import instrument_options
+
 if TYPE_CHECKING:
     from dbbstation.instrument.driver import Tally
     from dbbstation.instrument.reading import Reading
 
 
 @click.command()
-@click.option(
-    "--instrument",
-    required=True,
-    metavar="NAME",
-    help="Name of an instrument (`dbbstation instruments`), or a protocol file.",
-)
-@click.option("--port", required=True, help="Port name, or a URL such as socket://127.0.0.1:4001.")
-@click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
+@instrument_options(required=True)
 @click.option("--count", type=click.IntRange(min=1), help="Number of readings after which to stop.")
 @click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="Log every byte here, for `replay`.")
 @click.option("--force", is_flag=True, help="Overwrite the log file.")

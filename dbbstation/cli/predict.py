@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.number_options import number_language, number_options
 from dbbstation.cli.source_files import source_file_option
 
 
@@ -13,19 +14,31 @@ from dbbstation.cli.source_files import source_file_option
 @click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
 @source_file_option
 @click.option("--poses", required=True, type=click.Path(path_type=Path), help="CSV of commanded poses.")
+@number_options
 @click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="CSV of actual poses.")
 @click.option("--force", is_flag=True, help="Overwrite the output file.")
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON.")
-def predict(*, model: Path, source_files: tuple[Path, ...], poses: Path, out: Path, force: bool, as_json: bool) -> None:
+def predict(
+    *,
+    model: Path,
+    source_files: tuple[Path, ...],
+    poses: Path,
+    decimal: str | None,
+    separator: str | None,
+    out: Path,
+    force: bool,
+    as_json: bool,
+) -> None:
     r"""Predict the actual poses for commanded ones, with standard uncertainties.
 
     Input columns: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Output: the same columns with the actual pose, and u_x_mm,u_y_mm,
-    u_z_mm, the standard uncertainties. Further columns are copied. Combinations of parameters that the calibration
+    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. Combinations of parameters that the calibration
     could not identify are not part of the uncertainty; they are named.
 
     \b
     Examples:
       dbbstation predict --model model.yaml --poses commanded.csv --out actual.csv
+      dbbstation predict --model model.yaml --poses excel.csv --decimal , --out actual.csv
     """
     import numpy as np
 
@@ -42,7 +55,7 @@ def predict(*, model: Path, source_files: tuple[Path, ...], poses: Path, out: Pa
     refuse_existing(out, force=force)
     identified = read_model(model, every_source(source_files))
     say_unknown_causes(identified.model)
-    table = read_poses(poses)
+    table = read_poses(poses, number_language(decimal, separator))
     check_travel(identified.model.machine, table.poses, where=str(poses))
     motion = Motion(table.poses)
     actual = identified.model.of_the_machine().actual_poses(motion)

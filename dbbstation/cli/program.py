@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.correction import largest_correction_option
+from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
@@ -15,16 +16,29 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.command()
 @click.option("--plan", "plan_file", type=_FILE, required=True, help="Test plan.")
 @click.option("--machine", "machine_file", type=_FILE, required=True, help="Machine file.")
-@click.option("--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language of the control.")
+@shop_option(
+    "--dialect",
+    setting="program.dialect",
+    metavar="D",
+    default="linuxcnc",
+    show_default=True,
+    help="Language of the control.",
+)
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
 @click.option("--model", "model_file", type=_FILE, help="Compensate with this calibrated model.")
 @source_file_option
 @click.option("--test", "tests", multiple=True, metavar="NAME", help="This test only; may be given more than once.")
-@click.option(
-    "--step-deg", type=click.FloatRange(0.01, 5.0), default=0.1, show_default=True, help="Angle between points [deg]."
+@shop_option(
+    "--step-deg",
+    setting="program.step_deg",
+    type=click.FloatRange(0.01, 5.0),
+    default=0.1,
+    show_default=True,
+    help="Angle between points [deg].",
 )
-@click.option(
+@shop_option(
     "--clearance-mm",
+    setting="program.clearance_mm",
     type=click.FloatRange(0.0),
     default=20.0,
     show_default=True,

@@ -14,6 +14,7 @@ from dbbstation.files.models import parse_model
 from dbbstation.files.plan_file import parse_plan
 from dbbstation.files.run_csv import PART, read_run
 from dbbstation.files.session import SESSION_FILE, RunState, SessionFolder, no_session, parse_session
+from dbbstation.files.settings import read_settings
 from dbbstation.files.yaml_text import load_yaml
 from dbbstation.trace.loss import lost_samples
 
@@ -77,6 +78,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         "dbb-plan": lambda: _plan(checked),
         "dbb-jig": lambda: _jig(checked),
         "dbb-model": lambda: _model(checked, known_sources),
+        "dbb-settings": lambda: _settings(checked),
     }
     name = str(given).partition("/")[0]
     if name in by_name:
@@ -111,6 +113,16 @@ def _model(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
     if model is not None:
         names = sorted({one.source.name for one in model.model.of_the_machine().sources})
         checked.summary = f"model of {model.model.machine.name}: {', '.join(names) or 'no sources'}"
+
+
+def _settings(checked: Checked) -> None:
+    try:
+        settings = read_settings([checked.path])
+    except InputError as error:
+        checked.problems += error.problems
+        return
+    count = len(settings.values) + len(settings.tolerances)
+    checked.summary = f"settings: {_count(count, 'value')}"
 
 
 def _run(checked: Checked) -> None:

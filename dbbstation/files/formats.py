@@ -10,11 +10,12 @@ from dbbstation.files.model_file import ModelFile
 from dbbstation.files.plan_file import PlanFile
 from dbbstation.files.schema import format_of, versions_of
 from dbbstation.files.session_file import SessionFile
+from dbbstation.files.settings_file import SettingsFile
 
 if TYPE_CHECKING:
     from dbbstation.files.schema import Schema
 
-_NEWEST = (JigFile, MachineFile, ModelFile, PlanFile, SessionFile)
+_NEWEST = (JigFile, MachineFile, ModelFile, PlanFile, SessionFile, SettingsFile)
 
 SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _NEWEST}
 """Schema of each format by its name with its newest version, which has all keys of those before."""

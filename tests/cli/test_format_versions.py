@@ -23,6 +23,7 @@ STORED = {
     "dbb-plan/1": shipped_folder("protocols") / "plans" / "table2.yaml",
     "dbb-plan/2": FIXTURES / "plans" / "every-key.yaml",
     "dbb-model/1": FIXTURES / "models" / "small.yaml",
+    "dbb-settings/1": FIXTURES / "settings" / "every-key.yaml",
     "dbb-session/1": FIXTURES / "sessions" / "under-spindle",
     "dbb-session/2": FIXTURES / "sessions" / "small",
 }
@@ -53,7 +54,7 @@ def test_a_newer_key_in_an_older_version_is_refused_with_what_to_write(run, tmp_
     older.write_text(file.read_text(encoding="utf-8").replace(version, f"{name}/1"), encoding="utf-8")
     outcome = run("calibrate" if name == "dbb-session" else "check", older)
     assert outcome.code == 1
-    keys = [key for key in SINCE if f"{key}:" in older.read_text(encoding="utf-8")]
+    keys = [key for key in SINCE[name] if f"{key}:" in older.read_text(encoding="utf-8")]
     assert keys
     for key in keys:
         fault = rf"{older.name}:\d+:\d+: the key `{key}` came with {name}/2, and this file is {name}/1; write `format: {name}/2`"

@@ -32,10 +32,10 @@ def test_poses_and_further_columns(tmp_path: Path) -> None:
     [
         (f"{HEADER}\n1,5,2,-1000,0,0,0\n", ":2: 7 values in 6 columns; compare the line with the header; the decimal sign"),
         (f"{HEADER}\n1,2,-1000,0,0\n", ":2: 5 values in 6 columns"),
-        (f'{HEADER}\n"1,5",2,-1000,0,0,0\n', ":2: x_mm is '1,5', not a number; the decimal sign is a dot"),
+        (f'{HEADER}\n"1,5",2,-1000,0,0,0\n', ":2: x_mm is '1,5', not a number; the decimal sign is a dot, columns are separated by a comma: other tables need --decimal"),
         (f"{HEADER}\n1,2,-1000,0,0,nan\n", ":2: c_deg is 'nan', not a number; correct or remove the line"),
         (f"{HEADER}\n1,,-1000,0,0,0\n", ":2: y_mm is '', not a number"),
-        (f"{HEADER.replace(',', ';')}\n1,5;2;-1000;0;0;0\n", "commas stand between columns, the decimal sign is a dot"),
+        (f"{HEADER.replace(',', ';')}\n1,5;2;-1000;0;0;0\n", "the decimal sign is a dot, columns are separated by a comma: other tables need --decimal"),
         ("x_mm,y_mm\n1,2\n", ":1:1: no column z_mm, a_deg, b_deg, c_deg"),
         (f"{HEADER}\n", ":1:1: no pose follows the header"),
         ("", ":1:1: no column x_mm"),

@@ -93,7 +93,7 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
     if run.program is None:
         return observation
     path, faults = run.program.path, list[Problem]()
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, is_input=False)  # its hash stands in the session
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)

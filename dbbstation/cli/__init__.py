@@ -11,6 +11,7 @@ import click
 from dbbstation import __version__
 from dbbstation.cli.lazy import LazyGroup
 from dbbstation.errors import StationError
+from dbbstation.files.inputs import input_book
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,7 +81,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # The option is the program's, but people put it where they notice that they need it: at the end.
     given = _settings_first([argument for argument in given if argument != _DEBUG])
     try:
-        code = cli.main(given, prog_name="dbbstation", standalone_mode=False)
+        with input_book():
+            code = cli.main(given, prog_name="dbbstation", standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as problem:
         problem.show()

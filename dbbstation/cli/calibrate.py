@@ -89,6 +89,7 @@ def calibrate(
     from dbbstation.calibration.outliers import calibrate_robust
     from dbbstation.calibration.summary import calibration_summary, identified_model
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.provenance import provenance
     from dbbstation.errors import ModelError
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.models import write_model
@@ -118,7 +119,7 @@ def calibrate(
     summary = {"method": method, **calibration_summary(calibration, evaluate(calibration.model, known), outliers)}
     if out is not None:
         kept = {key: value for key, value in summary.items() if key not in ELSEWHERE_IN_MODEL}
-        write_model(out, identified_model(calibration, kept, recorded.sessions), force=force)
+        write_model(out, identified_model(calibration, kept, recorded.sessions), provenance=provenance(), force=force)
     if figure is not None:
         from dbbstation.report.calibration_figure import calibration_figure
 

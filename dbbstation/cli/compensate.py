@@ -72,7 +72,7 @@ def compensate(
       dbbstation compensate part.ngc --model model.yaml --out part-compensated.ngc
       dbbstation compensate part.nc --from linuxcnc --model model.yaml --out true.ngc --start 0,0,-1000,0,0,0
     """
-    from dbbstation.cli.programs import hashed, loaded_inverse, parsed_pose, print_programs, read_source
+    from dbbstation.cli.programs import loaded_inverse, origin_of, parsed_pose, print_programs, read_source
     from dbbstation.files.atomic import refuse_existing, write_text
     from dbbstation.nc.export import compensated_program
     from dbbstation.nc.registry import dialect_named, dialect_of_file
@@ -82,12 +82,13 @@ def compensate(
     written_in = dialect_named(dialect)
     reader = dialect_of_file(str(program_file)) if source is None else dialect_named(source)
     path = reader.read(read_source(program_file), str(program_file), start=pose)
+    inverse = loaded_inverse(model_file, time_s, source_files, largest_mm)
     done = compensated_program(
         path,
         written_in,
-        loaded_inverse(model_file, time_s, source_files, largest_mm),
+        inverse,
         chord_mm=chord_um / 1e3,
-        origin={"program file": hashed(program_file)},
+        origin=origin_of({"program file": program_file}, inverse),
     )
     write_text(out, done.text, force=force)
     print_programs([(out, done)], written_in.name, model_file, as_json=as_json)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.instrument_options import instrument_options
+from dbbstation.cli.provenance import provenance
 
 if TYPE_CHECKING:
     from dbbstation.instrument.driver import Tally
@@ -69,7 +70,7 @@ def _show(reading: Reading, t_s: float, *, as_json: bool) -> None:
 def _conclude(tally: Tally, *, as_json: bool) -> None:
     if as_json:
         totals = {"readings": tally.readings, "lost": tally.lost, "garbage_bytes": tally.garbage_bytes}
-        click.echo(json.dumps({"totals": totals}))
+        click.echo(json.dumps({"totals": totals, "provenance": provenance().data()}))
         return
     text = f"{tally.readings} readings, {tally.lost} lost, {tally.garbage_bytes} bytes not understood"
     click.echo(text + (f", for example {tally.garbage[:24].hex(' ')}" if tally.garbage else ""), err=True)

@@ -12,7 +12,14 @@ if TYPE_CHECKING:
 
 
 def print_json(data: dict[str, Any]) -> None:
-    """Print one JSON object; numbers that are not finite are refused rather than printed as invalid JSON."""
+    """Print one JSON object with where it comes from; numbers that are not finite are refused: they are no JSON."""
+    from dbbstation.cli.provenance import provenance
+
+    print_plain_json({**data, "provenance": provenance().data()})
+
+
+def print_plain_json(data: dict[str, Any]) -> None:
+    """Print one JSON object as it is: a document of its own, such as a schema."""
     click.echo(json.dumps(data, indent=1, allow_nan=False))
 
 

@@ -43,16 +43,17 @@ def predict(
     import numpy as np
 
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
-    from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.models import read_model
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.pose_table import read_poses, write_poses
+    from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.machine.travel import check_travel
     from dbbstation.model.uncertainty import position_uncertainty_mm
     from dbbstation.sources.contract import Motion
 
-    refuse_existing(out, force=force)
+    refuse_existing_table(out, force=force)
     identified = read_model(model, every_source(source_files))
     say_unknown_causes(identified.model)
     table = read_poses(poses, number_language(decimal, separator))
@@ -60,7 +61,7 @@ def predict(
     motion = Motion(table.poses)
     actual = identified.model.of_the_machine().actual_poses(motion)
     uncertainty_mm = position_uncertainty_mm(identified, motion)
-    write_poses(out, actual, uncertainty_mm, table.others, force=force)
+    write_poses(out, actual, uncertainty_mm, table.others, provenance(), force=force)
     error_um = 1e3 * np.linalg.norm(actual[:, :3] - table.poses[:, :3], axis=1)
     worst_u_um = 1e3 * float(np.linalg.norm(uncertainty_mm, axis=1).max())
     if as_json:

@@ -84,7 +84,7 @@ def program(
       dbbstation program --plan table2.yaml --machine machine.yaml --test a --test f --out two --json
     """
     from dbbstation.cli.output import say
-    from dbbstation.cli.programs import hashed, loaded_inverse, print_programs
+    from dbbstation.cli.programs import loaded_inverse, origin_of, print_programs
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.machine_file import read_machine
     from dbbstation.files.plan_file import read_plan
@@ -100,7 +100,7 @@ def program(
         machine,
         written_in,
         inverse=inverse,
-        origin={"plan file": hashed(plan_file), "machine file": hashed(machine_file)},
+        origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse),
         tests=tests,
         step_deg=step_deg,
         approach=None if bar_stays_on else Approach(clearance_mm),

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.atomic import write_text
 from dbbstation.files.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
+from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.source_text import decode, read_bytes
 
 if TYPE_CHECKING:
@@ -95,10 +95,13 @@ def write_poses(
     poses: NDArray[np.float64],
     uncertainty_mm: NDArray[np.float64],
     others: dict[str, list[str]],
+    provenance: Provenance,
     *,
     force: bool = False,
 ) -> None:
     """Write poses, shape (n, 6) [mm, deg], their standard uncertainties, shape (n, 3) [mm], and further columns.
+
+    Beside the table is written where it comes from.
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.
@@ -110,4 +113,4 @@ def write_poses(
     for k, (pose, uncertainty) in enumerate(zip(poses, uncertainty_mm, strict=True)):
         numbers = [f"{value:.9f}" for value in pose] + [f"{value:.7f}" for value in uncertainty]
         writer.writerow([*numbers, *(cells[k] for cells in kept.values())])
-    write_text(path, out.getvalue(), force=force)
+    write_table(path, out.getvalue(), provenance, force=force)

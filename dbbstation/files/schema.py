@@ -29,7 +29,7 @@ SINCE: dict[str, dict[str, int]] = {
     "dbb-session": {"stroke_mm": 2},
     "dbb-instrument": {"stroke_mm": 2},
     "dbb-machine": _OF_MACHINES,
-    "dbb-model": _OF_MACHINES,
+    "dbb-model": {**_OF_MACHINES, "provenance": 3},
 }
 """Keys that came after the first version of a format, with the version. A file of an older version must not have them: a
 program of that time would refuse it without saying that a newer one reads it."""

@@ -5,15 +5,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
+from dbbstation.files.inputs import note_input
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-def read_bytes(path: Path, faults: list[Problem]) -> bytes | None:
-    """Return a file's bytes, or None with the reason added to `faults`."""
+def read_bytes(path: Path, faults: list[Problem], *, is_input: bool = True) -> bytes | None:
+    """Return a file's bytes, or None with the reason added to `faults`.
+
+    Args:
+        path: of the file.
+        faults: take the reason.
+        is_input: outputs name it among their inputs; not so where the hash of the file stands in another input.
+    """
     try:
-        return path.read_bytes()
+        data = path.read_bytes()
     except FileNotFoundError:
         faults.append(Problem(str(path), 0, 0, "there is no such file", "check the path"))
     except IsADirectoryError:
@@ -21,6 +28,10 @@ def read_bytes(path: Path, faults: list[Problem]) -> bytes | None:
     except OSError as error:
         why = (error.strerror or "unknown reason").lower()
         faults.append(Problem(str(path), 0, 0, f"cannot be read: {why}", "check its permissions and the disk"))
+    else:
+        if is_input:
+            note_input(path, data)
+        return data
     return None
 
 

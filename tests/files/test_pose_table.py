@@ -9,6 +9,7 @@ import pytest
 
 from dbbstation.errors import InputError
 from dbbstation.files.pose_table import read_poses, write_poses
+from dbbstation.files.provenance import Provenance
 
 HEADER = "x_mm,y_mm,z_mm,a_deg,b_deg,c_deg"
 
@@ -23,7 +24,7 @@ def test_poses_and_further_columns(tmp_path: Path) -> None:
     table = read(tmp_path, f"name,{HEADER}\np1,1,2,-1000,0.5,0,0\np2,1,2,-1001,0,0,1e-1\n")
     assert table.poses.tolist() == [[1, 2, -1000, 0.5, 0, 0], [1, 2, -1001, 0, 0, 0.1]]
     assert table.others == {"name": ["p1", "p2"]}
-    write_poses(tmp_path / "out.csv", table.poses, np.zeros((2, 3)), table.others)
+    write_poses(tmp_path / "out.csv", table.poses, np.zeros((2, 3)), table.others, Provenance("p 1", "p"))
     assert (tmp_path / "out.csv").read_text().splitlines()[0] == f"{HEADER},u_x_mm,u_y_mm,u_z_mm,name"
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 DONE, FAILED, USAGE = 0, 1, 2
 """Exit codes."""
 
-_DEBUG, _SETTINGS = "--debug", "--settings"
+_DEBUG, _VERBOSE, _SETTINGS = "--debug", "--verbose", "--settings"
 
 COMMANDS = {
     "calibrate": "Fit the machine's errors to recorded sessions.",
@@ -60,8 +60,13 @@ COMMANDS = {
     metavar="FILE",
     help="Read the shop's settings from this file alone; may stand anywhere on the line.",
 )
+@click.option(
+    _VERBOSE,
+    is_flag=True,
+    help="Show on standard error what goes into the log; may stand anywhere on the line.",
+)
 @click.option(_DEBUG, is_flag=True, help="Show the traceback of an error; may stand anywhere on the line.")
-def cli(*, settings: str | None, debug: bool) -> None:
+def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:
     """Measure a hexapod machine tool with a double ball bar, calibrate it, find what its model lacks.
 
     \b
@@ -78,11 +83,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = _DEBUG in given
-    # The option is the program's, but people put it where they notice that they need it: at the end.
-    given = _settings_first([argument for argument in given if argument != _DEBUG])
     try:
         with input_book():
-            code = cli.main(given, prog_name="dbbstation", standalone_mode=False)
+            code = cli.main(_own_first(given), prog_name="dbbstation", standalone_mode=False, obj=tuple(given))
         sys.stdout.flush()
     except click.ClickException as problem:
         problem.show()
@@ -108,11 +111,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sys.exit(code if isinstance(code, int) else DONE)
 
 
-def _settings_first(given: list[str]) -> list[str]:
-    """Return the arguments with `--settings FILE` or `--settings=FILE`, wherever it stands, before the command."""
-    for k, argument in enumerate(given):
-        if argument == _SETTINGS:
-            return given[k : k + 2] + given[:k] + given[k + 2 :]
-        if argument.startswith(f"{_SETTINGS}="):
-            return [argument, *given[:k], *given[k + 1 :]]
-    return given
+def _own_first(given: list[str]) -> list[str]:
+    """Return the arguments with the program's own options before the command.
+
+    People put them where they notice that they need them: at the end.
+    """
+    own, others = [], list[str]()
+    arguments = iter(given)
+    for argument in arguments:
+        if argument in {_DEBUG, _VERBOSE} or argument.startswith(f"{_SETTINGS}="):
+            own.append(argument)
+        elif argument == _SETTINGS:
+            own += [argument, *[file for file in [next(arguments, None)] if file is not None]]
+        else:
+            others.append(argument)
+    return [*own, *others]

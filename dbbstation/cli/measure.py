@@ -113,12 +113,13 @@ def measure(
 
 def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> bool:
     """Run the sequence, say what happens, print the summary; return whether Ctrl-C ended it."""
-    from dbbstation.cli.measure_talk import Keyboard, Summary, Talk
+    from dbbstation.cli.measure_talk import Keyboard, Log, Summary, Talk
     from dbbstation.cli.output import print_json
     from dbbstation.station.autopilot import Autopilot
 
     station, summary = workplace.station, Summary()
     station.subscribe(summary)
+    station.subscribe(Log())
     station.subscribe(Talk(asking=hands is None, terminal=sys.stderr.isatty()))
     if hands is not None:
         station.subscribe(Autopilot(station.send, hands))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import logging
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+
+_LOG = logging.getLogger(__name__)
 
 
 def print_json(data: dict[str, Any]) -> None:
@@ -34,8 +37,14 @@ def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None
 
 
 def say(text: str) -> None:
-    """Tell the person at the terminal something that is not the result."""
+    """Tell the person at the terminal, and the log, something that is not the result."""
+    log_said(text)
     click.echo(text, err=True)
+
+
+def log_said(text: str) -> None:
+    """Log what the person at the terminal sees anyhow: `--verbose` does not show it again."""
+    _LOG.info("%s", text, extra={"said": True})
 
 
 def _text(cell: object) -> str:

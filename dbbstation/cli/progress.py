@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.output import log_said, say
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
@@ -38,7 +40,7 @@ def stage_bar(label: str, stages: Mapping[str, int], *, plain: bool = False) -> 
         plain: lines on a terminal too.
     """
     if plain or not sys.stderr.isatty():
-        yield lambda text: click.echo(f"... {text}", err=True)
+        yield lambda text: say(f"... {text}")
         return
     # Room for the ^C of a terminal is left, lest it begins a line of its own.
     room = max(shutil.get_terminal_size().columns - len(f"{label}  [{'':{_WIDTH}}]  100%  ^C") - 1, 0)
@@ -55,6 +57,7 @@ def stage_bar(label: str, stages: Mapping[str, int], *, plain: bool = False) -> 
 
         def tell(text: str) -> None:
             nonlocal reached
+            log_said(f"... {text}")
             if not reached:
                 stack.enter_context(bar)
             reached = max(reached, 1.0, _reached(text, stages, reached))

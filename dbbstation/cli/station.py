@@ -161,6 +161,7 @@ def opener(
         helper: told of everything after storage, before the screen.
         time_scale: of the job's clock.
     """
+    from dbbstation.cli.measure_talk import Log
     from dbbstation.instrument.driver import Instrument
     from dbbstation.station.assembly import assemble
     from dbbstation.tui.runner import OpenStation
@@ -169,6 +170,7 @@ def opener(
     def opened() -> Iterator[OpenStation]:
         with Instrument(protocol, port, baud=baud, clock=job.clock, **driver_patience(time_scale)) as source:
             workplace = assemble(job, source)
+            workplace.station.subscribe(Log())
             if helper is not None:
                 workplace.station.subscribe(helper)
             try:

@@ -84,14 +84,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = _DEBUG in given
     try:
-        with input_book():
-            code = cli.main(_own_first(given), prog_name="dbbstation", standalone_mode=False, obj=tuple(given))
+        # Not `cli.main`, which answers Ctrl-C with an empty line of its own.
+        with input_book(), cli.make_context("dbbstation", _own_first(given), obj=tuple(given)) as context:
+            code = cli.invoke(context)
         sys.stdout.flush()
+    except click.exceptions.Exit as left:
+        code = left.exit_code
     except click.ClickException as problem:
         problem.show()
         sys.exit(problem.exit_code)
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; what was written before stays", err=True)
+        # A terminal shows ^C where the cursor stands.
+        click.echo(("\n" if sys.stderr.isatty() else "") + "interrupted; what was written before stays", err=True)
         sys.exit(FAILED)
     except BrokenPipeError:
         # Whoever read the output has seen enough, as `| head` does; the interpreter must not flush into it again.

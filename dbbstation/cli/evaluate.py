@@ -42,6 +42,7 @@ def evaluate(
     from dbbstation.calibration.summary import evaluation_summary
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import count_bar
     from dbbstation.cli.shop import shop_settings
     from dbbstation.cli.tolerances import held_against, print_tolerances
     from dbbstation.files.models import read_model
@@ -51,12 +52,15 @@ def evaluate(
 
     settings = shop_settings()
     identified = read_model(model, every_source(source_files))
-    recorded = load_sessions(sessions, exclude)
+    with count_bar("reading runs") as reading:
+        recorded = load_sessions(sessions, exclude, reading)
     check_model_is_of(recorded.machine, identified.model.machine)
     for warning in recorded.warnings:
         say(f"note: {warning}")
     summary = evaluation_summary(compare(identified.model, recorded.observations))
-    for run, circle in zip(summary["runs"], predicted_circles(identified.model, recorded.observations), strict=True):
+    with count_bar("predicting runs") as predicting:
+        circles = predicted_circles(identified.model, recorded.observations, predicting)
+    for run, circle in zip(summary["runs"], circles, strict=True):
         run["circularity_30_upr_um"] = {
             "measured": circle.measured_um,
             "predicted": circle.predicted_um,

@@ -43,6 +43,7 @@ def predict(
     import numpy as np
 
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
     from dbbstation.files.models import read_model
@@ -50,18 +51,21 @@ def predict(
     from dbbstation.files.pose_table import read_poses, write_poses
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.machine.travel import check_travel
-    from dbbstation.model.uncertainty import position_uncertainty_mm
-    from dbbstation.sources.contract import Motion
+    from dbbstation.model.uncertainty import predicted_poses
 
     refuse_existing_table(out, force=force)
     identified = read_model(model, every_source(source_files))
     say_unknown_causes(identified.model)
-    table = read_poses(poses, number_language(decimal, separator))
-    check_travel(identified.model.machine, table.poses, where=str(poses))
-    motion = Motion(table.poses)
-    actual = identified.model.of_the_machine().actual_poses(motion)
-    uncertainty_mm = position_uncertainty_mm(identified, motion)
-    write_poses(out, actual, uncertainty_mm, table.others, provenance(), force=force)
+    with stage_bar("prediction", STAGES) as progress:
+        progress("reading poses")
+        table = read_poses(poses, number_language(decimal, separator))
+        progress("travel")
+        check_travel(identified.model.machine, table.poses, where=str(poses))
+        actual, uncertainty_mm = predicted_poses(
+            identified, table.poses, lambda done, of: progress("predicting pose", done, of)
+        )
+        progress("writing")
+        write_poses(out, actual, uncertainty_mm, table.others, provenance(), force=force)
     error_um = 1e3 * np.linalg.norm(actual[:, :3] - table.poses[:, :3], axis=1)
     worst_u_um = 1e3 * float(np.linalg.norm(uncertainty_mm, axis=1).max())
     if as_json:
@@ -80,3 +84,7 @@ def predict(
     say(f"greatest position error {error_um.max():.1f} µm, known to {worst_u_um:.1f} µm (one standard deviation)")
     for text in identified.directions_lost:
         say(f"not known, and not in the uncertainty: {text}")
+
+
+STAGES = {"reading": 0, "travel": 32, "predicting": 48, "writing": 67}
+"""Stages of a prediction, and the share of its time that has passed by then [%]."""

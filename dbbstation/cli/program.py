@@ -85,6 +85,7 @@ def program(
     """
     from dbbstation.cli.output import say
     from dbbstation.cli.programs import loaded_inverse, origin_of, print_programs
+    from dbbstation.cli.progress import count_bar
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.machine_file import read_machine
     from dbbstation.files.plan_file import read_plan
@@ -95,16 +96,18 @@ def program(
     written_in = dialect_named(dialect)
     plan, machine = read_plan(plan_file), read_machine(machine_file)
     inverse = None if model_file is None else loaded_inverse(model_file, time_s, source_files, largest_mm)
-    programs = circle_programs(
-        plan,
-        machine,
-        written_in,
-        inverse=inverse,
-        origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse),
-        tests=tests,
-        step_deg=step_deg,
-        approach=None if bar_stays_on else Approach(clearance_mm),
-    )
+    with count_bar("programs") as writing:
+        programs = circle_programs(
+            plan,
+            machine,
+            written_in,
+            inverse=inverse,
+            origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse),
+            tests=tests,
+            step_deg=step_deg,
+            approach=None if bar_stays_on else Approach(clearance_mm),
+            progress=writing,
+        )
     write_folder(out, {each.name: each.text for each in programs}, force=force)
     print_programs([(out / each.name, each) for each in programs], written_in.name, model_file, as_json=as_json)
     if not as_json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.calibration.fit import default_sources
+from dbbstation.calibration.fit.calibrate import default_sources
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
 from dbbstation.diagnosis.summary import diagnosis_summary
 from dbbstation.errors import ModelError

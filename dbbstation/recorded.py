@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, StationError
-from dbbstation.files.session import RunEntry, RunState, SessionFolder, read_session
+from dbbstation.files.recordings.session import RunEntry, RunState, SessionFolder, read_session
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.model.observation import Observation

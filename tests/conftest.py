@@ -14,7 +14,7 @@ os.environ["DBBSTATION_LOG"] = "off"
 import numpy as np
 import pytest
 
-from dbbstation.files.machine_file import read_machine
+from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.machine.geometry import Machine
 

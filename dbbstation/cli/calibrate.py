@@ -14,7 +14,7 @@ from dbbstation.cli.source_files import source_file_option
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
@@ -84,15 +84,15 @@ def calibrate(
     With drive-friction among the sources, recorded motor currents are fitted too. They give gains and friction of the
     drives, and with cog-shift the centre of gravity.
     """
-    from dbbstation.calibration.fit import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
-    from dbbstation.calibration.methods import Method, as_known
-    from dbbstation.calibration.summary import identified_model
+    from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
+    from dbbstation.calibration.fit.methods import Method, as_known
+    from dbbstation.calibration.reporting.summary import identified_model
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.errors import ModelError
     from dbbstation.files.atomic import refuse_existing, write_bytes
-    from dbbstation.files.models import write_model
+    from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source, sources_of
     from dbbstation.recorded import load_sessions
     from dbbstation.sources.registry import sources_named
@@ -146,10 +146,10 @@ def _calibrated(
     held: Sequence[tuple[str, str]] | None,
 ) -> tuple[Calibration, dict[str, Any]]:
     """Fit, and say how far it has come; return the fit and its summary."""
-    from dbbstation.calibration.evaluation import evaluate
-    from dbbstation.calibration.fit import calibrate as fit
-    from dbbstation.calibration.outliers import calibrate_robust
-    from dbbstation.calibration.summary import calibration_summary
+    from dbbstation.calibration.fit.calibrate import calibrate as fit
+    from dbbstation.calibration.outliers.robust import calibrate_robust
+    from dbbstation.calibration.reporting.evaluation import evaluate
+    from dbbstation.calibration.reporting.summary import calibration_summary
     from dbbstation.cli.progress import stage_bar
 
     with stage_bar("calibration", STAGES) as progress:
@@ -290,7 +290,7 @@ def _following_thermometers(
 ) -> tuple[ErrorSource, ...]:
     """Sources that grow with time by their thermometers where those were logged; said, since it is another model."""
     from dbbstation.cli.output import say
-    from dbbstation.sources.by_temperature import following_thermometers
+    from dbbstation.sources.laws.by_temperature import following_thermometers
 
     forms = following_thermometers(fitted, [observation.motion() for observation in observations])
     for source, form in zip(fitted, forms, strict=True):

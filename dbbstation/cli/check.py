@@ -66,7 +66,7 @@ def check(files: tuple[Path, ...], *, source_files: tuple[Path, ...], as_json: b
 
 def _print_schema(name: str) -> None:
     from dbbstation.cli.output import print_plain_json
-    from dbbstation.files.formats import SCHEMAS, json_schema
+    from dbbstation.files.formats.every_format import SCHEMAS, json_schema
 
     try:
         schema = json_schema(name)

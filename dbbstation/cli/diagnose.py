@@ -69,8 +69,8 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
       dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
     """
-    from dbbstation.calibration.evaluation import evaluate
-    from dbbstation.calibration.summary import calibration_summary, identified_model
+    from dbbstation.calibration.reporting.evaluation import evaluate
+    from dbbstation.calibration.reporting.summary import calibration_summary, identified_model
     from dbbstation.cli.calibrate import ELSEWHERE_IN_MODEL
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar, stage_bar
@@ -78,7 +78,7 @@ def diagnose(
     from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.diagnosed import diagnose_sessions
     from dbbstation.files.atomic import refuse_existing, write_bytes
-    from dbbstation.files.models import write_model
+    from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source
 
     if keep_unexplained and out is None:

@@ -36,16 +36,16 @@ def evaluate(
       dbbstation evaluate check-session --model model.yaml
       dbbstation evaluate check-session --model model.yaml --json
     """
-    from dbbstation.calibration.evaluation import evaluate as compare
-    from dbbstation.calibration.evaluation import plane_figures
-    from dbbstation.calibration.prediction import predicted_circles
-    from dbbstation.calibration.summary import evaluation_summary
+    from dbbstation.calibration.reporting.evaluation import evaluate as compare
+    from dbbstation.calibration.reporting.evaluation import plane_figures
+    from dbbstation.calibration.reporting.prediction import predicted_circles
+    from dbbstation.calibration.reporting.summary import evaluation_summary
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.shop import shop_settings
     from dbbstation.cli.tolerances import held_against, print_tolerances
-    from dbbstation.files.models import read_model
+    from dbbstation.files.formats.model import read_model
     from dbbstation.files.own_sources import every_source
     from dbbstation.machine.difference import check_model_is_of
     from dbbstation.recorded import load_sessions

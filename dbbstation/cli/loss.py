@@ -12,7 +12,7 @@ from dbbstation.cli.shop import from_settings, shop_option
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.files.plan_file import InlinePlan
+    from dbbstation.files.formats.plan import InlinePlan
 
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 

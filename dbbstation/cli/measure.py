@@ -78,9 +78,9 @@ def measure(
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar-length-mm 150.0003 --bar-uncertainty-um 0.5
       dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `emulate`)
     """
-    from dbbstation.files.machine_file import read_machine
-    from dbbstation.files.plan_file import read_inline_plan
-    from dbbstation.files.session_writer import SessionDetails
+    from dbbstation.files.formats.machine import read_machine
+    from dbbstation.files.formats.plan import read_inline_plan
+    from dbbstation.files.recordings.session_writer import SessionDetails
     from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.library import at_rate, load_instrument
     from dbbstation.station.assembly import Job, assemble

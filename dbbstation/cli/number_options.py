@@ -11,7 +11,7 @@ from dbbstation.cli.shop import shop_option
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.files.number_language import NumberLanguage
+    from dbbstation.files.formats.number_language import NumberLanguage
 
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
@@ -46,7 +46,7 @@ def number_language(decimal: str | None, separator: str | None) -> NumberLanguag
     Raises:
         InputError: decimal sign and separator are alike.
     """
-    from dbbstation.files.number_language import PLAIN, NumberLanguage
+    from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 
     decimal = decimal or PLAIN.decimal
     usual = ";" if decimal == "," else PLAIN.separator

@@ -46,9 +46,9 @@ def predict(
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
-    from dbbstation.files.models import read_model
+    from dbbstation.files.formats.model import read_model
+    from dbbstation.files.formats.pose_table import read_poses, write_poses
     from dbbstation.files.own_sources import every_source
-    from dbbstation.files.pose_table import read_poses, write_poses
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.machine.travel import check_travel
     from dbbstation.model.uncertainty import predicted_poses

@@ -87,8 +87,8 @@ def program(
     from dbbstation.cli.programs import loaded_inverse, origin_of, print_programs
     from dbbstation.cli.progress import count_bar
     from dbbstation.files.atomic import write_folder
-    from dbbstation.files.machine_file import read_machine
-    from dbbstation.files.plan_file import read_plan
+    from dbbstation.files.formats.machine import read_machine
+    from dbbstation.files.formats.plan import read_plan
     from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.export import circle_programs
     from dbbstation.nc.registry import dialect_named

@@ -12,7 +12,7 @@ from dbbstation.cli.output import print_json, print_table, say
 from dbbstation.cli.provenance import provenance
 from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.models import read_model
+from dbbstation.files.formats.model import read_model
 from dbbstation.files.own_sources import every_source
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.nc.export import Inverse

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from dbbstation.files.session import RunEntry, SessionFolder
-    from dbbstation.files.session_writer import SessionWriter
+    from dbbstation.files.recordings.session import RunEntry, SessionFolder
+    from dbbstation.files.recordings.session_writer import SessionWriter
 
 _FOLDER = click.argument("folder", type=click.Path(path_type=Path), metavar="FOLDER")
 _RUN = click.argument("run", metavar="RUN")
@@ -41,7 +41,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
       dbbstation session list 2026-11-20-hexapod-7 --json
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json, print_table
-    from dbbstation.files.session import read_session
+    from dbbstation.files.recordings.session import read_session
 
     read = read_session(folder)
     missing = [f"{test} {direction}" for test, direction in _missing(read)]
@@ -126,7 +126,7 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
     from dbbstation.files.atomic import write_text
-    from dbbstation.files.sealing import sealing
+    from dbbstation.files.recordings.sealing import sealing
 
     found = sealing(folder)
     if found.files and not dry_run:
@@ -157,7 +157,7 @@ def _tell(name: str, run: RunEntry, *, as_json: bool) -> None:
 
 def _missing(read: SessionFolder) -> list[tuple[str, str]]:
     """Tests and directions of the plan without an accepted run."""
-    from dbbstation.files.session import RunState
+    from dbbstation.files.recordings.session import RunState
 
     done = {(run.test, run.direction) for run in read.in_state(RunState.ACCEPTED)}
     planned = [(name, direction) for name, test in read.plan.tests.items() for direction in test.directions]
@@ -173,8 +173,8 @@ def _opened(folder: Path, run: str) -> tuple[SessionWriter, RunEntry]:
     import difflib
 
     from dbbstation.errors import InputError, Problem
-    from dbbstation.files.session import read_session
-    from dbbstation.files.session_writer import SessionWriter
+    from dbbstation.files.recordings.session import read_session
+    from dbbstation.files.recordings.session_writer import SessionWriter
 
     by_name = {_name(entry): entry for entry in read_session(folder).runs}
     if run not in by_name:

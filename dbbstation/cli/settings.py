@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from dbbstation.files.settings import Settings
+    from dbbstation.files.formats.settings import Settings
 
 
 @click.command()
@@ -52,7 +52,7 @@ PROGRAM = "dbbstation"
 
 def built_in() -> dict[str, Any]:
     """Values of the program itself by key, None where it has none; every key of the settings but the tolerances."""
-    from dbbstation.files.number_language import PLAIN
+    from dbbstation.files.formats.number_language import PLAIN
     from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH
     from dbbstation.nc.compensate import CHORD_MM
     from dbbstation.nc.limits import LARGEST_CORRECTION_MM

@@ -13,7 +13,7 @@ from dbbstation.cli.output import say
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from dbbstation.files.settings import Setting, Settings
+    from dbbstation.files.formats.settings import Setting, Settings
 
 SETTINGS_OPTION = "settings"
 """Name of the program's option `--settings FILE`, which replaces both files that are looked for."""
@@ -111,7 +111,7 @@ def folder_of_sessions(command: str | None, values: Mapping[str, Any]) -> Path |
 
 
 def _settings(ctx: click.Context, values: Mapping[str, Any]) -> Settings:
-    from dbbstation.files.settings import read_settings, settings_files
+    from dbbstation.files.formats.settings import read_settings, settings_files
 
     if _KEPT not in ctx.meta:
         named = ctx.find_root().params.get(SETTINGS_OPTION)

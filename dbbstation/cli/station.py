@@ -81,8 +81,8 @@ def station(
         virtual=virtual, time_scale=time_scale, baud=baud, needed=(plan_file, machine_file, instrument, port, out)
     )
     _check_terminal()
-    from dbbstation.files.machine_file import read_machine
-    from dbbstation.files.plan_file import read_inline_plan
+    from dbbstation.files.formats.machine import read_machine
+    from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.shipped import shipped_folder
     from dbbstation.instrument.library import load_instrument
     from dbbstation.station.assembly import Job

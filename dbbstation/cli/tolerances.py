@@ -9,7 +9,7 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from dbbstation.files.settings import Settings
+    from dbbstation.files.formats.settings import Settings
     from dbbstation.plan.tolerance import Tolerance
 
 _WHEN = {"before": "nominal machine", "after": "model"}

@@ -6,16 +6,16 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, TravelError
-from dbbstation.files.drive_csv import looks_like_drive, read_drive
-from dbbstation.files.formats import SCHEMAS
-from dbbstation.files.jig_file import parse_jig
-from dbbstation.files.machine_file import parse_machine
-from dbbstation.files.models import parse_model
-from dbbstation.files.plan_file import parse_plan
-from dbbstation.files.run_csv import PART, read_run
-from dbbstation.files.session import SESSION_FILE, RunState, SessionFolder, no_session, parse_session
-from dbbstation.files.settings import read_settings
-from dbbstation.files.yaml_text import load_yaml
+from dbbstation.files.formats.every_format import SCHEMAS
+from dbbstation.files.formats.jig import parse_jig
+from dbbstation.files.formats.machine import parse_machine
+from dbbstation.files.formats.model import parse_model
+from dbbstation.files.formats.plan import parse_plan
+from dbbstation.files.formats.settings import read_settings
+from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
+from dbbstation.files.recordings.run_csv import PART, read_run
+from dbbstation.files.recordings.session import SESSION_FILE, RunState, SessionFolder, no_session, parse_session
+from dbbstation.files.yaml.text import load_yaml
 from dbbstation.trace.loss import lost_samples
 
 if TYPE_CHECKING:

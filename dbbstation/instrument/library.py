@@ -6,9 +6,9 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from dbbstation.errors import InputError, InstrumentError, Problem
-from dbbstation.files.schema import validate
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.files.yaml_text import load_yaml
+from dbbstation.files.yaml.schema import validate
+from dbbstation.files.yaml.text import load_yaml
 from dbbstation.instrument.protocol import Protocol
 
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from dbbstation.calibration.evaluation import rms_um
-from dbbstation.calibration.noise_level import fine_noise_mm
-from dbbstation.calibration.residual_map import residual_map
+from dbbstation.calibration.checks.noise_level import fine_noise_mm
+from dbbstation.calibration.reporting.evaluation import rms_um
+from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.source_curves import found_sources, source_curves
 from dbbstation.plan.circle import Direction

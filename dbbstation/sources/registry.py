@@ -1,4 +1,4 @@
-"""Every error source by name: one file each in this folder, found by looking, not by a list."""
+"""Every error source by name: one file each in `causes` and `unmodelled`, found by looking, not by a list."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import importlib
 import pkgutil
 from functools import cache
 from inspect import getmembers, isabstract, isclass
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING
 
-import dbbstation.sources
 from dbbstation.errors import ModelError
+from dbbstation.sources import causes, unmodelled
 from dbbstation.sources.contract import ErrorSource
 
 if TYPE_CHECKING:
@@ -26,14 +26,19 @@ HOW_TO_ADD = "One of your own is given with --source-file FILE.py, or its packag
 def known_sources() -> Mapping[str, ErrorSource]:
     """All error sources of the package, sorted by name."""
     found: dict[str, ErrorSource] = {}
-    for module in pkgutil.iter_modules(dbbstation.sources.__path__):
-        content = importlib.import_module(f"dbbstation.sources.{module.name}")
+    modules = [name for folder in (causes, unmodelled) for name in _modules_in(folder)]
+    for content in map(importlib.import_module, modules):
         for _, member in getmembers(content, isclass):
             own = member.__module__ == content.__name__
             public = own and not member.__name__.startswith("_")  # those are other forms of a source
             if public and issubclass(member, ErrorSource) and not isabstract(member):
                 found[member.name] = member()
     return MappingProxyType(dict(sorted(found.items())))
+
+
+def _modules_in(folder: ModuleType) -> list[str]:
+    """Full names of the modules of a package."""
+    return [f"{folder.__name__}.{module.name}" for module in pkgutil.iter_modules(folder.__path__)]
 
 
 def sources_named(names: Iterable[str], known: Mapping[str, ErrorSource] | None = None) -> tuple[ErrorSource, ...]:

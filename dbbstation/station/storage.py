@@ -11,9 +11,9 @@ from dbbstation.station import events
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from dbbstation.files.journal import RunWriter
-    from dbbstation.files.session import Program, RunEntry
-    from dbbstation.files.session_writer import SessionWriter
+    from dbbstation.files.recordings.journal import RunWriter
+    from dbbstation.files.recordings.session import Program, RunEntry
+    from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.plan.circle import Direction
 
 COLUMNS = ("t_s", "length_mm", "status")

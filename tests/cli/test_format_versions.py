@@ -7,12 +7,12 @@ import re
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.formats import SCHEMAS, json_schema
-from dbbstation.files.machine_file import MachineFile, read_machine
-from dbbstation.files.plan_file import PlanFile, read_plan
-from dbbstation.files.schema import SINCE, format_for, versions_of
-from dbbstation.files.session import read_session
+from dbbstation.files.formats.every_format import SCHEMAS, json_schema
+from dbbstation.files.formats.machine import MachineFile, read_machine
+from dbbstation.files.formats.plan import PlanFile, read_plan
+from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.yaml.schema import SINCE, format_for, versions_of
 from tests.plant.session import record
 
 FIXTURES = shipped_folder("fixtures")

@@ -117,7 +117,7 @@ def test_a_fault_stands_there_with_its_traceback_and_the_terminal_has_one_line(r
 
 
 def test_what_is_wrong_with_the_program_itself_stands_there_too(run, shop, monkeypatch):
-    monkeypatch.setattr("dbbstation.files.session.read_session", lambda _: 1 / 0)
+    monkeypatch.setattr("dbbstation.files.recordings.session.read_session", lambda _: 1 / 0)
     assert run("session", "list", shop / "small").code == FAILED
     assert "ZeroDivisionError: division by zero" in (shop / "dbbstation.log").read_text(encoding="utf-8")
 
@@ -126,7 +126,7 @@ def test_an_interruption_is_noted(run, shop, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dbbstation.files.session.read_session", interrupted)
+    monkeypatch.setattr("dbbstation.files.recordings.session.read_session", interrupted)
     assert run("session", "list", shop / "small").code == FAILED
     assert re.search(r" WARNING interrupted after \d+\.\d s$", lines_of(shop / "dbbstation.log")[-1])
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import FAILED
-from dbbstation.files.machine_file import read_machine
-from dbbstation.files.models import write_model
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.model import write_model
 from dbbstation.files.own_sources import every_source
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel

@@ -16,7 +16,7 @@ from dbbstation import __version__
 from dbbstation.cli import DONE
 from dbbstation.files.provenance import Provenance
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.files.yaml_text import load_yaml
+from dbbstation.files.yaml.text import load_yaml
 
 PROGRAM = f"dbbstation {__version__}"
 SMALL = shipped_folder("fixtures") / "sessions" / "small"

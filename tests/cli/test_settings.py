@@ -10,11 +10,11 @@ import pytest
 
 from dbbstation.cli import DONE, FAILED, USAGE, loss
 from dbbstation.cli.settings import built_in
-from dbbstation.files.plan_file import read_inline_plan
-from dbbstation.files.settings import read_settings
-from dbbstation.files.settings_file import SettingsFile
+from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.formats.settings import read_settings
+from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.files.yaml_text import load_yaml
+from dbbstation.files.yaml.text import load_yaml
 from dbbstation.plan.tolerance import CircleFigure, Tolerance, worst
 
 EVERY_KEY = shipped_folder("fixtures") / "settings" / "every-key.yaml"

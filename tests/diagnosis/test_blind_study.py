@@ -10,8 +10,8 @@ import pytest
 
 from dbbstation.diagnosed import default_candidates
 from dbbstation.sources.registry import known_sources
-from dbbstation.studies.blind import judge_sessions, read_answers
-from dbbstation.studies.blind_score import numbers, score
+from studies.blind import judge_sessions, read_answers
+from studies.blind_score import numbers, score
 from tests.plant.blind.sessions import make_study
 
 SMALL = {"clean": 1, "single": 3, "concealed": 1}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dbbstation.calibration.fit import calibrate, default_sources
+from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.held import held_beside, held_variance
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named

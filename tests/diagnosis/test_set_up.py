@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.calibration.outlier import Kind
+from dbbstation.calibration.outliers.outlier import Kind
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.summary import diagnosis_summary

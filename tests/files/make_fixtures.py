@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from dbbstation.files.machine_file import read_machine
-from dbbstation.files.models import write_model
-from dbbstation.files.plan_file import read_inline_plan
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.model import write_model
+from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.provenance import Provenance
-from dbbstation.files.session import Bar, read_session
-from dbbstation.files.session_set_up import SetUpReadings
-from dbbstation.files.session_writer import FinishedRun, SessionDetails, SessionWriter, write_session
+from dbbstation.files.recordings.session import Bar, read_session
+from dbbstation.files.recordings.session_set_up import SetUpReadings
+from dbbstation.files.recordings.session_writer import FinishedRun, SessionDetails, SessionWriter, write_session
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction

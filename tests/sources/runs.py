@@ -11,9 +11,9 @@ from dbbstation.machine.geometry import Compliance, JointAxes, Machine, Masses, 
 from dbbstation.machine.rotation import Rotation
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Plate
-from dbbstation.sources.base_joints import BaseJoints
+from dbbstation.sources.causes.base_joints import BaseJoints
+from dbbstation.sources.causes.strut_reference_length import StrutReferenceLength
 from dbbstation.sources.contract import Motion, Setup
-from dbbstation.sources.strut_reference_length import StrutReferenceLength
 
 # [GRAV Table 4]: centre X, Y [mm], tilt A, B [deg]; all at Z = -1008 mm with a radius of 144 mm.
 CONDITIONS = {

@@ -7,6 +7,7 @@ name that was asked for.
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import shutil
 import tempfile
@@ -17,6 +18,8 @@ from dbbstation.errors import OutputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+
+_LOG = logging.getLogger(__name__)
 
 _MARK = ".new"
 
@@ -47,6 +50,7 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False) -> None:
             temporary.unlink(missing_ok=True)
             raise
         sync_folder(path.parent)
+    _LOG.info("wrote %s", path)
 
 
 def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool = False) -> None:
@@ -72,12 +76,15 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool 
                 shutil.rmtree(made, ignore_errors=True)
                 raise
             sync_folder(folder.parent)
+        _LOG.info("wrote %s with %d files", folder, len(files))
         return
     for name in files:
         if not name.endswith("/"):
             _refuse_overwriting(folder / name, force=force)
     with _told(folder):
         _replace_all(folder, files)
+    for name in files:
+        _LOG.info("wrote %s", folder / name)
 
 
 def refuse_existing(path: Path, *, force: bool) -> None:

@@ -11,6 +11,7 @@ from dbbstation.files.formats.jig import parse_jig
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
+from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.run_csv import PART, read_run
 from dbbstation.files.recordings.session import (
@@ -84,6 +85,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         "dbb-plan": lambda: _plan(checked),
         "dbb-jig": lambda: _jig(checked),
         "dbb-model": lambda: _model(checked, known_sources),
+        "dbb-settings": lambda: _settings(checked),
     }
     name = str(given).partition("/")[0]
     if name in by_name:
@@ -118,6 +120,16 @@ def _model(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
     if model is not None:
         names = sorted({one.source.name for one in model.model.of_the_machine().sources})
         checked.summary = f"model of {model.model.machine.name}: {', '.join(names) or 'no sources'}"
+
+
+def _settings(checked: Checked) -> None:
+    try:
+        settings = read_settings([checked.path])
+    except InputError as error:
+        checked.problems += error.problems
+        return
+    count = len(settings.values) + len(settings.tolerances)
+    checked.summary = f"settings: {_count(count, 'value')}"
 
 
 def _run(checked: Checked) -> None:

@@ -28,7 +28,7 @@ from dbbstation.trace.cut import lost_on_turn
 from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.machine.geometry import Machine
@@ -218,19 +218,27 @@ class SessionFolder:
             raise InputError(faults)
         return read
 
-    def load_all(self, runs: Sequence[RunEntry]) -> list[RunFile]:
+    def load_all(
+        self, runs: Sequence[RunEntry], progress: Callable[[int, int], None] = lambda _done, _of: None
+    ) -> list[RunFile]:
         """Read several runs.
+
+        Args:
+            runs: which.
+            progress: told how many of how many are read.
 
         Raises:
             InputError: every fault of all their files.
         """
         read: list[RunFile] = []
         faults: list[Problem] = []
-        for run in runs:
+        for done, run in enumerate(runs):
+            progress(done, len(runs))
             try:
                 read.append(self.load(run))
             except InputError as error:
                 faults += error.problems
+        progress(len(runs), len(runs))
         if faults:
             raise InputError(faults)
         return read

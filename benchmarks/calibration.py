@@ -24,9 +24,9 @@ from benchmarks.measuring import ROOT, Row, show, timed, timed_once  # isort: sk
 
 import numpy as np
 
-from dbbstation.calibration import nodes
-from dbbstation.calibration.evaluation import evaluate
-from dbbstation.calibration.fit import calibrate
+from dbbstation.calibration.fit import nodes
+from dbbstation.calibration.fit.calibrate import calibrate
+from dbbstation.calibration.reporting.evaluation import evaluate
 from dbbstation.recorded import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.session import record

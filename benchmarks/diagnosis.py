@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.measuring import Row, show, timed  # isort: skip - sets up the environment
 
-from dbbstation.calibration.fit import calibrate
+from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
 from dbbstation.diagnosis.findings import Verdict

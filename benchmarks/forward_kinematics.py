@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from dbbstation.files.machine_file import read_machine
+from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.machine.kinematics import forward, strut_lengths
 from dbbstation.machine.rotation import Frames

@@ -13,7 +13,7 @@ from dbbstation.diagnosis.table.contract import TableSource
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.units import PLAIN, Meaning, meaning_of, stated_meaning
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.table_csv import MOST_FAULTS, TableFile, read_table
+from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
 from dbbstation.files.table_sources import own_table_sources
 from dbbstation.inference.variables import Kind, Variable
 

@@ -15,7 +15,7 @@ import dbbstation
 from dbbstation.cli import COMMANDS, cli
 from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
-from dbbstation.files.machine_file import read_machine
+from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.sources.registry import known_sources
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.texts import Texts
 
-NOT_PUBLIC = {"cli", "tui", "studies", "__main__"}
-"""Top-level modules that nobody imports: commands, screens, experiments."""
+NOT_PUBLIC = {"cli", "tui", "demo", "prepare", "__main__"}
+"""Top-level modules that nobody imports: commands, screens, what is run once."""
 
 _UNWRAPPED = "\b"
 
@@ -37,7 +37,7 @@ Every cause of force that `dbbstation drive` looks for, from its own texts in `d
 names are what `drive --sources` takes."""
 
 _SOURCES_HEAD = """\
-Every cause that a model can contain, from its own texts in `dbbstation/sources/`. The names are what
+Every cause that a model can contain, from its own texts in `dbbstation/sources/causes/`. The names are what
 `calibrate --sources` takes. Those that a diagnosis compares have a plausible size, here for the machine in
 `fixtures/machines/every-key.yaml`, and the exactness of their formula: [Diagnosis](../diagnosis.md) says what these decide."""
 

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.files.machine_file import read_machine
-from dbbstation.files.plan_file import read_inline_plan
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.model.machine_model import MachineModel

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from dbbstation.studies.demo import DemoResult
+    from dbbstation.demo import DemoResult
 
 
 @click.command()
@@ -28,8 +28,8 @@ def demo(*, out: Path | None, seed: int, as_json: bool) -> None:
       dbbstation demo --out try-it --seed 7
     """
     from dbbstation.cli.output import print_json, say
+    from dbbstation.demo import run_demo
     from dbbstation.errors import OutputError
-    from dbbstation.studies.demo import run_demo
 
     folder = out or _unused(Path("dbbstation-demo"))
     if folder.exists():

@@ -54,7 +54,7 @@ def drive(
     from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
     from dbbstation.diagnosis.drive.summary import drive_summary
     from dbbstation.files.atomic import refuse_existing, write_bytes, write_text
-    from dbbstation.files.drive_csv import compared_csv, read_drive
+    from dbbstation.files.recordings.drive_csv import compared_csv, read_drive
 
     for path in (out, figure):
         if path is not None:
@@ -70,7 +70,7 @@ def drive(
         write_text(out, compared_csv(found.table()), force=force)
         summary["compared"] = str(out)
     if figure is not None:
-        from dbbstation.studies.drive_figure import drive_figure
+        from dbbstation.report.drive_figure import drive_figure
 
         write_bytes(figure, drive_figure(found, format_of(figure)), force=force)
         summary["figure"] = str(figure)

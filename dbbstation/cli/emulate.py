@@ -96,8 +96,8 @@ def emulate(
       dbbstation emulate --instrument streaming-encoder --plan table2.yaml --machine machine.yaml
       dbbstation emulate --instrument heidenhain-nd281b --plan p.yaml --machine m.yaml --seed 7 --time-scale 50
     """
-    from dbbstation.files.machine_file import read_machine
-    from dbbstation.files.plan_file import read_plan
+    from dbbstation.files.formats.machine import read_machine
+    from dbbstation.files.formats.plan import read_plan
     from dbbstation.instrument.library import at_rate, load_instrument
     from dbbstation.virtual.cell import VirtualCell
     from dbbstation.virtual.control import CellCommands, ControlServer
@@ -137,8 +137,8 @@ def _truth(machine: Machine, file: Path | None, source_files: tuple[Path, ...], 
         InputError: the model file is wrong, or is of another machine.
     """
     from dbbstation.errors import InputError, Problem
-    from dbbstation.files.machine_file import machine_data, machine_parts
-    from dbbstation.files.models import read_model
+    from dbbstation.files.formats.machine import machine_data, machine_parts
+    from dbbstation.files.formats.model import read_model
     from dbbstation.files.own_sources import every_source
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.virtual.truth import random_kinematics

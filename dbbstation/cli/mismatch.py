@@ -115,7 +115,7 @@ CORRECTED, LEFT = "corrected", "left"
 
 def _corrected(tabulated: Tabulated, found: Mismatch) -> str:
     """Text of the table with the corrected simulation and what it leaves."""
-    from dbbstation.files.table_csv import table_csv
+    from dbbstation.files.recordings.table_csv import table_csv
 
     corrected = found.table.simulated + found.explained
     unit = f"_{found.table.unit.replace('µ', 'u')}" if found.table.unit else ""

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from dbbstation.files.session import RunEntry, SessionFolder
-    from dbbstation.files.session_writer import SessionWriter
+    from dbbstation.files.recordings.session import RunEntry, SessionFolder
 
 _FOLDER = click.argument("folder", type=click.Path(path_type=Path), metavar="FOLDER")
 _RUN = click.argument("run", metavar="RUN")
@@ -18,7 +17,7 @@ _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result a
 
 @click.group()
 def session() -> None:
-    """List the runs of a session, accept or reject them afterwards, or seal recordings made elsewhere.
+    """List the runs of a session, accept or reject them afterwards, take in or seal recordings.
 
     \b
     Examples:
@@ -41,7 +40,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
       dbbstation session list 2026-11-20-hexapod-7 --json
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json, print_table
-    from dbbstation.files.session import read_session
+    from dbbstation.files.recordings.session import read_session
 
     read = read_session(folder)
     missing = [f"{test} {direction}" for test, direction in _missing(read)]
@@ -87,8 +86,7 @@ def accept(folder: Path, run: str, *, as_json: bool) -> None:
     Examples:
       dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
     """  # noqa: D301 (click reads the escape)
-    writer, entry = _opened(folder, run)
-    _tell(run, writer.judge(entry, accepted=True), as_json=as_json)
+    _tell(run, _judged(folder, run, accepted=True), as_json=as_json)
 
 
 @session.command()
@@ -105,8 +103,36 @@ def reject(folder: Path, run: str, *, reason: str, as_json: bool) -> None:
     """  # noqa: D301 (click reads the escape)
     if not reason.strip():
         raise click.UsageError("say why with --reason: whoever reads the session later will ask")
-    writer, entry = _opened(folder, run)
-    _tell(run, writer.judge(entry, accepted=False, reason=reason.strip()), as_json=as_json)
+    _tell(run, _judged(folder, run, accepted=False, reason=reason.strip()), as_json=as_json)
+
+
+@session.command("take-in")
+@_FOLDER
+@_JSON
+def take_in(folder: Path, *, as_json: bool) -> None:
+    """List sealed runs that lie in the session's folder and are in no list.
+
+    `dbbstation check` names them. They may come from a second program that wrote into the folder, or from a session file
+    that was restored. They are `complete` then: accept or reject each.
+
+    \b
+    Examples:
+      dbbstation session take-in 2026-11-20-hexapod-7
+      dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
+    """  # noqa: D301 (click reads the escape)
+    from dbbstation.cli.output import print_json
+    from dbbstation.files.recordings.session import unlisted_sealed
+    from dbbstation.files.recordings.session_writer import SessionWriter
+
+    with SessionWriter.open(folder) as writer:
+        taken = [_name(writer.take_in(path)) for path in unlisted_sealed(writer.session)]
+    if as_json:
+        print_json({"session": str(folder), "taken_in": taken})
+        return
+    for name in taken:
+        click.echo(f"{name}: complete, accept or reject it")
+    if not taken:
+        click.echo("every sealed run is listed already")
 
 
 @session.command()
@@ -126,7 +152,7 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
     from dbbstation.files.atomic import write_text
-    from dbbstation.files.sealing import sealing
+    from dbbstation.files.recordings.sealing import sealing
 
     found = sealing(folder)
     if found.files and not dry_run:
@@ -157,29 +183,31 @@ def _tell(name: str, run: RunEntry, *, as_json: bool) -> None:
 
 def _missing(read: SessionFolder) -> list[tuple[str, str]]:
     """Tests and directions of the plan without an accepted run."""
-    from dbbstation.files.session import RunState
+    from dbbstation.files.recordings.session import RunState
 
     done = {(run.test, run.direction) for run in read.in_state(RunState.ACCEPTED)}
     planned = [(name, direction) for name, test in read.plan.tests.items() for direction in test.directions]
     return [(name, direction.value) for name, direction in planned if (name, direction) not in done]
 
 
-def _opened(folder: Path, run: str) -> tuple[SessionWriter, RunEntry]:
-    """Open the session for writing and find a run by its name.
+def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunEntry:
+    """Find a run by its name and note what became of it.
 
     Raises:
         InputError: faults of the session, or no such run in it.
+        OutputError: another process writes into the session.
     """
     import difflib
 
     from dbbstation.errors import InputError, Problem
-    from dbbstation.files.session import read_session
-    from dbbstation.files.session_writer import SessionWriter
+    from dbbstation.files.recordings.session import read_session
+    from dbbstation.files.recordings.session_writer import SessionWriter
 
-    by_name = {_name(entry): entry for entry in read_session(folder).runs}
-    if run not in by_name:
-        near = difflib.get_close_matches(run, by_name, n=1, cutoff=0.6)
+    names = [_name(entry) for entry in read_session(folder).runs]
+    if run not in names:
+        near = difflib.get_close_matches(run, names, n=1, cutoff=0.6)
         remedy = f"did you mean {near[0]}?" if near else "`dbbstation session list` names them"
         raise InputError([Problem(str(folder), 0, 0, f"the session has no run {run}", remedy)])
-    writer = SessionWriter.open(folder)
-    return writer, next(entry for entry in writer.runs if _name(entry) == run)
+    with SessionWriter.open(folder) as writer:
+        entry = next(entry for entry in writer.runs if _name(entry) == run)
+        return writer.judge(entry, accepted=accepted, reason=reason)

@@ -32,14 +32,13 @@ def simulate(
     from dataclasses import replace
     from datetime import UTC, datetime, timedelta
 
-    from dbbstation.calibration.observability import setup_of
     from dbbstation.cli.output import say
     from dbbstation.errors import OutputError
-    from dbbstation.files.models import read_model
+    from dbbstation.files.formats.model import read_model
+    from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.own_sources import every_source
-    from dbbstation.files.plan_file import read_inline_plan
-    from dbbstation.files.session_writer import FinishedRun, write_session
-    from dbbstation.model.simulation import simulate_circle
+    from dbbstation.files.recordings.session_writer import FinishedRun, write_session
+    from dbbstation.model.simulation import setup_of, simulate_circle
     from dbbstation.virtual.under_spindle import SetUp, put_up
 
     if out.exists():

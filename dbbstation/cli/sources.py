@@ -42,7 +42,7 @@ def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[
     """
     from dbbstation.cli.output import print_json, print_table
     from dbbstation.errors import ModelError
-    from dbbstation.files.machine_file import read_machine
+    from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.own_sources import every_source
     from dbbstation.sources.registry import sources_named
 
@@ -99,7 +99,7 @@ def _told(source: ErrorSource, machine: Machine | None) -> dict[str, Any]:
 
 def _role(source: ErrorSource) -> str:
     """What becomes of it: fitted in every calibration, a candidate of the diagnosis, or the keeper of a curve."""
-    from dbbstation.calibration.fit import default_sources
+    from dbbstation.calibration.fit.calibrate import default_sources
 
     if source.name in {fitted.name for fitted in default_sources()}:
         return "fitted always"

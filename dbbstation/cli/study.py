@@ -1,24 +1,60 @@
-"""`dbbstation study`: reproducible experiments."""
+"""`dbbstation study`: reproducible experiments, which stand in a checkout beside the package."""
 
 from __future__ import annotations
 
+import importlib
+import sys
+from typing import TYPE_CHECKING
+
 from dbbstation.cli.lazy import LazyGroup
+from dbbstation.errors import StationError
+from dbbstation.files.shipped import checkout
 
-STUDIES = {
-    "blind": "Effects hidden by an independent simulation: found, named, or rightly not.",
-    "concealed-gravity": "Gravity hidden in a kinematic calibration: found, named, modelled.",
-    "coverage": "Do the stated 95 % intervals hold the truth?",
-    "gravity": "Gravity identified after the kinematics, as in the paper, and with them.",
-    "platform-joints": "The hard case: joint errors hidden to 99 %, from cannot tell to a name.",
-    "table-iii": "The paper's three ways to calibrate, on many random machines.",
-}
-"""Name and one line of help of every study; each is a module of `cli.studies` with a command of its name."""
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
-study = LazyGroup(
+    import click
+
+
+class StudyGroup(LazyGroup):
+    """The studies of the checkout; where the package came as a wheel, a word on where they are."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the study.
+
+        Raises:
+            StationError: this installation has no studies.
+        """
+        if not STUDIES:
+            raise StationError(
+                f"study {args[0]}: the studies are not part of the installed package",
+                remedy="get the source of dbbstation and run there: python3 dev.py run study " + " ".join(args),
+            )
+        return super().resolve_command(ctx, args)
+
+
+def _studies() -> Mapping[str, str]:
+    """Name and one line of help of every study; none where there is no checkout."""
+    root = checkout()
+    if root is None:
+        return {}
+    # Before anything else of this name that the folder of the caller may hold.
+    sys.path.insert(0, str(root))
+    table: Mapping[str, str] = importlib.import_module("studies.commands").STUDIES
+    return table
+
+
+STUDIES = _studies()
+
+study = StudyGroup(
     name="study",
     table=STUDIES,
-    package="dbbstation.cli.studies",
+    package="studies.commands",
     help="""Repeat an experiment from a seed to its numbers and its figure.
+
+The studies are part of the source, not of the installed package.
 
 \b
 Examples:

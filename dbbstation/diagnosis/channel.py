@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.fit import SMALLEST_NOISE_MM
-from dbbstation.calibration.scatter import LEAST_STATED_MM
+from dbbstation.calibration.checks.scatter import LEAST_STATED_MM
+from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.inference.harmonics import Spectrum
     from dbbstation.inference.square_root import Columns
     from dbbstation.machine.geometry import Machine
@@ -221,9 +221,9 @@ class Channel:
         sd = np.concatenate([tangent_sd, np.full(discrepancy.shape[1], source.form_uncertainty)])
         size = [values[own][amplitudes] / np.array([parameters[k].plausible for k in amplitudes]) for own in values]
         at = max(float(np.sqrt(np.mean(np.square(size)))), 1e-12)
-        grid = np.prod([max(len(parameters[k].shape), 1) for k in shaped]) if shaped else 1.0
         # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
-        weight = -float(np.log(max(grid / 2.5 ** len(shaped), 1.0)))
+        covered = [len(p.shape) / (1.0 if p.listed else 2.5) for p in (parameters[k] for k in shaped)]
+        weight = -float(np.log(max(float(np.prod(covered)), 1.0)))
         self._refined[name, law] = tuple(
             replace(
                 variant,
@@ -303,6 +303,7 @@ class Channel:
         shaped = [k for k, p in enumerate(parameters) if p.shape]
         shared = [source.shared_by(motion) for motion in self.motions]
         points = list(product(*(parameters[k].shape for k in shaped)))
+        points = [point for point in points if source.shows(self.motions, point)] or points[:1]
         found: list[Variant] = []
         for point in points:
             values = np.zeros(len(parameters))
@@ -360,5 +361,7 @@ def _spacing(parameter: Parameter, value: float) -> float:
     grid = np.sort(np.array(parameter.shape))
     if len(grid) == 1:
         return parameter.plausible
+    if parameter.listed:
+        return LISTED_WITHIN * value
     k = int(np.clip(np.searchsorted(grid, value), 1, len(grid) - 1))
     return float(grid[k] - grid[k - 1])

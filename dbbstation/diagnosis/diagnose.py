@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
-from dbbstation.calibration.stray_balls import beside
+from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
+from dbbstation.calibration.outliers.stray_balls import beside
 from dbbstation.diagnosis.explain import SURE, explain
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained
 from dbbstation.diagnosis.left_out import found_again, predicted
@@ -21,7 +21,7 @@ from dbbstation.diagnosis.unexplained_model import with_exact_wave
 from dbbstation.diagnosis.verdicts import judge
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
-from dbbstation.sources.by_temperature import not_given
+from dbbstation.sources.laws.by_temperature import not_given
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -15,6 +15,9 @@ import numpy as np
 from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.model_form import modulated
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.travel import middle
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Owner
 
@@ -57,7 +60,9 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
     if source.form_uncertainty == 0.0:
         return np.zeros((sum(len(run.derivative) for run in runs), 0))
     amplitude = np.array([not p.shape for p in source.parameters(machine)])
-    effects, along, signs = [], [], []
+    effects: list[NDArray[np.float64]] = []
+    along: list[list[NDArray[np.float64]]] = []
+    signs: list[NDArray[np.float64]] = []
     for run in runs:
         motion = run.motion
         # What an instrument does wrong it does to the whole reading, though a model may write it as errors of struts.
@@ -68,15 +73,15 @@ def discrepancy_of(source: ErrorSource, machine: Machine, runs: Sequence[Effects
             followed = _followed(source, known, motion)[motion.kept]
             total = run.derivative[:, amplitude] @ run.values[amplitude]
             effects.append(np.repeat(total[:, None], followed.shape[1], axis=1))
-            along.append(followed)
+            along.append([followed])
             continue
         effects.append(by_strut)
-        followed = known["time" if source.varies_with in {"time", "temperature"} else "strut-length"]
-        wide = np.broadcast_to(followed[:, None], (len(motion), STRUTS)) if followed.ndim == 1 else followed
-        along.append(wide[motion.kept])
+        along.append([values[motion.kept] for values in _followed_by_strut(source, known, motion, machine)])
         if source.varies_with in BY_DIRECTION:
             signs.append(known["strut-speed-sign"][motion.kept])
-    columns = modulated(effects, along, signs or None)
+    by_variable = [modulated(effects, one, signs or None) for one in zip(*along, strict=True)]
+    # Each variable takes its part of what a formula may be off by.
+    columns = np.hstack(by_variable) / np.sqrt(len(by_variable))
     return np.hstack([columns, _other_stages(source, machine, runs)])
 
 
@@ -115,6 +120,34 @@ def _strut_contributions(
         return None
     lengths = np.broadcast_to(np.asarray(effect.strut_mm), (len(motion), STRUTS))
     return np.asarray((reading.sensitivity.response.per_strut * lengths)[motion.kept], dtype=np.float64)
+
+
+def _followed_by_strut(
+    source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion, machine: Machine
+) -> list[NDArray[np.float64]]:
+    """Variables that the discrepancy of a source that acts on struts follows: place and its own, each of shape (n, 6)."""
+    if source.varies_with in {"time", "temperature"}:
+        return [np.broadcast_to(known["time"][:, None], (len(motion), STRUTS))]
+    found = [known["strut-length"]]
+    if source.varies_with in OF_STRUTS_SMOOTH and source.varies_with in known:
+        found.append(known[source.varies_with])
+    if source.varies_with.startswith("joint-angle"):
+        found.append(_swing_rad(motion, machine))
+    return found
+
+
+OF_STRUTS_SMOOTH = ("strut-force", "strut-speed")
+"""Variables of struts along which an effect may be off its formula gradually: a contact that stiffens under its load, a lag
+that is another at speed."""
+
+
+def _swing_rad(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    """Angles of the platform joints away from the middle of the travel, shape (n, 6) [rad]."""
+    frames, rest = Frames.from_poses(motion.poses, machine.hexapod.rotation), middle(machine)
+    unit, at_rest = (inverse(machine.hexapod, one).unit for one in (frames, rest))
+    in_platform = np.einsum("nji,nkj->nki", frames.rotation, unit)
+    cosine = np.einsum("nki,ki->nk", in_platform, np.einsum("ji,kj->ki", rest.rotation[0], at_rest[0]))
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)), dtype=np.float64)
 
 
 def _followed(source: ErrorSource, known: Mapping[str, NDArray[np.float64]], motion: Motion) -> NDArray[np.float64]:

@@ -9,23 +9,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
-from dbbstation.calibration.fit import Calibration, calibrate, default_sources
-from dbbstation.calibration.missing_physics import misfit_of
-from dbbstation.calibration.outliers import MOST, calibrate_robust
-from dbbstation.calibration.scatter import seats_of
-from dbbstation.calibration.strange_runs import in_place_after_all
-from dbbstation.calibration.stray_balls import set_free
+from dbbstation.calibration.checks.missing_physics import misfit_of
+from dbbstation.calibration.checks.scatter import seats_of
+from dbbstation.calibration.fit.calibrate import Calibration, calibrate, default_sources
+from dbbstation.calibration.outliers.robust import MOST, calibrate_robust
+from dbbstation.calibration.outliers.strange_runs import in_place_after_all
+from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import Channel
 from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
+from dbbstation.inference.model_comparison import SCALES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.outlier import Fit, Outlier
+    from dbbstation.calibration.outliers.outlier import Fit, Outlier
     from dbbstation.inference.harmonics import Misfit, Spectrum
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.projection import BesideBase
@@ -296,7 +297,14 @@ def _joint(channel: Channel, comparison: ModelComparison, best: Hypothesis) -> C
     for within in (None, GRID):
         # A shape that these runs hardly see, such as a decay shorter than their samples, runs away with its amplitude.
         try:
-            return calibrate(channel.machine, channel.observations, every, start, shapes_within=within)
+            return calibrate(
+                channel.machine,
+                channel.observations,
+                every,
+                start,
+                shapes_within=within,
+                amplitudes_within=float(SCALES[-1]),
+            )
         except (CalibrationError, KinematicsError):
             continue
     return None

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from dbbstation.inference.verdict import Value, Verdict
 
 if TYPE_CHECKING:
-    from dbbstation.calibration.fit import Calibration
-    from dbbstation.calibration.outlier import Outlier
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.held_out import HeldOut

@@ -9,7 +9,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
 
 
 def uncertainties(calibration: Calibration, held: NDArray[np.float64]) -> NDArray[np.float64]:

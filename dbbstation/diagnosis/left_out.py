@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.fit import SMALLEST_NOISE_MM
-from dbbstation.calibration.noise_level import fine_noise_mm
+from dbbstation.calibration.checks.noise_level import fine_noise_mm
+from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.inference.harmonics import LOW
 from dbbstation.inference.held_out import HeldOut, held_out
 from dbbstation.inference.selection_frequency import renumbered, selection_frequency

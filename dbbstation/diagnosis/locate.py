@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import Effect, ErrorSource, Fitted

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.fit import SMALLEST_NOISE_MM
+from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.findings import NextTest, Verdict
 from dbbstation.diagnosis.verdicts import TESTABLE_SHARE, TESTABLE_SIGMA
 from dbbstation.errors import MachineError

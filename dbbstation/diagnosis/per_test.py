@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.calibration.evaluation import rms_um
-from dbbstation.calibration.residual_map import names_of_tests
+from dbbstation.calibration.reporting.evaluation import rms_um
+from dbbstation.calibration.reporting.residual_map import names_of_tests
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.average import by_angle
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.plan.circle import Direction
 

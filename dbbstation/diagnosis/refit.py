@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.calibration.fit import Calibration, calibrate
+from dbbstation.calibration.fit.calibrate import Calibration, calibrate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dbbstation.inference.forms import Form, Hats, Lobes, Plane, Proportional, Sign
+from dbbstation.inference.forms import Form, Hats, Lobes, Plane, Proportional, Sign, Spring
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
-from dbbstation.sources.by_temperature import FOLLOWED_K, known_thermometers, logged_degc
 from dbbstation.sources.contract import Effect
+from dbbstation.sources.laws.by_temperature import FOLLOWED_K, known_thermometers, logged_degc
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,9 +40,17 @@ LEVER_MM = 100.0
 """Turns and moments count by what they do at this distance [mm]."""
 
 EVERY, SIGNED = "every strut", "every strut by direction of travel"
-READING, BALL, TABLE, TOOL, PULL = "reading", "ball on the table", "table", "ball on the tool", "pull"
+READING, BALL, TABLE, TOOL = "reading", "ball on the table", "table", "ball on the tool"
+PULL, TOWARDS = "pull", "pull towards a place"
 """What moves: struts, or struts one way while they lengthen and the other way while they shorten; what the bar reads; a
-ball; the table as a body with the ball on it; struts by a pull on the platform."""
+ball; the table as a body with the ball on it; struts by a pull on the platform, of any direction or towards a place."""
+
+WAYS_DEG = tuple(30.0 * k for k in range(12))
+"""Where the place may be that pulls. Its height, its distance and where on the platform it pulls are not searched: the nearest
+form leaves 14 to 40 % of what joints do not conceal of a hose (rms, seven hoses of 0.7 to 2 m; docs/decisions/0020)."""
+
+AWAY_MM = 1000.0
+"""How far it is from the Z axis: beyond the machine's frame."""
 
 UNITS = {
     "strut-length": "mm",
@@ -59,6 +67,7 @@ UNITS = {
     "angle since the start": "turns",
     "position of the platform": "mm",
     "tilt of the platform": "deg",
+    "position of the platform towards a place": "mm",
 }
 """Variables that an error may follow, and their units. Printed names begin with them: what kind of curve, and what
 moves where it is no strut, come behind."""
@@ -125,16 +134,22 @@ class Shape:
 
     def columns(self, samples: Samples) -> NDArray[np.float64]:
         """Effect of each amplitude on the readings of a run: directions that move times curves, shape (n, d p)."""
-        values, gain = samples.values[self.variable], self._gain(samples)
+        values, gain = self.followed(samples.values[self.variable]), self._gain(samples)
         if self.variable not in OF_STRUTS or self.strut is not None:
-            curve = self.form.columns(
-                values[:, self.strut - 1] if self.variable in OF_STRUTS and self.strut else values
-            )
+            curve = self.form.columns(values)
             return np.asarray((gain[:, :, None] * curve[:, None, :]).reshape(len(gain), -1))
         return np.einsum("ni,nip->np", samples.gain[self.moves], self.form.columns(values))
 
+    def followed(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of the variable that this one follows: of its strut or of its place, where there are several."""
+        if isinstance(self.form, Spring):
+            return values[..., WAYS_DEG.index(self.form.towards_deg)]
+        return values[..., self.strut - 1] if self.variable in OF_STRUTS and self.strut else values
+
     def _gain(self, samples: Samples) -> NDArray[np.float64]:
         gain = samples.gain[self.moves]
+        if isinstance(self.form, Spring):
+            gain = np.split(gain, len(WAYS_DEG), axis=1)[WAYS_DEG.index(self.form.towards_deg)]
         if self.strut is not None:
             return gain[:, self.strut - 1 : self.strut]
         return gain.sum(axis=1, keepdims=True) if self.moves in {EVERY, SIGNED} else gain
@@ -147,6 +162,7 @@ BEHIND = {
     TABLE: " of the table",
     TOOL: " of the ball on the tool",
     PULL: " with a pull on it",
+    TOWARDS: " that pulls on it",
 }
 """How a printed name ends, by what moves; nothing for struts."""
 
@@ -198,6 +214,8 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
     found |= _temperatures(motion)
     found["position of the platform"] = motion.poses[:, :2]
     found["tilt of the platform"] = motion.poses[:, 3:5]
+    frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+    found["position of the platform towards a place"] = np.linalg.norm(_hoses(frames, machine), axis=2)
     if motion.setup is not None:
         away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]
         angle = np.unwrap(np.arctan2(away[:, 1], away[:, 0]))
@@ -234,6 +252,7 @@ def samples_of(
         BALL: reading.by_parameters(Effect(fixed_ball_mm=np.eye(3))),
         TOOL: reading.by_parameters(Effect(tool_tip_mm=np.eye(3))),
         PULL: reading.by_parameters(Effect(strut_mm=_pulled(_struts(motion, machine)))),
+        TOWARDS: reading.by_parameters(Effect(strut_mm=_pulled_towards(motion, machine))),
     }
     if motion.is_path:
         gain[SIGNED] = gain[EVERY] * known["strut-speed-sign"]
@@ -256,6 +275,35 @@ def _pulled(struts: Struts) -> NDArray[np.float64]:
         wrench = np.tile(load, (count, 1))
         stretch[:, :, k] = strut_tensions(struts, Load(wrench[:, :3], wrench[:, 3:]))
     return stretch
+
+
+def _hoses(frames: Frames, machine: Machine) -> NDArray[np.float64]:
+    """From the middle of the platform's joints to each far place, shape (n, 12, 3) [mm]."""
+    middle = frames.position_mm + frames.rotation @ machine.hexapod.platform_joints_mm.mean(axis=0)
+    angles = np.radians(WAYS_DEG)
+    places = AWAY_MM * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))])
+    places[:, 2] = middle[:, 2].mean()
+    return np.asarray(places - middle[:, None, :], dtype=np.float64)
+
+
+def _pulled_towards(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    """Lengthening of the struts by a unit pull, shape (n, 6, 60): five numbers for each place.
+
+    The pull on the middle of the platform's joints; what it does as a moment where it holds the platform elsewhere, at
+    `LEVER_MM` along each of the platform's axes; and a force down, since the place may be higher or lower.
+    """
+    struts, frames = _struts(motion, machine), Frames.from_poses(motion.poses, machine.hexapod.rotation)
+    count = len(motion)
+    hoses, still = _hoses(frames, machine), np.zeros((count, 3))
+    arm = frames.rotation @ machine.hexapod.platform_joints_mm.mean(axis=0)
+    down = Load(np.tile([0.0, 0.0, -1.0], (count, 1)), np.cross(arm, [0.0, 0.0, -1.0]))
+    found = []
+    for way in range(len(WAYS_DEG)):
+        pull = hoses[:, way] / np.linalg.norm(hoses[:, way], axis=1, keepdims=True)
+        moments = [np.cross(LEVER_MM * frames.rotation[:, :, axis], pull) for axis in range(3)]
+        loads = [Load(pull, np.cross(arm, pull)), *(Load(still, moment) for moment in moments), down]
+        found += [strut_tensions(struts, load) for load in loads]
+    return np.stack(found, axis=2)
 
 
 def ranges(runs: Sequence[Samples]) -> Ranges:
@@ -293,6 +341,17 @@ def shapes(extent: Ranges) -> list[Shape]:
     found.append(Shape("position of the platform", "", None, TABLE, Plane(100.0, 2)))
     found.append(Shape("tilt of the platform", "", None, TOOL, Plane(10.0, 2)))
     found.append(Shape("position of the platform", "", None, PULL, Plane(100.0, 2, constant=True)))
+    found += [
+        Shape(
+            "position of the platform towards a place",
+            "",
+            None,
+            TOWARDS,
+            Spring(way, AWAY_MM),
+            tried=float(len(WAYS_DEG)),
+        )
+        for way in WAYS_DEG
+    ]
     if "angle" in extent.low:
         found.append(Shape("angle", "", None, READING, Lobes(LOBES)))
         turned = Hats(extent.low["angle since the start"], extent.high["angle since the start"])

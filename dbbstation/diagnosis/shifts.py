@@ -9,7 +9,7 @@ from dbbstation.diagnosis.held import held_beside, uncertainties
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
 
 
 def shifts_between(before: Calibration, after: Calibration) -> tuple[Shift, ...]:

@@ -16,14 +16,14 @@ from dbbstation.diagnosis.shapes import THERMOMETERS, variables
 from dbbstation.diagnosis.shapes import moves_struts as of_struts
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.sources.by_temperature import FollowsTemperature
+from dbbstation.sources.laws.by_temperature import FollowsTemperature
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.findings import Diagnosis
     from dbbstation.model.machine_model import Actual
     from dbbstation.model.observation import Observation

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.calibration.evaluation import rms_um
-from dbbstation.calibration.outlier import SOURCE_OF, Kind
-from dbbstation.calibration.summary import outlier_summary
+from dbbstation.calibration.outliers.outlier import SOURCE_OF, Kind
+from dbbstation.calibration.reporting.evaluation import rms_um
+from dbbstation.calibration.reporting.summary import outlier_summary
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.calibration.outlier import Outlier
+    from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.findings import Diagnosis, Location, NextTest, SourceFinding
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.findings import Curve, CurvePoint
-from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, READING, TABLE, TOOL, UNITS
+from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, READING, TABLE, TOOL, TOWARDS, UNITS
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.forms import HATS, Hats, Plane, PlaneStep
 from dbbstation.inference.model_comparison import Member
@@ -50,6 +50,8 @@ AXES = {
     f"{LEVER_MM:g} mm from the middle of the balls",
     PULL: "strut lengths change as under a force ({:+.2f}, {:+.2f}, {:+.2f}) and moments ({:+.2f}, {:+.2f}, {:+.2f}), "
     f"these at {LEVER_MM:g} mm from the tool tip",
+    TOWARDS: "strut lengths change as under a pull of {:+.2f} that way on the middle of the platform's joints, of "
+    f"({{:+.2f}}, {{:+.2f}}, {{:+.2f}}) at {LEVER_MM:g} mm from there along X, Y, Z of the platform, and of {{:+.2f}} down",
 }
 """How a direction is told, by what moves."""
 
@@ -209,8 +211,7 @@ def _line(at: NDArray[np.float64], weights: NDArray[np.float64], order: int) -> 
 
 def _values(shape: Shape, run: Samples) -> NDArray[np.float64]:
     """Values of the shape's variable in one run: of its strut, or of all."""
-    values = run.values[shape.variable]
-    return values[:, shape.strut - 1] if shape.variable in OF_STRUTS and shape.strut else values
+    return shape.followed(run.values[shape.variable])
 
 
 def _weights(runs: Sequence[Samples], shape: Shape) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.calibration.summary import identified_model
+from dbbstation.calibration.reporting.summary import identified_model
 from dbbstation.diagnosis.findings import CurvePoint
 from dbbstation.diagnosis.refit import refitted
 from dbbstation.errors import CalibrationError, ModelError
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.findings import Curve, Unexplained
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel

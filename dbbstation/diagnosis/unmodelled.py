@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.fit import SMALLEST_NOISE_MM
+from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.shape_look import Look, looked_for
 from dbbstation.diagnosis.shapes import PLAUSIBLE_MM, Samples, Shape, ranges, samples_of, shapes
 from dbbstation.inference.model_comparison import Cause, Variant
@@ -17,7 +17,7 @@ from dbbstation.machine.geometry import STRUTS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.diagnosis.channel import Channel
     from dbbstation.inference.model_comparison import Member
 

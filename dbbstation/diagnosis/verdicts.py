@@ -44,7 +44,7 @@ MOST_ALTERNATIVES = 6
 """Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
 
 
-NOT_SURE = "It may be there; these tests do not decide it."
+OPEN = "These tests leave it open: they neither show nor exclude it."
 
 
 def judge(explained: Explained) -> tuple[SourceFinding, ...]:
@@ -121,7 +121,8 @@ class _Judge:
                 return Verdict.AMBIGUOUS, others, (), _either(others)
         if self._probability((name,)) >= EVEN:
             others = tuple(other for other in self._ambiguity(name) if other != name)
-            return Verdict.AMBIGUOUS, others, (), _either(others)
+            if others:
+                return Verdict.AMBIGUOUS, others, (), _either(others)
         return self._verdict_of_absent(name)
 
     def _verdict_of_absent(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
@@ -129,7 +130,7 @@ class _Judge:
         if not self._testable(name):
             return Verdict.NOT_TESTABLE, (), (), self._why_not_testable(name)
         if self._probability((name,)) > PRIOR:
-            return Verdict.NOT_TESTABLE, (), (), "These tests leave it open: they neither show nor exclude it."
+            return Verdict.NOT_TESTABLE, (), (), OPEN
         return Verdict.RULED_OUT, (), (), "It would have been seen at its plausible size and was not needed."
 
     def _verdict_of_member(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
@@ -140,6 +141,8 @@ class _Judge:
         if self._probability(equal) >= SURE:
             return Verdict.IDENTIFIED, (), shown, ""
         others = tuple(other for other in self._ambiguities[name] if other != name)
+        if not others and not shown:
+            return Verdict.NOT_TESTABLE, (), (), OPEN
         return Verdict.AMBIGUOUS, others, shown, _either(others)
 
     def _class_with(self, name: str) -> tuple[str, ...]:
@@ -270,7 +273,7 @@ class _Judge:
 
 def _either(others: Sequence[str]) -> str:
     """Text of a cause that may be there, or one of others in its place."""
-    return f"These tests cannot tell it from {', '.join(others)}." if others else NOT_SURE
+    return f"These tests cannot tell it from {', '.join(others)}."
 
 
 def _refused(name: str, why: str) -> SourceFinding:

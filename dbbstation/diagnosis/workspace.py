@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.summary import identified_model
+from dbbstation.calibration.reporting.summary import identified_model
 from dbbstation.errors import MachineError
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.uncertainty import position_uncertainty_mm
@@ -16,7 +16,7 @@ from dbbstation.sources.contract import Motion
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.fit import Calibration
+    from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.machine.geometry import Machine
 
 REACH = 0.6

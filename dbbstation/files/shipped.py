@@ -7,6 +7,12 @@ from pathlib import Path
 from dbbstation.errors import InputError, Problem
 
 
+def checkout() -> Path | None:
+    """Return the folder of the source that this package is part of; None where it was installed from a wheel."""
+    root = Path(__file__).resolve().parents[2]
+    return root if (root / "pyproject.toml").is_file() and (root / "studies").is_dir() else None
+
+
 def shipped_folder(name: str) -> Path:
     """Return the folder `name` (for example `protocols`) with the files that the package ships.
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from inspect import isabstract
 from typing import TYPE_CHECKING, TypeVar
 
+from dbbstation.catalogue import in_words
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.own_sources import classes_in, line_in, said_of
+from dbbstation.files.own_classes import classes_in_files, line_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +27,8 @@ def own_table_sources(files: Sequence[Path], base: type[_Contract]) -> list[_Con
     """
     faults: list[Problem] = []
     found: dict[str, _Contract] = {}
-    for kind, place in classes_in(files, base, CONTRACT, faults):
+    for one_of in classes_in_files(files, base, CONTRACT, faults):
+        kind, place = one_of.kind, one_of.place
         lacking = [name for name in ("name", "needs", "texts") if not hasattr(kind, name)]
         if isabstract(kind):
             lacking += sorted(getattr(kind, "__abstractmethods__", ()))
@@ -37,7 +39,7 @@ def own_table_sources(files: Sequence[Path], base: type[_Contract]) -> list[_Con
             one = kind()
         except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
             line = line_in(error, place.file) or place.line
-            faults.append(Problem(place.file, line, 0, f"{kind.__name__}: {said_of(error)}", CONTRACT))
+            faults.append(Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", CONTRACT))
             continue
         name = str(getattr(one, "name", ""))
         if name in found:

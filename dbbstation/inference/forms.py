@@ -291,3 +291,34 @@ class PlaneStep(Form):
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         """Across the line."""
         return _across(self.at, self.width, low, high)
+
+
+@dataclass(frozen=True, eq=False)
+class Spring(Form):
+    """The same everywhere, and in proportion to a distance: what a spring of unknown length pulls.
+
+    Args:
+        towards_deg: where its far end is, seen from the Z axis.
+        about: distance that counts as none [mm].
+    """
+
+    towards_deg: float
+    about: float
+
+    @property
+    def count(self) -> int:
+        """A constant and a slope."""
+        return 2
+
+    def text(self, unit: str) -> str:
+        """Whereto."""
+        del unit
+        return f"towards {self.towards_deg:.0f} deg to +X"
+
+    def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """One, and the distance in 100 mm; values of shape (n,)."""
+        return np.column_stack([np.ones(len(values)), (values - self.about) / 100.0])
+
+    def points(self, low: float, high: float) -> NDArray[np.float64]:
+        """Both ends and the middle."""
+        return np.linspace(low, high, 3)

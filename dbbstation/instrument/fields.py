@@ -22,7 +22,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
-from dbbstation.files.schema import Schema
+from dbbstation.files.yaml.schema import Schema
 from dbbstation.instrument.checksums import Algorithm, checksum, checksum_bytes
 from dbbstation.instrument.reading import SEVERITY, Status
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, model_validator
 
-from dbbstation.files.schema import Schema
+from dbbstation.files.yaml.schema import Schema
 from dbbstation.instrument.fields import Code, Content, Found, NotRepresentable, NotUnderstood
 
 if TYPE_CHECKING:

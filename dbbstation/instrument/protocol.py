@@ -16,7 +16,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
-from dbbstation.files.schema import Schema
+from dbbstation.files.yaml.schema import Schema
 from dbbstation.instrument.fields import (
     Bit,
     Bytes,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from dbbstation.errors import InstrumentError
-
 Status: TypeAlias = Literal["ok", "overrange", "fault"]
 """`ok`: the length can be trusted. `overrange`: the device says (or its range says) that it cannot. `fault`: no length."""
 
@@ -35,17 +33,3 @@ class Reading:
     counter: int | None = None
     said: str = ""
     remedy: str = ""
-
-    def trusted_mm(self, where: str) -> float:
-        """Return the length in mm where it can be trusted.
-
-        Args:
-            where: port or run, for the message.
-
-        Raises:
-            InstrumentError: the device reports a fault or is out of its range.
-        """
-        if self.status == "ok" and self.length_mm is not None:
-            return self.length_mm
-        kind = "out of range" if self.status == "overrange" else "fault"
-        raise InstrumentError(f"the instrument reports {kind}: {self.said}", where=where, remedy=self.remedy)

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import Effect, Fitted, Motion
-from dbbstation.sources.weights import stated_loads
+from dbbstation.sources.laws.weights import stated_loads
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

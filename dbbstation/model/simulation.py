@@ -1,4 +1,4 @@
-"""What a model predicts that a bar would record: whole turns without noise."""
+"""What a model predicts that a bar would record: whole turns without noise, and the set-up that a plan foresees."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.model.observation import LEAD_IN_STEP_DEG
 from dbbstation.plan.circle import FULL_TURN_DEG
-from dbbstation.sources.contract import Motion
+from dbbstation.sources.contract import Motion, Setup
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from dbbstation.model.machine_model import MachineModel
     from dbbstation.plan.circle import Circle
-    from dbbstation.sources.contract import Setup
+    from dbbstation.plan.plan import PlannedTest
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,3 +74,19 @@ def simulate_circle(
         motion = replace(motion, poses=command(motion))
     theta = np.mod(circle.theta_deg(turn), FULL_TURN_DEG)
     return SimulatedCircle(turn / circle.turning_deg_s, theta, model.bar(motion).length_mm, motion.poses)
+
+
+def setup_of(test: PlannedTest) -> Setup:
+    """Return the set-up that a planned test will have when it is mounted once."""
+    ball = test.ball
+    return Setup(
+        session="",
+        mounting=test.name,
+        ball=ball.name,
+        instrument="",
+        fixed_ball_mm=np.array(ball.centre_mm),
+        mounting_repeatability_mm=ball.repeatability_mm,
+        ball_uncertainty_mm=ball.uncertainty_mm,
+        bar_uncertainty_mm=0.0,
+        plate=ball.plate,
+    )

@@ -130,18 +130,9 @@ class Toolpath:
         """Time at the end of each row, from the start of the program, shape (n,) [s]."""
         return np.cumsum(self.duration_s)
 
-    @cached_property
-    def end_mm(self) -> NDArray[np.float64]:
-        """Way of the tool tip up to the end of each row, shape (n,) [mm]."""
-        return np.cumsum(self.tip_mm)
-
     def at_time(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Commanded poses at times after the start of the program, shape (n, 6); its ends hold beyond them."""
         return self._interpolated(time_s, self.end_s)
-
-    def at_way(self, way_mm: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Commanded poses after the tool tip has gone so far, shape (n, 6); its ends hold beyond them."""
-        return self._interpolated(way_mm, self.end_mm)
 
     def between(self, row: NDArray[np.int64], share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Poses within rows, shape (k, 6): `share` 0 before the row, 1 after it, both of shape (k,)."""

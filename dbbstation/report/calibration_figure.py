@@ -8,13 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle as Ring
 
-from dbbstation.calibration.noise_level import fine_noise_mm
-from dbbstation.calibration.on_the_plate import ball_shifts, circle_tests
-from dbbstation.calibration.residual_map import residual_map
-from dbbstation.calibration.visibility import visibility
+from dbbstation.calibration.checks.noise_level import fine_noise_mm
+from dbbstation.calibration.checks.visibility import visibility
+from dbbstation.calibration.reporting.on_the_plate import ball_shifts, circle_tests
+from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, draw_maps, in_style
-from dbbstation.report.figure_format import FigureFormat, in_format
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
-    from dbbstation.calibration.fit import Calibration
-    from dbbstation.calibration.on_the_plate import BallShift, CircleTest
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.calibration.reporting.on_the_plate import BallShift, CircleTest
 
 WIDTH_IN = 11.0
 COLUMNS = 5
@@ -38,7 +38,7 @@ LONGEST_MM = 60.0
 LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
-def calibration_figure(calibration: Calibration, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
+def calibration_figure(calibration: Calibration, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw circles before and after, residuals, centres and balls on the plate, and leverages, as SVG."""
     with in_style():
         return in_format(draw_calibration(calibration), wanted)

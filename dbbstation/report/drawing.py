@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh
     from numpy.typing import NDArray
 
-    from dbbstation.calibration.residual_map import ResidualMap
+    from dbbstation.calibration.reporting.residual_map import ResidualMap
 
 STYLE: Any = {
     "svg.hashsalt": "dbbstation",

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
-from dbbstation.report.figure_format import FigureFormat, in_format
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +25,7 @@ BINS = 40
 FEWEST_IN_BIN = 3
 
 
-def mismatch_figure(found: Mismatch, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
+def mismatch_figure(found: Mismatch, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw measured less simulated over the variables that lead it, over the rows, and the held-out error of every part."""
     names = [share.variable for share in found.shares[:MOST_VARIABLES]]
     variables = [v for name in names for v in found.settled.channel.variables if v.name == name]

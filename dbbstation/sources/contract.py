@@ -9,7 +9,6 @@ current.
 from __future__ import annotations
 
 import math
-import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
@@ -18,15 +17,18 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from dbbstation.errors import ModelError
+from dbbstation.machine.geometry import STRUTS
 from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
+from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Compliance, Machine
     from dbbstation.plan.plan import Plate
+    from dbbstation.trace.columns import Logged
 
 
 class Owner(StrEnum):
@@ -123,7 +125,7 @@ class Setup:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(WithLogged):
     """A whole run as commanded, in time order, with what was logged beside it.
 
     Rows before `kept` are the way there: they give backlash, lag and friction their history and are not
@@ -134,10 +136,8 @@ class Motion:
         is_path: the rows follow each other on one path; otherwise they are poses without a history.
         kept: the rows that count.
         time_s: since the session's first sample, shape (n,) [s]; None where unknown.
-        temperature_degc: logged temperatures by column name without its unit (`bar`, `jig`, `machine`,
-            `strut1` ...), each of shape (n,) [degC].
-        motor_current_a: logged motor currents, shape (n, 6) [A], NaN for a motor that was not logged; None where
-            none was.
+        logged: what was logged beside the bar, by the name of its column, shape (n,) each; `temperature_degc` and
+            `motor_current_a` give it by sensor and motor.
         load_n: axial forces that the motors hold, positive where the platform pulls, shape (n, 6) [N]; None: those of
             the machine file's weights at the commanded poses.
         setup: None for poses that nobody measured.
@@ -152,8 +152,7 @@ class Motion:
     is_path: bool = False
     kept: slice = field(default_factory=lambda: slice(None))
     time_s: NDArray[np.float64] | None = None
-    temperature_degc: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    motor_current_a: NDArray[np.float64] | None = None
+    logged: Logged = field(default_factory=dict)
     load_n: NDArray[np.float64] | None = None
     setup: Setup | None = None
     reading_mm: NDArray[np.float64] | None = None
@@ -194,8 +193,10 @@ class Parameter:
         newer: True for one that the source had not always: models written before lack it, and it is zero there.
         positive: True for what cannot be negative, such as a compliance or a friction: where a fit says so beyond its
             uncertainty, something else is at work.
+        listed: True where only the values of `shape` are possible and nothing between them, as of a part that is bought.
         part: amplitudes with one label may be wrong alone, such as those of one order of a ball's form; empty for those of a
-            strut, which its name says, and for a source that has no parts.
+            strut, and for a source that has no parts.
+        strut: strut that it is of, 1 to 6; the amplitudes of one strut may be wrong alone. None where it is of none.
     """
 
     name: str
@@ -206,7 +207,9 @@ class Parameter:
     tolerance: float | None = None
     newer: bool = False
     positive: bool = False
+    listed: bool = False
     part: str = ""
+    strut: int | None = None
 
     @property
     def alone_with(self) -> str:
@@ -218,11 +221,23 @@ class Parameter:
         """Greatest size of a value that a model may have, in the parameter's unit."""
         return max(BEYOND_PLAUSIBLE * self.plausible, *(10.0 * abs(value) for value in self.shape), 0.0)
 
-    @property
-    def strut(self) -> int | None:
-        """Strut that it is of, 1 to 6, as `strut_3_um` and `joint_3_x_mm` say; None where it is of none."""
-        named = re.match(r"(?:strut|joint)_([1-6])_", self.name)
-        return int(named.group(1)) if named else None
+
+def of_each_strut(
+    name: str, unit: str, plausible: float, meaning: str, *, positive: bool = False
+) -> tuple[Parameter, ...]:
+    """Return one amplitude for each strut.
+
+    Args:
+        name: of the parameter; `{}` stands for the strut, 1 to 6.
+        unit: as printed.
+        plausible: usual size, one standard deviation, in that unit.
+        meaning: one line with the sign; `{}` stands for the strut.
+        positive: True for what cannot be negative.
+    """
+    return tuple(
+        Parameter(name.format(k), unit, plausible, meaning.format(k), positive=positive, strut=k)
+        for k in range(1, STRUTS + 1)
+    )
 
 
 @dataclass(frozen=True)
@@ -342,6 +357,13 @@ class ErrorSource(ABC):
         A stated size makes the set a random effect of the fit.
         """
         return None
+
+    def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:  # noqa: ARG002
+        """Whether runs can show the effect at values of its parameters of shape, shape (s,).
+
+        False where they show only a part of it that anything may look like: a diagnosis must not look for it there.
+        """
+        return True
 
     def by_temperature(self) -> ErrorSource | None:
         """Return the same cause in the form that follows logged temperatures; None where it knows none.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.bar_reach import unlike_bar
-from dbbstation.files.session_writer import SessionDetails
+from dbbstation.files.recordings.bar_reach import unlike_bar
+from dbbstation.files.recordings.session_writer import SessionDetails
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.opening import last_end, open_session
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from dbbstation.files.plan_file import InlinePlan
-    from dbbstation.files.session_writer import SessionWriter
+    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
     from dbbstation.station.engine import ReadingSource
@@ -82,8 +82,11 @@ class Workplace:
     _storage: Storage
 
     def close(self) -> None:
-        """Bring everything to disk."""
-        self._storage.close()
+        """Bring everything to disk, and let others write into the session."""
+        try:
+            self._storage.close()
+        finally:
+            self.writer.close()
 
 
 def assemble(job: Job, source: ReadingSource) -> Workplace:
@@ -104,4 +107,5 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     station = Station(Sequencer(plan, schedule, programs=names, patience=job.patience), source)
     storage = Storage(writer, time_of_day(job.clock, last_end(writer.session)), kept)
     station.subscribe(storage)
+    station.regularly(storage.sync_if_due)
     return Workplace(station, schedule, writer, storage)

@@ -6,17 +6,17 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.machine_file import machine_data, machine_parts
-from dbbstation.files.plan_file import plan_data, read_inline_plan
-from dbbstation.files.session import RunState
-from dbbstation.files.session_writer import SessionWriter
+from dbbstation.files.formats.machine import machine_data, machine_parts
+from dbbstation.files.formats.plan import plan_data, read_inline_plan
+from dbbstation.files.recordings.session import RunState
+from dbbstation.files.recordings.session_writer import SessionWriter
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dbbstation.files.plan_file import InlinePlan
-    from dbbstation.files.session import SessionFolder
-    from dbbstation.files.session_writer import SessionDetails
+    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.files.recordings.session_writer import SessionDetails
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
 
@@ -57,7 +57,11 @@ def open_session(
     if not (folder / "session.yaml").is_file():
         return SessionWriter.create(folder, machine, plan, details)
     writer = SessionWriter.open(folder)
-    check_session(folder, machine, plan, with_programs=with_programs, session=writer.session)
+    try:
+        check_session(folder, machine, plan, with_programs=with_programs, session=writer.session)
+    except InputError:
+        writer.close()
+        raise
     return writer
 
 

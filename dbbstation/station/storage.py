@@ -11,9 +11,9 @@ from dbbstation.station import events
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from dbbstation.files.journal import RunWriter
-    from dbbstation.files.session import Program, RunEntry
-    from dbbstation.files.session_writer import SessionWriter
+    from dbbstation.files.recordings.journal import RunWriter
+    from dbbstation.files.recordings.session import Program, RunEntry
+    from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.plan.circle import Direction
 
 COLUMNS = ("t_s", "length_mm", "status")
@@ -63,6 +63,15 @@ class Storage:
                 self.close()
             case _:
                 pass
+
+    def sync_if_due(self) -> None:
+        """Bring to disk what has waited for a second, also while no readings come.
+
+        Raises:
+            OutputError: the disk refuses.
+        """
+        if self._journal is not None:
+            self._journal.sync_if_due()
 
     def close(self) -> None:
         """Bring a run that goes on to disk as far as it came; its file stays a `.part`."""

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from dbbstation.sources.causes.tool_ball_offset import ToolBallOffset
 from dbbstation.sources.contract import Fitted, Motion, Owner, SetUpErrors
 from dbbstation.sources.registry import sources_named
-from dbbstation.sources.tool_ball_offset import ToolBallOffset
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

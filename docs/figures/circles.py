@@ -19,7 +19,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib import pyplot as plt
 
-from dbbstation.calibration.fit import calibrate
+from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.model.compensation import compensated
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Motion

@@ -13,7 +13,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from dbbstation.calibration.fit import calibrate
+from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.diagnosed import diagnose_sessions
 from dbbstation.recorded import load_sessions
 from dbbstation.report.calibration_figure import calibration_figure

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.cli.demo import _print
 from dbbstation.cli.figures import G_LOW_PASSED, G_WITH_NOISE
-from dbbstation.studies.demo import DemoResult, _side_by_side
+from dbbstation.demo import DemoResult, _side_by_side
 
 NOISE_UM = 0.3
 """Of one reading of the bar in the recorded sessions."""

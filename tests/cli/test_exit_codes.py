@@ -139,7 +139,7 @@ def test_an_interrupt_leaves_no_half_result(run, monkeypatch, tmp_path, fifteen)
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dbbstation.calibration.fit.linearise", interrupted)
+    monkeypatch.setattr("dbbstation.calibration.fit.calibrate.linearise", interrupted)
     outcome = run("calibrate", fifteen, "--out", tmp_path / "model.yaml")
     assert (outcome.code, outcome.out) == (FAILED, "")
     assert outcome.err.strip() == "interrupted; what was written before stays"

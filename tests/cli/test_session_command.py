@@ -12,8 +12,8 @@ import pytest
 
 from dbbstation.cli import main
 from dbbstation.errors import InputError
-from dbbstation.files.sealing import sealing
-from dbbstation.files.session import RunState, read_session
+from dbbstation.files.recordings.sealing import sealing
+from dbbstation.files.recordings.session import RunState, read_session
 from tests.plant.session import record
 
 

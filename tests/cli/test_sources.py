@@ -7,7 +7,7 @@ import json
 import pytest
 
 from dbbstation.cli import main
-from dbbstation.files.machine_file import read_machine
+from dbbstation.files.formats.machine import read_machine
 from dbbstation.sources.registry import known_sources
 from tests.station.bench import MACHINE_FILE
 

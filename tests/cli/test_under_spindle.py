@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import DONE
-from dbbstation.files.machine_file import read_machine
-from dbbstation.files.models import write_model
-from dbbstation.files.session import read_session
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.model import write_model
+from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel

@@ -89,6 +89,13 @@ def test_it_knows_its_instruments(installed, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_it_says_where_the_studies_are(installed, tmp_path):
+    done = run(installed, tmp_path, "dbbstation", "study", "coverage")
+    assert done.returncode == 1
+    said = "study coverage: the studies are not part of the installed package; "
+    assert done.stderr == f"{said}get the source of dbbstation and run there: python3 dev.py run study coverage\n"
+
+
 def test_it_calibrates(installed, tmp_path):
     small = CHECKOUT / "fixtures" / "sessions" / "small"
     done = run(installed, tmp_path, "dbbstation", "calibrate", small, "--out", "model.yaml")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from dbbstation.calibration.fit import calibrate, default_sources
-from dbbstation.calibration.missing_physics import misfit_of
+from dbbstation.calibration.checks.missing_physics import misfit_of
+from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.findings import Diagnosis, SourceFinding, Unexplained, Verdict
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.inference.held_out import HeldOut
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named
-from dbbstation.studies.virtual_session import draw_session
 from dbbstation.virtual.truth import random_kinematics
+from studies.virtual_session import draw_session
 
 PLAY_UM, DRIFT_UM, CONSTANT_S = 4.0, 3.0, 1800.0
 

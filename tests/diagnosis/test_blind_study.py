@@ -10,8 +10,8 @@ import pytest
 
 from dbbstation.diagnosed import default_candidates
 from dbbstation.sources.registry import known_sources
-from dbbstation.studies.blind import judge_sessions, read_answers
-from dbbstation.studies.blind_score import numbers, score
+from studies.blind import judge_sessions, read_answers
+from studies.blind_score import numbers, score
 from tests.plant.blind.sessions import make_study
 
 SMALL = {"clean": 1, "single": 3, "concealed": 1}
@@ -20,7 +20,10 @@ LARGER = {"clean": 3, "single": 6, "pair": 1, "outside": 1, "concealed": 1}
 
 @pytest.fixture(
     scope="module",
-    params=[(SMALL, 2027), pytest.param((LARGER, 2026), marks=pytest.mark.nightly)],
+    params=[
+        pytest.param((SMALL, 2027), marks=pytest.mark.slow),
+        pytest.param((LARGER, 2026), marks=pytest.mark.nightly),
+    ],
     ids=["small", "larger"],
 )
 def study(request, tmp_path_factory):

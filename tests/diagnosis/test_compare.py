@@ -11,7 +11,7 @@ from scipy.stats import binom
 from dbbstation.diagnosis.compare import SIGNIFICANT, compare
 from dbbstation.diagnosis.compare_pairs import at_common_angles, match
 from dbbstation.errors import TraceError
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.observation import Observation
 from dbbstation.plan.circle import Direction

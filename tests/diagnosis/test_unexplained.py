@@ -14,7 +14,7 @@ from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.summary import diagnosis_summary
 from dbbstation.diagnosis.unexplained_model import keep_unexplained
 from dbbstation.errors import ModelError
-from dbbstation.files.models import read_model, write_model
+from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.model.compensation import compensated
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.recorded import load_sessions

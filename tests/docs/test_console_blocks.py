@@ -21,7 +21,7 @@ DOCUMENTS = ["README.md", *sorted(str(path.relative_to(HERE)) for path in (HERE 
 ANYTHING = "…"
 
 EXEMPT = {
-    ("README.md", "dbbstation demo"): "measures thirty circles twice, a minute or two; see tests/studies/test_demo.py",
+    ("README.md", "dbbstation demo"): "measures thirty circles twice, a minute or two; see tests/test_demo.py",
     ("README.md", "dbbstation diagnose measured"): "the session of the demonstration, which takes a minute to record",
     ("docs/calibration.md", "dbbstation calibrate standard-test"): "thirty circles that are in no repository",
     ("docs/compare.md", "dbbstation compare before after"): "two sessions of thirty circles, a minute to record",

@@ -8,7 +8,7 @@ import textwrap
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.machine_file import read_machine
+from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.own_sources import every_source, sources_of
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.sources.contract import Owner
@@ -155,8 +155,8 @@ def test_a_name_that_is_taken(tmp_path):
         ('"The scale of a strut is bowed."', '" "', "its texts say nothing under what"),
         ("    belongs_to", '    needs = {"pose"}\n    belongs_to', "its `needs` must be a frozenset of Need"),
         ("detail_mm = SMOOTH_MM", "detail_mm = 0", "its `detail_mm` must be a length above zero"),
-        ("50.0, f", "0.0, f", "its parameter strut_1_um needs a plausible size above zero"),
-        ("{i + 1}_um", "um", "two of its parameters are called strut_um"),
+        ("50.0, ", "0.0, ", "its parameter strut_1_um needs a plausible size above zero"),
+        ("strut_{}_um", "strut_um", "two of its parameters are called strut_um"),
         ("strut_mm=1e-3", "tool_tip_mm=1e-3", "tool_tip_mm of its derivative has the shape (181, 6, 6), not (3, 6)"),
         (" * np.eye(STRUTS))", ")", "strut_mm of its derivative has the shape (181, 6, 1), not (6, 6) or (181, 6, 6)"),
         ("1e-3 * place", "np.nan * place", "strut_mm of its derivative is not a number somewhere"),
@@ -227,4 +227,4 @@ def test_a_second_form_belongs_to_its_source(tmp_path, label, fault):
     assert every["scale-bow"].by_temperature().varies_with == "temperature"
 
 
-IMPORTS = "from dbbstation.sources.contract import Need  # noqa\nfrom dbbstation.sources.contract import "
+IMPORTS = "from dbbstation.sources.contract import Need, Parameter  # noqa\nfrom dbbstation.sources.contract import "

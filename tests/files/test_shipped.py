@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.shipped import checkout, shipped_folder
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -18,6 +18,7 @@ CHECKOUT = Path(__file__).parents[2]
 def test_from_a_checkout() -> None:
     assert shipped_folder("protocols") == CHECKOUT / "protocols"
     assert shipped_folder("fixtures") == CHECKOUT / "fixtures"
+    assert checkout() == CHECKOUT
     with pytest.raises(InputError, match="this folder of the installation is missing; install dbbstation again"):
         shipped_folder("nothing")
 
@@ -37,7 +38,7 @@ def test_from_a_wheel(tmp_path: Path) -> None:
     assert not [name for name in names if "/sessions/" in name]
     assert size < 500_000
     program = (
-        "from dbbstation.files.shipped import shipped_folder\nfrom dbbstation.files.plan_file import read_plan\n"
+        "from dbbstation.files.shipped import shipped_folder\nfrom dbbstation.files.formats.plan import read_plan\n"
         "print(shipped_folder('protocols'))\nprint(len(read_plan(shipped_folder('protocols') / 'plans/table2.yaml').tests))\n"
         "print(len(read_plan(shipped_folder('fixtures') / 'plans/every-key.yaml').tests))\n"
     )

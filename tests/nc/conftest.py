@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.machine.geometry import Machine
 from dbbstation.model.machine_model import MachineModel

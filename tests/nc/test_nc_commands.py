@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from dbbstation.cli.compensate import compensate
 from dbbstation.cli.program import program
 from dbbstation.errors import InputError, ModelError, OutputError, StationError, TravelError
-from dbbstation.files.models import write_model
+from dbbstation.files.formats.model import write_model
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 

@@ -37,17 +37,16 @@ def path():
 
 def test_times_and_ways(path):
     np.testing.assert_allclose(path.duration_s, [0.0, 0.0, 1.0, 2.0, 1.0, 60.0 * 50.0 / RAPID_MM_MIN])
-    np.testing.assert_allclose(path.end_mm, [0, 0, 50, 50, 50, 100])
+    np.testing.assert_allclose(np.cumsum(path.tip_mm), [0, 0, 50, 50, 50, 100])
     np.testing.assert_array_equal(np.isnan(path.poses[:, 0]), [True, False, False, False, False, False])
 
 
-def test_samples_by_time_and_by_way(path):
+def test_samples_by_time(path):
     times = path.at_time(np.array([-1.0, 0.5, 1.0, 2.5, 3.5, 99.0]))
     np.testing.assert_allclose(
         times,
         [HOME, moved(X=15, Y=20), *[moved(X=30, Y=40)] * 2, moved(X=30, Y=40, A=3), moved(X=30, Y=40, A=6, Z=50)],
     )
-    np.testing.assert_allclose(path.at_way(np.array([25.0, 75.0]))[:, :3], [[15, 20, -1000], [30, 40, -975]])
 
 
 def test_the_first_move_from_a_known_place_has_a_way():

@@ -8,13 +8,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from dbbstation.calibration.fit import calibrate
-from dbbstation.files.plan_file import read_plan
+from dbbstation.calibration.fit.calibrate import calibrate
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.report.calibration_figure import _round, calibration_figure
-from dbbstation.studies.virtual_session import draw_session
 from dbbstation.virtual.truth import random_kinematics
+from studies.virtual_session import draw_session
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields, replace
 
 import numpy as np
@@ -18,8 +19,8 @@ SOURCES += [form for source in SOURCES if (form := source.by_temperature()) is n
 WITHOUT = {
     Need.PATH: {"is_path": False},
     Need.TIME: {"time_s": None},
-    Need.TEMPERATURE: {"temperature_degc": {}},
-    Need.CURRENT: {"motor_current_a": None},
+    Need.TEMPERATURE: {"logged": {}},
+    Need.CURRENT: {"logged": {}},
     Need.READING: {"reading_mm": None},
 }
 
@@ -91,6 +92,8 @@ def test_parameters_and_texts_are_complete(source, machine):
         assert parameter.name.endswith(f"_{unit}")
         assert parameter.plausible > 0
         assert len(parameter.meaning.split()) > 3
+        named = re.match(r"(?:strut|joint)_([1-6])_", parameter.name)
+        assert parameter.strut == (int(named[1]) if named else None)
         assert not parameter.shape or min(parameter.shape) <= parameter.plausible <= max(parameter.shape)
     for f in fields(source.texts):
         assert len(getattr(source.texts, f.name)) > 9, f.name

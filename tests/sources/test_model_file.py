@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.files.machine_file import read_machine
-from dbbstation.files.models import read_model, write_model
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel

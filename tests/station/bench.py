@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.files.machine_file import read_machine
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import at_rate, load_instrument
 from dbbstation.model.machine_model import MachineModel

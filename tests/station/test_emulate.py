@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.files.machine_file import read_machine
-from dbbstation.files.models import write_model
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.model import write_model
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument
 from dbbstation.model.identified import IdentifiedModel

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dbbstation.errors import InstrumentError, OutputError
-from dbbstation.files.machine_file import read_machine
-from dbbstation.files.plan_file import read_inline_plan, read_plan
-from dbbstation.files.run_csv import read_run
-from dbbstation.files.session import read_session
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.plan import read_inline_plan, read_plan
+from dbbstation.files.recordings.run_csv import read_run
+from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import Direction
 from dbbstation.station import events
 from dbbstation.station.assembly import Job, assemble

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dbbstation.errors import InputError, TravelError
-from dbbstation.files.machine_file import read_machine
-from dbbstation.files.plan_file import read_plan
-from dbbstation.files.session import read_session
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.recordings.session import read_session
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, circle_programs
 from dbbstation.nc.registry import dialect_named

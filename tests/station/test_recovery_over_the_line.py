@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.calibration.fit import KINEMATIC_SOURCES, calibrate
+from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, calibrate
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.recorded import load_sessions
 from tests.station.bench import bench

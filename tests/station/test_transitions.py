@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from dbbstation.errors import InstrumentError
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.instrument.reading import Reading
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Quit, Reject, Repeat, Skip, Start

@@ -10,10 +10,10 @@ import pytest
 
 from dbbstation.cli import main
 from dbbstation.errors import InputError
-from dbbstation.studies.blind import judge_sessions, read_answers, verdict_folder
-from dbbstation.studies.blind_figure import reliability_figure
-from dbbstation.studies.blind_reliability import Forecast, reliability
-from dbbstation.studies.blind_score import compare, numbers, score
+from studies.blind import judge_sessions, read_answers, verdict_folder
+from studies.blind_figure import reliability_figure
+from studies.blind_reliability import Forecast, reliability
+from studies.blind_score import compare, numbers, score
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.session import record

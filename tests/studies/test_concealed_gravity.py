@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.studies.concealed_figure import concealed_figure
-from dbbstation.studies.concealed_gravity import concealed_gravity
+from studies.concealed_figure import concealed_figure
+from studies.concealed_gravity import concealed_gravity
 
 
 @pytest.fixture(scope="module")

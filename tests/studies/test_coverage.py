@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.studies.coverage import coverage, wilson
+from studies.coverage import coverage, wilson
 
 
 @pytest.mark.parametrize(("name", "level"), [("table2-elevated", False), ("table2", True)])

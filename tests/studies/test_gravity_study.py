@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 from dbbstation.cli import cli
 from dbbstation.errors import OutputError
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.studies.gravity import (
+from studies.gravity import (
     JOINT,
     POSITION_ONLY,
     PUBLISHED_UM,
@@ -22,7 +22,7 @@ from dbbstation.studies.gravity import (
     WITHOUT,
     gravity_study,
 )
-from dbbstation.studies.gravity_figure import gravity_figure, same_place
+from studies.gravity_figure import gravity_figure, same_place
 
 MACHINES = 4
 

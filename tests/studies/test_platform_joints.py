@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.studies.platform_joints import platform_joints
+from studies.platform_joints import platform_joints
 
 
 @pytest.mark.slow

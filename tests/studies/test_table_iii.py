@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.studies.table_iii import PUBLISHED, table_iii
+from studies.table_iii import PUBLISHED, table_iii
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["rigid", "gravity"])

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.studies.virtual_session import BAR_UNCERTAINTY_MM, draw_session
 from dbbstation.virtual.truth import random_kinematics
+from studies.virtual_session import BAR_UNCERTAINTY_MM, draw_session
 from tests.virtual.brute_force import tool
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import InstrumentError
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.plan import Plan

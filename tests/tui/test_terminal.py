@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dbbstation.files.session import RunState, read_session
+from dbbstation.files.recordings.session import RunState, read_session
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dbbstation.errors import MachineError
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import MachineError
-from dbbstation.files.plan_file import read_plan
+from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import circle_toolpath

@@ -1,0 +1,56 @@
+"""Why a set of tests loses more directions than it should, and which tests would show them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.model.observation import Observation
+
+APART_MM = 20.0
+"""Heights that differ by less are one level [mm]."""
+
+TILTED_DEG = 2.0
+"""Orientations that differ by less are one [deg]."""
+
+
+def gaps(calibration: Calibration) -> tuple[str, ...]:
+    """What is missing in the tests where directions are lost, in words; empty where nothing is.
+
+    The fifteen circles of [CAL Table II] lose one direction, the common height, which raised bars show. One level
+    loses three, one orientation most of the rest.
+    """
+    lost = len(calibration.directions_lost) + len(calibration.directions_regularised)
+    if lost == 0:
+        return ()
+    runs = calibration.observations
+    if any(not run.setup.place_known for run in runs):
+        return ("balls put up under the spindle say nothing of the machine's place and tilt on the table",)
+    found = []
+    if lost > 1 and _spread([run.raw.circle.ball_mm[2] for run in runs]) < APART_MM:
+        found.append("the balls of all tests stand at one height: add tests on a longer holder, at two more levels")
+    if lost > 1 and _tilts(runs) < TILTED_DEG:
+        found.append("all tests have one orientation: add tests with the platform tilted by 10 degrees or more")
+    if lost > 1 and not found:
+        tests = len({(run.setup.session, run.test) for run in runs})
+        found.append(
+            f"{tests} tests lose {lost} directions where the fifteen circles of the jig plan lose one: add places, "
+            "levels and tilts"
+        )
+    if all(run.raw.circle.elevation_deg == 0.0 for run in runs):
+        found.append("no test has a raised bar: five with elevation_deg: 5 show the height of the machine too")
+    return tuple(found)
+
+
+def _spread(values: Sequence[float]) -> float:
+    return float(np.ptp(values))
+
+
+def _tilts(runs: Sequence[Observation]) -> float:
+    """Greatest difference of a tilt angle between tests [deg]."""
+    return float(np.ptp([run.raw.circle.tilt_deg for run in runs], axis=0).max())

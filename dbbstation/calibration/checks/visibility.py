@@ -1,0 +1,179 @@
+"""What the runs of a calibration see of the machine: singular values, weak directions, indices, leverage of tests."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.fit.directions import in_words
+from dbbstation.inference.square_root import complement, spread
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.inference.square_root import Block
+
+WEAKEST = 3
+"""Weak directions that are told."""
+
+STRONGEST = 5
+"""Correlations that are told."""
+
+
+@dataclass(frozen=True)
+class Indices:
+    """Observability indices O1 to O5 of scaled parameters [Sun and Hollerbach, ICRA 2008, eqs 3 to 7].
+
+    With singular values s_1 >= ... >= s_L of the sensitivity of n readings: O1 = (s_1 ... s_L)^(1/L) / sqrt(n),
+    O2 = s_L / s_1, O3 = s_L, O4 = s_L^2 / s_1, O5 = 1 / (1/s_1 + ... + 1/s_L). All grow with what is seen.
+    """
+
+    o1: float
+    o2: float
+    o3: float
+    o4: float
+    o5: float
+
+
+@dataclass(frozen=True)
+class WeakDirection:
+    """A direction that the runs see least of those they see.
+
+    Attributes:
+        text: in words.
+        uncertainty: how far the parameter that it moves most may be off along it, one standard deviation.
+        unit: of that; µm for lengths of the geometry.
+    """
+
+    text: str
+    uncertainty: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Two parameters that the runs hardly tell apart, by source and name."""
+
+    first: str
+    second: str
+    value: float
+
+
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Visibility:
+    """What the circles see of the machine's parameters.
+
+    Attributes:
+        singular: of the readings' sensitivity to parameters in units of their usual size, falling, without those
+            that are lost, shape (L,) [mm].
+        condition: greatest over least of them.
+        indices: O1 to O5 of them.
+        weak: least seen directions, the weakest first.
+        correlations: largest first.
+        leverage: by test, how many parameters' worth of what is known it brings; they add up to the parameters
+            identified, but for what tests share.
+    """
+
+    singular: NDArray[np.float64]
+    condition: float
+    indices: Indices
+    weak: tuple[WeakDirection, ...]
+    correlations: tuple[Correlation, ...]
+    leverage: dict[str, float]
+
+
+def visibility(calibration: Calibration) -> Visibility:
+    """Look at the matrix that a calibration solved."""
+    known = calibration.layout.known
+    fitted = np.flatnonzero(~known.random)
+    scale = known.scale[fitted]
+    whole = spread(calibration.circle_blocks, len(known.random))[:, fitted] * scale
+    free = complement(calibration.solution.held)
+    singular = np.asarray(np.linalg.svd(whole @ free.T, compute_uv=False), dtype=np.float64)
+    singular = singular[singular > ROUNDING * singular[0]]  # circles see nothing of what moves currents only
+    readings = sum(block.count for block in calibration.circle_blocks)
+    return Visibility(
+        singular=singular,
+        condition=float(singular[0] / singular[-1]),
+        indices=indices(singular, readings),
+        weak=_weakest(calibration),
+        correlations=_correlations(calibration),
+        leverage=_leverage(calibration, fitted),
+    )
+
+
+def indices(singular: NDArray[np.float64], readings: int) -> Indices:
+    """O1 to O5 of singular values, falling and positive, shape (L,)."""
+    greatest, least = float(singular[0]), float(singular[-1])
+    return Indices(
+        o1=float(np.exp(np.mean(np.log(singular)))) / float(np.sqrt(readings)),
+        o2=least / greatest,
+        o3=least,
+        o4=least**2 / greatest,
+        o5=1.0 / float(np.sum(1.0 / singular)),
+    )
+
+
+def _weakest(calibration: Calibration) -> tuple[WeakDirection, ...]:
+    """Directions of greatest uncertainty, from the covariance of the fitted columns in units of their sizes."""
+    known = calibration.layout.known
+    fitted = np.flatnonzero(~known.random)
+    scale = known.scale[fitted]
+    scaled = calibration.solution.covariance[np.ix_(fitted, fitted)] / np.outer(scale, scale)
+    variance, axes = np.linalg.eigh(scaled)
+    units = [parameter.unit for term in calibration.layout.terms for parameter in term.parameters]
+    found = []
+    for k in range(len(fitted) - 1, len(fitted) - 1 - min(WEAKEST, calibration.parameters_identified), -1):
+        moved = scale * axes[:, k]
+        # Among parameters of several units, the one that moves most in units of its usual size.
+        most = int(np.argmax(np.abs(axes[:, k])))
+        size, unit = float(np.sqrt(variance[k]) * np.abs(moved[most])), units[fitted[most]]
+        size, unit = (1e3 * size, "µm") if unit == "mm" else (size, unit)
+        found.append(WeakDirection(in_words(calibration.layout, axes[None, :, k])[0], size, unit))
+    return tuple(found)
+
+
+def _correlations(calibration: Calibration) -> tuple[Correlation, ...]:
+    fitted = np.flatnonzero(~calibration.layout.known.random)
+    covariance = calibration.solution.covariance[np.ix_(fitted, fitted)]
+    sigma = np.sqrt(np.diag(covariance))
+    fitted, covariance, sigma = fitted[sigma > 0.0], covariance[np.ix_(sigma > 0.0, sigma > 0.0)], sigma[sigma > 0.0]
+    names = [f"{source} {parameter}" for source, _, parameter in calibration.layout.names]
+    value = covariance / np.outer(sigma, sigma)
+    first, second = np.triu_indices(len(fitted), 1)
+    order = np.argsort(-np.abs(value[first, second]))[:STRONGEST]
+    return tuple(
+        Correlation(names[fitted[i]], names[fitted[j]], float(value[i, j]))
+        for i, j in zip(first[order], second[order], strict=True)
+    )
+
+
+def _leverage(calibration: Calibration, fitted: NDArray[np.int64]) -> dict[str, float]:
+    """Trace of covariance times a test's own information, its own random effects averaged over.
+
+    Measures what the solution would lose to first order without the test, in parameters. Effects that tests share,
+    such as the bar's length, are unknowns like the fitted ones here.
+    """
+    known, noise = calibration.layout.known, calibration.noise.effective
+    tests: dict[str, list[Block]] = {}
+    for observation, block in zip(calibration.observations, calibration.circle_blocks, strict=True):
+        tests.setdefault(observation.test, []).append(block)
+    touched = {test: np.unique(np.concatenate([block.columns for block in blocks])) for test, blocks in tests.items()}
+    times = np.bincount(np.concatenate(list(touched.values())), minlength=len(known.random))
+    common = np.concatenate([fitted, np.flatnonzero(known.random & (times > 1))])
+    covariance = calibration.solution.covariance[np.ix_(common, common)]
+    worth: dict[str, float] = {}
+    for test, blocks in tests.items():
+        own = np.setdiff1d(touched[test], common)
+        priors = np.hstack([np.diag(1.0 / known.prior[own]), np.zeros((len(own), len(common)))])
+        rows = spread(blocks, len(known.random))[:, np.concatenate([own, common])] / noise
+        triangle = np.asarray(np.linalg.qr(np.vstack([priors, rows]), mode="r"), dtype=np.float64)
+        root = triangle[len(own) :, len(own) :]
+        worth[test] = float(np.sum((root @ covariance) * root))
+    return worth

@@ -1,0 +1,204 @@
+"""Motor currents as a second channel of a fit: load profiles of the struts beside the circles [GRAV 3.2].
+
+Each motor is an instrument of its own, with its own noise. Its samples are compressed to blocks beside those of the bar,
+so that one solution weighs circles and currents against each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.currents.readings import FEWEST, cleaned, one_way
+from dbbstation.errors import CalibrationError
+from dbbstation.inference.noise import Noise, noise_of
+from dbbstation.inference.square_root import Block, Columns, Solution, compress, lost_directions, solve
+from dbbstation.machine.compiled import in_parallel
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.model.motors import motor_currents
+from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN, PER_MOTOR, driven_directions
+from dbbstation.trace.average import averaged
+from dbbstation.trace.columns import currents
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.layout import Layout
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import Motion
+
+MOST_STEPS = 20
+SETTLED_SIGMA = 1e-2
+"""Share of its standard deviation by which the last step of the currents alone may still move a parameter."""
+
+SECTORS = 1440
+"""Of a turn, a quarter of a degree each, over which currents of long runs are averaged: on the way loads change by a
+thousandth, and friction that turns over does not count anyway."""
+
+LONG = 2
+"""Readings per sector from which a run is long."""
+
+FULLY = 1.0 - 1e-9
+"""Direction of friction that has turned over, but for rounding."""
+
+ROUNDING = 1e-6
+"""Share of a parameter's plausible size that is rounding."""
+
+SMALLEST_NOISE_A = 1e-6
+"""No drive's current is better; keeps noise-free simulations from dividing by zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """Runs with motor currents.
+
+    Attributes:
+        motions: of these runs.
+        current_a: measured, one array of shape (n, 6) per run [A].
+        usable: samples that count, one array of shape (n, 6) per run: logged, not clipped, friction turned over.
+        notes: what was left out and what cannot be told, in words.
+    """
+
+    motions: tuple[Motion, ...]
+    current_a: tuple[NDArray[np.float64], ...]
+    usable: tuple[NDArray[np.bool_], ...]
+    notes: tuple[str, ...]
+
+
+def current_channel(layout: Layout, observations: Sequence[Observation]) -> Channel | None:
+    """Currents of all runs that have them; None for a fit without a source of currents.
+
+    Raises:
+        CalibrationError: no motor has a current that could be used.
+    """
+    if not any(term.source.of_currents for term in layout.terms):
+        return None
+    runs = [run for run in observations if run.raw.motor_current_a is not None]
+    clean, notes = cleaned([run.label for run in runs], [np.asarray(run.raw.motor_current_a) for run in runs])
+    motions = tuple(_motion(run, current) for run, current in zip(runs, clean, strict=True))
+    current = tuple(np.asarray(motion.motor_current_a)[motion.kept] for motion in motions)
+    directions = [driven_directions(motion, layout.machine)[motion.kept] for motion in motions]
+    usable = tuple((np.abs(way) > FULLY) & np.isfinite(values) for way, values in zip(directions, current, strict=True))
+    notes += one_way([way > 0.0 for way in directions], usable)
+    if len(runs) < len(observations):
+        missing = len(observations) - len(runs)
+        notes.insert(0, f"{missing} of {len(observations)} runs have no motor currents: their circles count alone")
+    if not any((np.count_nonzero(rows, axis=0) >= FEWEST).any() for rows in usable):
+        raise CalibrationError(
+            "no motor has a current that could be used: " + "; ".join(notes),
+            remedy="check how currents are logged, or leave drive-friction out and calibrate from circles",
+        )
+    return Channel(motions, current, usable, tuple(notes))
+
+
+def _motion(run: Observation, current_a: NDArray[np.float64]) -> Motion:
+    """Return a run with its currents as cleaned; a long one as means over sectors, in which loads hardly change."""
+    raw = replace(run.raw, logged={**run.raw.logged, **currents(current_a)})
+    if run.commanded is None and len(raw) > LONG * SECTORS:
+        raw = averaged(raw, SECTORS)
+    return replace(run, raw=raw).motion()
+
+
+def current_blocks(layout: Layout, channel: Channel | None, x: NDArray[np.float64]) -> list[Block]:
+    """Compress the currents about the values x, shape (k,), one block per run and motor with the noise found there."""
+    if channel is None:
+        return []
+    blocks, left = linearised(layout, channel, x)
+    noise = motor_noise(left)
+    return [replace(block, noise=_effective(noise[motor])) for motor, block in blocks]
+
+
+def linearised(
+    layout: Layout, channel: Channel, x: NDArray[np.float64]
+) -> tuple[list[tuple[int, Block]], list[list[NDArray[np.float64]]]]:
+    """Blocks with their motors, and per motor what each run leaves [A]."""
+    model = layout.model(x)
+    whole = x - layout.nominal
+
+    def of_run(k: int) -> list[tuple[int, Block, NDArray[np.float64]]]:
+        motion = channel.motions[k]
+        predicted = motor_currents(model, motion)
+        left = channel.current_a[k] - predicted.current_a
+        parts = [
+            (np.r_[term.columns], derivative)
+            for term in layout.terms
+            if (derivative := predicted.by_parameters(term.fitted(x))) is not None
+        ]
+        columns = np.concatenate([own for own, _ in parts])
+        jacobian = np.concatenate([derivative for _, derivative in parts], axis=2)
+        found = []
+        for motor in range(STRUTS):
+            rows = channel.usable[k][:, motor]
+            if np.count_nonzero(rows) >= FEWEST:
+                by_column = jacobian[rows, motor]
+                touched = by_column.any(axis=0)
+                own, J, rest = columns[touched], by_column[:, touched], left[rows, motor]
+                found.append((motor, compress(own, J, rest + J @ whole[own]), rest))
+        return found
+
+    length = sum(map(len, channel.motions)) // len(channel.motions)
+    done = [one for run in in_parallel(of_run, range(len(channel.motions)), length) for one in run]
+    left_by_motor: list[list[NDArray[np.float64]]] = [[] for _ in range(STRUTS)]
+    for motor, _, rest in done:
+        left_by_motor[motor].append(rest)
+    return [(motor, block) for motor, block, _ in done], left_by_motor
+
+
+def motor_noise(left: Sequence[Sequence[NDArray[np.float64]]]) -> list[Noise | None]:
+    """Noise of each motor from what is left of its readings."""
+    return [noise_of(of_motor, len(PER_MOTOR)) if of_motor else None for of_motor in left]
+
+
+def _effective(noise: Noise | None) -> float:
+    return SMALLEST_NOISE_A if noise is None else max(noise.effective, SMALLEST_NOISE_A)
+
+
+def current_start(layout: Layout, channel: Channel | None) -> dict[str, NDArray[np.float64]]:
+    """Values by source name from the currents alone, at the nominal geometry, for the joint fit to start from.
+
+    Gains multiply loads and frictions, so that a fit that began at zero gain would not see them.
+    """
+    if channel is None:
+        return {}
+    x = layout.nominal.copy()
+    for term in layout.terms:
+        if term.source.of_currents:
+            gains = [p.plausible if p.name in MOTOR_OF_GAIN else 0.0 for p in term.parameters]
+            x[term.columns] = gains
+    for _ in range(MOST_STEPS):
+        columns, solution = by_themselves(current_blocks(layout, channel, x), layout.known)
+        step = layout.nominal[columns] + solution.x - x[columns]
+        x[columns] += step
+        sigma = np.sqrt(np.diag(solution.covariance))
+        if np.all(np.abs(step) <= SETTLED_SIGMA * sigma + ROUNDING * layout.known.scale[columns]):
+            break
+    touched = set(columns.tolist())
+    return {term.source.name: x[term.columns] for term in layout.terms if touched & set(np.r_[term.columns].tolist())}
+
+
+def by_themselves(
+    blocks: Sequence[Block], known: Columns, noise: float = 1.0, nominal: Sequence[Block] | None = None
+) -> tuple[NDArray[np.int64], Solution]:
+    """Solve for the columns that some blocks touch, by these blocks alone.
+
+    Args:
+        blocks: of one channel.
+        known: of all columns.
+        noise: of a reading, where blocks do not have their own.
+        nominal: the same blocks where lost directions are looked for, if elsewhere.
+
+    Returns:
+        The columns, shape (c,), and their solution.
+    """
+    columns = np.unique(np.concatenate([block.columns for block in blocks]))
+    part = Columns(known.prior[columns], known.scale[columns], known.random[columns])
+
+    def within(some: Sequence[Block]) -> list[Block]:
+        return [replace(block, columns=np.searchsorted(columns, block.columns)) for block in some]
+
+    held = lost_directions(within(blocks if nominal is None else nominal), part, noise)
+    return columns, solve(within(blocks), part, noise, held)

@@ -1,0 +1,166 @@
+"""What motor currents say in a fit: noise and residual of each motor, and the centre of gravity by channel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.currents.channel import by_themselves, linearised, motor_noise
+from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.currents.channel import Channel
+    from dbbstation.calibration.layout import Layout
+    from dbbstation.inference.noise import Noise
+    from dbbstation.inference.square_root import Block, Solution
+
+OPEN = 0.1
+"""Share of a parameter that may lie in held directions before it counts as left open."""
+
+MORE_THAN_NOISE = 1.2
+"""Residual over fine noise above which something slow must be left."""
+
+SLOW_SAMPLES = 10.0
+"""Correlation in samples from which a residual is slow."""
+
+SURE = 5.0
+"""Standard deviations from which a gain is taken to have a sign."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotorFindings:
+    """What the motor currents say in a fit.
+
+    Attributes:
+        noise: of one reading of each motor, in long runs of the mean over a sector; None for a motor without readings.
+        residual_a: root mean square that the model leaves of each motor's readings [A]; NaN without readings.
+        fine_a: noise of a reading from differences of neighbours, which no slow misfit reaches [A]; NaN without readings.
+        samples: readings of each motor that went in, means of long runs counted once.
+        held: parameters of the drives that the recordings leave open, by their names.
+        alone: centre of gravity by channel (`circles`, `currents`) and parameter, with its standard deviation [mm];
+            None where that channel by itself leaves it open. Empty without the source cog-shift.
+        notes: what was left out and what cannot be told, in words.
+    """
+
+    noise: tuple[Noise | None, ...]
+    residual_a: tuple[float, ...]
+    fine_a: tuple[float, ...]
+    samples: tuple[int, ...]
+    held: frozenset[str]
+    alone: Mapping[str, Mapping[str, tuple[float, float] | None]]
+    notes: tuple[str, ...]
+
+
+def motor_findings(
+    layout: Layout,
+    channel: Channel | None,
+    x: NDArray[np.float64],
+    solution: Solution,
+    blocks: Sequence[Block],
+    nominal: Sequence[Block],
+    noise: Noise,
+) -> MotorFindings | None:
+    """Say what the currents left and what each channel tells by itself.
+
+    Args:
+        layout: of the fit.
+        channel: currents; None for a fit without them.
+        x: values found, shape (k,).
+        solution: of both channels.
+        blocks: of both channels, those of `current_blocks` last.
+        nominal: the same at the nominal geometry.
+        noise: of a bar reading.
+    """
+    if channel is None:
+        return None
+    own, left = linearised(layout, channel, x)
+    circles, currents = len(blocks) - len(own), blocks[len(blocks) - len(own) :]
+    alone = {
+        "circles": by_themselves(blocks[:circles], layout.known, noise.effective, nominal[:circles]),
+        "currents": by_themselves(currents, layout.known),
+    }
+    fitted = np.flatnonzero(~layout.known.random)
+    names = layout.names
+    open_columns = fitted[np.linalg.norm(solution.held, axis=0) > OPEN]
+    held = frozenset(names[column][2] for column in open_columns if names[column][0] in _drives(layout))
+    found = motor_noise(left)
+    residual = tuple(_rms(of_motor) for of_motor in left)
+    fine = tuple(_rms([np.diff(one) for one in of_motor]) / np.sqrt(2.0) for of_motor in left)
+    return MotorFindings(
+        noise=tuple(found),
+        residual_a=residual,
+        fine_a=fine,
+        samples=tuple(sum(map(len, of_motor)) for of_motor in left),
+        held=held,
+        alone=_centre_of_gravity(layout, alone),
+        notes=(*channel.notes, *_doubts(layout, x, solution, held), *_misfits(residual, fine, found)),
+    )
+
+
+def _rms(parts: Sequence[NDArray[np.float64]]) -> float:
+    """Root mean square of all parts; NaN of nothing."""
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2))) if parts else np.nan
+
+
+def _drives(layout: Layout) -> set[str]:
+    return {term.source.name for term in layout.terms if term.source.of_currents}
+
+
+def _centre_of_gravity(
+    layout: Layout, alone: Mapping[str, tuple[NDArray[np.int64], Solution]]
+) -> dict[str, dict[str, tuple[float, float] | None]]:
+    """Each channel's own centre of gravity."""
+    term = next((term for term in layout.terms if term.source.name == "cog-shift"), None)
+    if term is None:
+        return {}
+    said: dict[str, dict[str, tuple[float, float] | None]] = {}
+    for channel, (columns, solution) in alone.items():
+        fitted = np.flatnonzero(~layout.known.random[columns])
+        held = dict(zip(columns[fitted].tolist(), np.linalg.norm(solution.held, axis=0), strict=True))
+        place = {column: k for k, column in enumerate(columns.tolist())}
+        said[channel] = {}
+        for parameter, column in zip(term.parameters, np.r_[term.columns].tolist(), strict=True):
+            told = column in place and held[column] <= OPEN
+            k = place.get(column, 0)
+            sigma = float(np.sqrt(solution.covariance[k, k]))
+            said[channel][parameter.name] = (float(solution.x[k]), sigma) if told else None
+    return said
+
+
+def _doubts(layout: Layout, x: NDArray[np.float64], solution: Solution, held: frozenset[str]) -> list[str]:
+    """Gains that cannot be right."""
+    doubts = []
+    sigma = np.sqrt(np.diag(solution.covariance))
+    for column, (source, _, name) in enumerate(layout.names):
+        if source in _drives(layout) and name in MOTOR_OF_GAIN and name not in held:
+            motor = MOTOR_OF_GAIN[name]
+            if x[column] < -SURE * sigma[column]:
+                doubts.append(f"motor {motor}: its current falls where its load grows; is its sign turned round?")
+            elif x[column] < SURE * sigma[column]:
+                doubts.append(f"motor {motor}: its current does not follow its load; what is said of it says nothing")
+    return doubts
+
+
+def _misfits(residual_a: Sequence[float], fine_a: Sequence[float], noise: Sequence[Noise | None]) -> list[str]:
+    """One text for motors that leave something slow: correlated noise is no misfit unless it lasts long."""
+    lacking = [
+        str(motor + 1)
+        for motor, (left, fine, found) in enumerate(zip(residual_a, fine_a, noise, strict=True))
+        if found is not None and left > MORE_THAN_NOISE * fine and found.correlation_samples > SLOW_SAMPLES
+    ]
+    if not lacking:
+        return []
+    return [_TOO_SLOW.format(motors=f"motor{'s' if len(lacking) > 1 else ''} {', '.join(lacking)}")]
+
+
+_TOO_SLOW = (
+    "{motors}: the currents leave something slow beside noise, so that loads or friction are not as modelled and the "
+    "stated uncertainties too small; are the weights of struts and screws in the machine file (strut_masses), does a hose "
+    "or a counterbalance pull at the platform?"
+)

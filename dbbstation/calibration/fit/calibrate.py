@@ -1,0 +1,428 @@
+"""The fit: Gauss-Newton on exact predictions with analytic sensitivities and random effects [CAL II-D]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.currents.channel import current_blocks, current_channel, current_start
+from dbbstation.calibration.currents.findings import MotorFindings, motor_findings
+from dbbstation.calibration.fit.directions import in_words, of_circles
+from dbbstation.calibration.fit.nodes import Nodes, nodes_of, smooth
+from dbbstation.calibration.fit.prescription import Name, names_of, prescribed
+from dbbstation.calibration.layout import Layout, lay_out
+from dbbstation.errors import CalibrationError
+from dbbstation.inference.noise import Noise, noise_of
+from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve
+from dbbstation.machine.compiled import in_parallel
+from dbbstation.sources.contract import Need, Owner
+from dbbstation.sources.registry import sources_named
+from dbbstation.trace.circle import RawCircle
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource
+
+KINEMATIC_SOURCES = ("strut-reference-length", "base-joints")
+"""The 24 parameters of [CAL II-C]."""
+
+MEASUREMENT_SOURCES = ("mounting", "ball-coordinate", "bar-offset", "run-start")
+"""Random effects that every session has, with the sizes that plan and session state."""
+
+FEWEST_TESTS = 3
+"""Fewer circles leave more directions open than they close."""
+
+MOST_STEPS = 30
+SMALLEST_SHARE = 0.1
+"""Of a step, however much a fit swings."""
+CONVERGED = 1e-6
+"""Share of the columns' plausible sizes by which the last step may still move: a fifth of a nanometre on joints."""
+
+CONVERGED_SIGMA = 1e-3
+"""The same as a share of their standard deviations, for what the runs hardly see."""
+FIRST_NOISE_MM = 1e-3
+
+COARSE_MM = 1.0
+"""What a nominal machine leaves [mm rms] beyond which the fit approaches first. Curvature leaves the square of an error over
+the length of a strut, 1 µm for 1 mm: less than a usual bar's noise below, more than that above. An approach where none is
+needed costs two steps and changes nothing."""
+
+NOISE_STEPS = 12
+"""Steps in which the noise is read anew. What is left to be called noise depends on how it is weighted against what is known
+of balls; where physics is missing the two creep, or run, after each other without an end."""
+
+AT_NODES = frozenset({Need.POSE, Need.TIME})
+"""What a source may need for its effect to be as smooth as the circle; a path's history and logged values are not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What a fit found.
+
+    Attributes:
+        layout: its columns.
+        x: values of all columns, shape (k,).
+        solution: covariance, directions and what was held, of all columns.
+        noise: of one bar reading.
+        observations: the runs that went in.
+        machine_residual_mm: per run, what the machine's own sources leave [mm].
+        residual_mm: per run, what is left after the measurement's effects too [mm].
+        blocks: what the runs say of the columns, about the values found: one for the circle of each run, then those of
+            motor currents.
+        directions_lost: what the recordings could not see, in words.
+        directions_regularised: what they could not see and the machine file's tolerances stand in for, in words.
+        prescribed: parameters that were held at nominal in place of the lost directions; empty where the directions
+            themselves were.
+        currents: what the motor currents say; None where the fit does without them.
+    """
+
+    layout: Layout
+    x: NDArray[np.float64]
+    solution: Solution
+    noise: Noise
+    observations: tuple[Observation, ...]
+    machine_residual_mm: tuple[NDArray[np.float64], ...]
+    residual_mm: tuple[NDArray[np.float64], ...]
+    blocks: tuple[Block, ...]
+    directions_lost: tuple[str, ...]
+    directions_regularised: tuple[str, ...]
+    prescribed: tuple[Name, ...]
+    currents: MotorFindings | None = None
+
+    @property
+    def model(self) -> MachineModel:
+        """Machine model with everything that was fitted."""
+        return self.layout.model(self.x)
+
+    @property
+    def circle_blocks(self) -> tuple[Block, ...]:
+        """What the circles say of the columns, one block for each run."""
+        return self.blocks[: len(self.observations)]
+
+    @property
+    def parameters_identified(self) -> int:
+        """Machine parameters less the directions that were held."""
+        return int(np.count_nonzero(~self.layout.known.random)) - len(self.solution.held)
+
+
+def default_sources() -> tuple[ErrorSource, ...]:
+    """Return the kinematic parameters of the paper and the random effects of every session."""
+    return sources_named(KINEMATIC_SOURCES + MEASUREMENT_SOURCES)
+
+
+def calibrate(
+    machine: Machine,
+    observations: Sequence[Observation],
+    sources: Sequence[ErrorSource] | None = None,
+    start: Mapping[str, NDArray[np.float64]] | None = None,
+    *,
+    prescribe: Sequence[Name] | None = None,
+    shapes_within: float | None = None,
+    amplitudes_within: float = np.inf,
+) -> Calibration:
+    """Fit error sources to raw circles.
+
+    Directions that the runs cannot see are found at the nominal geometry, where they are lost exactly, judged by
+    the noise, and held at nominal. The fit looks for whole values, not for steps, so that nothing walks along a
+    direction that only the curvature of the model makes visible. Where the machine file states tolerances, these are
+    priors, and nothing that they bound is lost.
+
+    Args:
+        machine: nominal machine.
+        observations: raw runs; all share that machine.
+        sources: what to fit; the default sources if None.
+        start: values near the answer by source name, for sources with parameters of shape, which a fit that starts
+            at zero amplitude cannot see.
+        prescribe: parameters to hold at nominal in place of the lost directions, as many as are lost; an empty
+            sequence has them chosen among the base joints; None holds the directions themselves.
+        shapes_within: share of their starting values to which parameters of shape are known; None where they are
+            known to their usual sizes only.
+        amplitudes_within: plausible sizes to which amplitudes of sources with a start are known, one standard deviation.
+
+    Raises:
+        CalibrationError: centred circles, too few tests, parameters that cannot stand in for what is lost, or no
+            convergence.
+        ModelError: a source lacks what it needs.
+    """
+    check_raw(observations)
+    _check_enough(observations)
+    layout = lay_out(machine, default_sources() if sources is None else sources, observations)
+    if start:
+        layout = _near(layout, start, shapes_within, amplitudes_within)
+    channel = current_channel(layout, observations)
+    x = _start_values(layout, {**current_start(layout, channel), **(start or {})})
+    noise = Noise(FIRST_NOISE_MM, 1.0)
+    runs = looked_at(observations, layout.needs)
+    nominal, left = linearise(layout, runs, x)
+    nominal += current_blocks(layout, channel, x)
+    blocks, before, share = nominal, np.zeros_like(x), 1.0
+    if _rms_mm(left) > COARSE_MM:
+        x, blocks = _approached(layout, runs, nominal, left)
+        blocks += current_blocks(layout, channel, x)
+    lost, held = np.zeros((0, 0)), None
+    for steps in range(MOST_STEPS):
+        seen = lost_directions(nominal, layout.known, noise.effective)
+        if len(seen) != len(lost) or held is None:
+            lost = seen
+            held = lost if prescribe is None else prescribed(layout, lost, prescribe)
+        if steps < NOISE_STEPS:
+            solution, noise = _settled(blocks, layout, noise, held)
+        else:
+            solution = solve(blocks, layout.known, noise.effective, held)
+        update = layout.nominal + solution.x
+        sigma = np.sqrt(np.diag(solution.covariance))
+        settled_at = np.maximum(CONVERGED * layout.known.scale, CONVERGED_SIGMA * sigma)
+        step = update - x
+        change = float(np.abs(step / settled_at).max(initial=0.0))
+        share = _share(layout, step, before, share)
+        x = x + share * step
+        before = step
+        if change < 1.0:
+            break
+        blocks, left = linearise(layout, runs, x)
+        blocks += current_blocks(layout, channel, x)
+        if steps < NOISE_STEPS:
+            noise = noise_of(left, solution.freedom_used)
+    else:
+        raise CalibrationError(
+            f"the fit still moves, {change:.2g} times more than it should after {MOST_STEPS} steps",
+            remedy="check that machine, plan and recordings belong together; leave out doubtful tests with --exclude",
+        )
+    return Calibration(
+        layout=layout,
+        x=x,
+        solution=solution,
+        noise=noise,
+        observations=tuple(observations),
+        machine_residual_mm=_residuals(layout.model(x).of_the_machine(), runs),
+        residual_mm=_residuals(layout.model(x), runs),
+        blocks=tuple(blocks),
+        directions_lost=in_words(layout, of_circles(layout, lost)),
+        directions_regularised=in_words(layout, unseen(nominal, layout, noise)),
+        prescribed=() if prescribe is None else names_of(layout, held),
+        currents=motor_findings(layout, channel, x, solution, blocks, nominal, noise),
+    )
+
+
+def _approached(
+    layout: Layout,
+    runs: Sequence[Observation | Nodes],
+    nominal: Sequence[Block],
+    left: Sequence[NDArray[np.float64]],
+) -> tuple[NDArray[np.float64], list[Block]]:
+    """Approach the values of a machine that is millimetres off by Gauss-Newton steps with the noise of a usual bar.
+
+    What the first steps leave is curvature. Taken for noise, it would hide directions that the runs do see; these would
+    be held at nominal, and the curvature would stay. So the noise is read only where steps no longer halve what is left.
+
+    Args:
+        layout: columns of the fit.
+        runs: as the fit looks at them.
+        nominal: blocks at the starting values.
+        left: per run, what the starting values leave, shape (n,) [mm].
+
+    Returns:
+        Values of all columns, shape (k,), and blocks of the circles about them.
+    """
+    noise = Noise(FIRST_NOISE_MM, 1.0).effective
+    held = lost_directions(nominal, layout.known, noise)
+    blocks = list(nominal)
+    for _ in range(MOST_STEPS):
+        before_mm = _rms_mm(left)
+        x = layout.nominal + solve(blocks, layout.known, noise, held).x
+        blocks, left = linearise(layout, runs, x)
+        if _rms_mm(left) > before_mm / 2.0:
+            break
+    return x, blocks
+
+
+def _rms_mm(left: Sequence[NDArray[np.float64]]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+
+
+def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> NDArray[np.float64]:
+    """Orthonormal rows of fitted directions, in units of the scales, of which only priors say anything, shape (r, f)."""
+    known = layout.known
+    if not layout.bounded.any():
+        return np.zeros((0, int(np.count_nonzero(~known.random))))
+    free = replace(known, prior=np.where(layout.bounded, np.inf, known.prior))
+    return lost_directions(blocks, free, noise.effective)
+
+
+def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64], share: float) -> float:
+    """Share of a step to take.
+
+    Gauss-Newton leaves out the curvature that a parameter of shape has while its amplitude is small, so that full
+    steps swing to and fro about the answer. Two steps that differ by the ratio q after a share s was taken say that
+    s / (1 - q) would have hit it (Aitken's rule); the most cautious of these is taken.
+    """
+    shaped = np.array([bool(p.shape) for term in layout.terms for p in term.parameters])
+    now, last = step[shaped], before[shaped]
+    swinging = now * last < 0.0
+    if not swinging.any():
+        return min(1.0, 1.5 * share)
+    ratio = float(np.min(now[swinging] / last[swinging]))
+    return float(np.clip(share / (1.0 - ratio), SMALLEST_SHARE, 1.0))
+
+
+def _near(
+    layout: Layout, start: Mapping[str, NDArray[np.float64]], within: float | None, amplitudes_within: float
+) -> Layout:
+    """Layout whose parameters of shape are nominally those of the start, and known to a share of them.
+
+    Amplitudes are known to so many plausible sizes: what the geometry conceals nearly whole has no other bound.
+    """
+    nominal, prior = layout.nominal.copy(), layout.known.prior.copy()
+    for term in layout.terms:
+        if term.source.name not in start:
+            continue
+        for k, parameter in enumerate(term.parameters):
+            column = term.columns.start + k
+            if not parameter.shape:
+                prior[column] = min(prior[column], amplitudes_within * parameter.plausible)
+            else:
+                nominal[column] = start[term.source.name][k]
+                if parameter.listed:
+                    prior[column] = LISTED_WITHIN * nominal[column]
+                elif within is not None:
+                    prior[column] = within * max(abs(nominal[column]), SMALLEST_SHAPE * parameter.plausible)
+    return replace(layout, nominal=nominal, known=replace(layout.known, prior=prior))
+
+
+LISTED_WITHIN = 1e-3
+"""Share to which a value that is one of a list is known: gratings are made to parts in ten thousand, and warm."""
+
+SMALLEST_SHAPE = 0.1
+"""Of its plausible size: a parameter of shape that starts at less is known to no less than a share of this."""
+
+
+def _start_values(layout: Layout, start: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    x = layout.nominal.copy()
+    for term in layout.terms:
+        if term.source.name in start:
+            x[term.columns] = start[term.source.name]
+    return x
+
+
+def looked_at(observations: Sequence[Observation], needs: frozenset[Need]) -> list[Observation | Nodes]:
+    """Runs as a fit looks at them: through nodes where they are long and sources need no more than pose and time."""
+    if not needs <= AT_NODES:
+        return list(observations)
+    nodes = in_parallel(nodes_of, observations, _usual_length(observations))
+    return [run if seen is None else seen for run, seen in zip(observations, nodes, strict=True)]
+
+
+def linearise(
+    layout: Layout, runs: Sequence[Observation | Nodes], x: NDArray[np.float64]
+) -> tuple[list[Block], list[NDArray[np.float64]]]:
+    """Compress every run about the values x, shape (k,), so that a solution of the blocks is x less its nominal.
+
+    Returns:
+        The blocks, and per run measured minus predicted length at x, shape (n,) [mm].
+    """
+    model = layout.model(x)
+
+    def of_run(run: Observation | Nodes) -> tuple[Block, NDArray[np.float64]]:
+        if isinstance(run, Nodes):
+            columns, jacobian, length = _predicted(layout, model, run.coarse, x)
+            if smooth(jacobian) and smooth(length[:, None] - run.run.raw.circle.bar_mm):
+                block = run.compressed(columns, jacobian, length, (x - layout.nominal)[columns])
+                return block, run.run.raw.length_mm - run.samples_of(length)
+            run = run.run
+        columns, jacobian, length = _predicted(layout, model, run, x)
+        left = run.raw.length_mm - length
+        return compress(columns, jacobian, left + jacobian @ (x - layout.nominal)[columns]), left
+
+    done = in_parallel(of_run, runs, _usual_length(runs))
+    return [block for block, _ in done], [left for _, left in done]
+
+
+def _predicted(
+    layout: Layout, model: MachineModel, observation: Observation, x: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Columns that act on a run, shape (k,), their derivatives, shape (n, k), and the reading, shape (n,) [mm]."""
+    motion = observation.motion()
+    reading = model.bar(motion)
+    terms = [term for term in layout.terms if term.acts_on(motion)]
+    jacobian = np.hstack([np.zeros((len(observation.raw), 0))] + [reading.by_fitted(term.fitted(x)) for term in terms])
+    return np.concatenate([np.r_[term.columns] for term in terms]), jacobian, reading.length_mm
+
+
+def _settled(
+    blocks: Sequence[Block], layout: Layout, noise: Noise, held: NDArray[np.float64]
+) -> tuple[Solution, Noise]:
+    """Solve with the noise that the solution itself leaves: three rounds settle it to a per mille."""
+    count = sum(block.count for block in blocks if block.noise is None)
+    sigma = noise.sigma
+    for _ in range(3):
+        solution = solve(blocks, layout.known, sigma * np.sqrt(noise.correlation_samples), held)
+        square = (solution.chi2 - solution.stated_chi2) * sigma**2 * noise.correlation_samples
+        sigma = float(np.sqrt(max(square, 0.0) / max(count - solution.freedom_used, 1.0)))
+        sigma = max(sigma, SMALLEST_NOISE_MM)
+    return solution, Noise(sigma, noise.correlation_samples)
+
+
+SMALLEST_NOISE_MM = 1e-7
+"""No bar is better; keeps noise-free simulations from dividing by zero."""
+
+
+def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple[NDArray[np.float64], ...]:
+    """Measured minus predicted length of every run, shape (n,) each [mm]."""
+    needs = frozenset[Need]().union(*(f.source.needs for f in model.sources if not f.source.of_currents))
+    return _residuals(model, looked_at(observations, needs))
+
+
+def _residuals(model: MachineModel, runs: Sequence[Observation | Nodes]) -> tuple[NDArray[np.float64], ...]:
+    def of_run(run: Observation | Nodes) -> NDArray[np.float64]:
+        if isinstance(run, Nodes):
+            length = model.bar(run.coarse.motion()).length_mm
+            if smooth(length[:, None] - run.run.raw.circle.bar_mm):
+                return run.run.raw.length_mm - run.samples_of(length)
+            run = run.run
+        return run.raw.length_mm - model.bar(run.motion()).length_mm
+
+    return tuple(in_parallel(of_run, runs, _usual_length(runs)))
+
+
+def _usual_length(runs: Sequence[Observation | Nodes]) -> int:
+    """Poses of a run at which a model is asked, on average."""
+    poses = sum(len((run.coarse if isinstance(run, Nodes) else run).raw) for run in runs)
+    return poses // max(len(runs), 1)
+
+
+def check_raw(observations: Sequence[Observation]) -> None:
+    """Refuse anything but raw circles: a removed centre is the machine's position error [CAL III-A].
+
+    Raises:
+        CalibrationError: names the test of the first other one.
+    """
+    for observation in observations:
+        if not isinstance(observation.raw, RawCircle):
+            raise CalibrationError(
+                "is a centred circle: its position on the machine is gone",
+                where=observation.test,
+                remedy="calibrate from the raw recording",
+            )
+
+
+def _check_enough(observations: Sequence[Observation]) -> None:
+    tests = {(o.setup.session, o.test) for o in observations}
+    if len(tests) < FEWEST_TESTS:
+        raise CalibrationError(
+            f"{len(tests)} test{'s' if len(tests) != 1 else ''} cannot calibrate a machine: at least {FEWEST_TESTS} at "
+            "different places are needed, and the fifteen of the jig plan to see all it can",
+            remedy="measure more tests, or evaluate these under an existing model",
+        )
+
+
+def machine_sources(sources: Sequence[ErrorSource]) -> tuple[ErrorSource, ...]:
+    """Those that belong to the machine and show in circles."""
+    return tuple(source for source in sources if source.belongs_to is Owner.MACHINE and not source.of_currents)

@@ -1,0 +1,137 @@
+"""The paper's three ways to calibrate [CAL IV]: one solver, fed with different knowledge of where balls stand.
+
+`jig`: a coordinate measuring machine knows every ball in the machine's coordinates.
+`conv-a`: the standard circular test; nobody knows where the ball stands, the centre of each circle says nothing.
+`conv-b`: as before, but a micrometer read how far the ball stands from the tool tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.fit.calibrate import check_raw
+from dbbstation.errors import CalibrationError
+from dbbstation.machine.rotation import Frames
+from dbbstation.trace.analysis import figures
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.observation import Observation
+
+BY_HAND_MM = 0.3
+"""How far from the tool tip a ball stands that was put up under the spindle by hand and not measured, one standard
+deviation per axis: hundreds of times what circles tell, so that nothing is learnt from it [mm]."""
+
+CENTRED_MM = 2e-5
+"""Centres this near the fixed ball cannot have been measured, however well balls stand [mm]."""
+
+CENTRED_SHARE = 0.3
+"""Of the stated scatter of mountings and CMM: thirty coordinates that scatter by less have a chance of 1e-12. What
+centre compensation leaves, the square of the centre over the radius, is less."""
+
+LEAST_CIRCULARITY_UM = 0.5
+"""A circle that is truer than this may well stand where it should: a simulation of a nominal machine [µm]."""
+
+
+HEIGHT_MM = 0.02
+"""The same for the height about which a level bar turns. A tenth of a millimetre changes its reading by 0.03 µm; left
+free, such heights would only trade with the tilt of circles in second order [mm]."""
+
+
+class Method(StrEnum):
+    """How the places of balls are known."""
+
+    JIG = "jig"
+    CONV_A = "conv-a"
+    CONV_B = "conv-b"
+
+
+def as_known(method: Method, machine: Machine, observations: Sequence[Observation]) -> list[Observation]:
+    """Runs with what a method knows of their balls.
+
+    Args:
+        method: one of the paper's three.
+        machine: nominal machine.
+        observations: raw runs; the conventional methods take runs about the balls of a jig too, and forget where those
+            stand.
+
+    Returns:
+        The runs, their set-ups changed to what the method knows.
+
+    Raises:
+        CalibrationError: a ball whose place the method needs and nobody knows; centred circles.
+    """
+    check_raw(observations)
+    if method is Method.JIG:
+        _check_places(observations)
+        _check_not_centred(observations)
+        return list(observations)
+    if method is Method.CONV_B:
+        _check_read(observations)
+        _check_not_centred(observations)
+        return [_under_spindle(observation, machine) for observation in observations]
+    forgotten = [replace(o, setup=replace(o.setup, set_up_errors=None)) for o in observations]
+    return [_under_spindle(observation, machine) for observation in forgotten]
+
+
+def _under_spindle(observation: Observation, machine: Machine) -> Observation:
+    """The run with its ball at the tool tip, as well as hand or micrometer had it there."""
+    raised = observation.raw.circle.elevation_deg != 0.0
+    unknown = np.array([BY_HAND_MM, BY_HAND_MM, BY_HAND_MM if raised else HEIGHT_MM])
+    read = observation.setup.set_up_errors
+    if read is None:
+        size = unknown
+    else:
+        tilt = np.array([[0.0, 0.0, 0.0, *observation.raw.circle.tilt_deg]])
+        turn = Frames.from_poses(tilt, machine.hexapod.rotation).rotation[0]
+        fixed, moving = (
+            np.where(np.isnan(values), unknown, read.uncertainty_mm)
+            for values in (read.fixed_ball_mm, read.moving_ball_mm)
+        )
+        size = np.sqrt(fixed**2 + turn**2 @ moving**2)
+    setup = replace(observation.setup, mounting_repeatability_mm=size, ball_uncertainty_mm=0.0, place_known=False)
+    return replace(observation, setup=setup)
+
+
+def _check_places(observations: Sequence[Observation]) -> None:
+    unknown = [observation.test for observation in observations if not observation.setup.place_known]
+    if unknown:
+        raise CalibrationError(
+            f"the ball was put up under the spindle in test {', '.join(dict.fromkeys(unknown))}: nobody knows where it "
+            "stands in the machine's coordinates, which the jig method needs",
+            remedy="calibrate with --method conv-a, or conv-b where set-up errors were measured; or measure on a jig plate",
+        )
+
+
+def _check_read(observations: Sequence[Observation]) -> None:
+    missing = [o.test for o in observations if o.setup.set_up_errors is None]
+    if missing:
+        raise CalibrationError(
+            f"no set-up errors were measured in test {', '.join(dict.fromkeys(missing))}, which conv-b needs",
+            remedy="write the micrometer readings under `set_up_errors` in session.yaml, or use --method conv-a",
+        )
+
+
+def _check_not_centred(observations: Sequence[Observation]) -> None:
+    """Refuse recordings from which software took the centres out: all stand truer than any ball can be put up."""
+    if not observations:
+        return
+    seen = [figures(observation.raw) for observation in observations]
+    off = float(np.sqrt(np.mean([np.square(circle.centre_mm) for circle in seen])))
+    bent = np.median([circle.circularity_um for circle in seen])
+    setups = [observation.setup for observation in observations]
+    stated = np.mean([np.mean(s.mounting_repeatability_mm) ** 2 + s.ball_uncertainty_mm**2 for s in setups])
+    limit = max(CENTRED_MM, CENTRED_SHARE * float(np.sqrt(stated)))
+    if off < limit and bent > LEAST_CIRCULARITY_UM:
+        raise CalibrationError(
+            f"the centres of the {len(seen)} circles lie within {1e3 * off:.2g} µm rms of the fixed balls, which no "
+            "mounting does: a centre compensation took the machine's position errors out of these recordings",
+            remedy="switch centre compensation off and measure again, or export raw lengths; --method conv-a can use "
+            "these recordings, without global position",
+        )

@@ -1,0 +1,164 @@
+"""Long runs seen through a few hundred nodes: all that the samples say, at a hundredth of the work.
+
+Where a reading depends on the pose and the time alone, it is as smooth along the circle as the circle itself. Over a
+sector of six degrees it and its derivatives are polynomials of degree five to parts in 1e8, given by their values at
+six nodes. The model is asked at the nodes only. With W the matrix that leads from nodes to samples, J = W Jn, and with
+W = Q R in each sector the samples' J^T J and J^T residual are those of R Jn and Q^T residual: the estimates, their
+covariance and the sum of squares are the samples' own, nothing is averaged. See docs/decisions/0002.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.square_root import compress
+from dbbstation.plan.circle import FULL_TURN_DEG
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.square_root import Block
+    from dbbstation.model.observation import Observation
+
+SECTORS = 60
+"""Sectors of a turn, six degrees each."""
+
+PER_SECTOR = 6
+"""Nodes of a sector, at the zeros of Chebyshev's polynomial."""
+
+LONG = 4
+"""Samples per node from which nodes are less work."""
+
+SMOOTH = 1e-6
+"""Greatest share of the last Chebyshev coefficient in a smooth quantity. The next, which is what the nodes miss, is a
+hundred times smaller where the quantity goes with the circle's first harmonics; a step leaves a tenth of itself."""
+
+NOTHING = 1e-9
+"""Size of what cannot be told from zero: a picometre in a reading, or the effect of a millimetre by so much."""
+
+_ANGLES = (np.arange(PER_SECTOR) + 0.5) * np.pi / PER_SECTOR
+_PLACES = -np.cos(_ANGLES)
+"""Nodes within a sector that reaches from -1 to 1, rising."""
+
+_WEIGHTS = (-1.0) ** np.arange(PER_SECTOR) * np.sin(_ANGLES)
+"""Of the barycentric formula [Berrut and Trefethen, SIAM Review 46 (2004) 501, eq 5.3]."""
+
+_LAST = 2.0 / PER_SECTOR * np.cos((PER_SECTOR - 1) * np.arccos(_PLACES))
+"""Values at the nodes times this: the last Chebyshev coefficient."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """A run and its nodes.
+
+    Attributes:
+        run: with all its samples.
+        coarse: the same run with the nodes in place of the samples; its lengths say nothing.
+        weights: W by sectors, shape (sectors, most samples, nodes); rows of zeros where a sector has fewer.
+        place: where each sample stands in those rows, counted through, shape (n,).
+        roots: R of each sector, shape (sectors, nodes, nodes).
+        seen: Q^T of measured less nominal length, shape (sectors, nodes) [mm].
+        unseen: length of what is left of it, which no smooth reading can explain [mm].
+    """
+
+    run: Observation
+    coarse: Observation
+    weights: NDArray[np.float64]
+    place: NDArray[np.int64]
+    roots: NDArray[np.float64]
+    seen: NDArray[np.float64]
+    unseen: float
+
+    def samples_of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at all samples, shape (n,), from those at the nodes, shape (m,)."""
+        by_sector = values.reshape(SECTORS, PER_SECTOR, 1)
+        found: NDArray[np.float64] = (self.weights @ by_sector).ravel()[self.place]
+        return found
+
+    def compressed(
+        self,
+        columns: NDArray[np.int64],
+        jacobian: NDArray[np.float64],
+        length_mm: NDArray[np.float64],
+        shift: NDArray[np.float64],
+    ) -> Block:
+        """Compress the run's samples.
+
+        Args:
+            columns: of the fit, shape (k,).
+            jacobian: of the reading at the nodes, shape (m, k).
+            length_mm: reading at the nodes, shape (m,) [mm].
+            shift: what is added to measured less predicted length: jacobian times this, shape (k,).
+        """
+        nominal = self.run.raw.circle.bar_mm
+        rows = self.roots @ jacobian.reshape(SECTORS, PER_SECTOR, -1)
+        explained = self.roots @ (length_mm - nominal).reshape(SECTORS, PER_SECTOR, 1)
+        flat = rows.reshape(SECTORS * PER_SECTOR, -1)
+        target = self.seen.ravel() - explained.ravel() + flat @ shift
+        block = compress(columns, np.vstack([flat, np.zeros(flat.shape[1])]), np.append(target, self.unseen))
+        return replace(block, count=len(self.run.raw))
+
+
+def nodes_of(run: Observation) -> Nodes | None:
+    """Return a run's nodes; None for one that is short, or that was commanded sample by sample."""
+    raw = run.raw
+    if len(raw) < LONG * SECTORS * PER_SECTOR or run.commanded is not None:
+        return None
+    in_sectors = raw.phi_deg * (SECTORS / FULL_TURN_DEG)
+    sector = np.clip(in_sectors.astype(np.int64), 0, SECTORS - 1)
+    phi = (np.arange(SECTORS)[:, None] + (1.0 + _PLACES) / 2.0).ravel() * (FULL_TURN_DEG / SECTORS)
+    order = np.argsort(raw.phi_deg, kind="stable")
+    nodes = replace(
+        raw,
+        phi_deg=phi,
+        t_s=np.interp(phi, raw.phi_deg[order], raw.t_s[order]),
+        length_mm=np.full(len(phi), raw.circle.bar_mm),
+        logged={},
+    )
+    count = np.bincount(sector, minlength=SECTORS)
+    most = max(int(count.max()), PER_SECTOR + 1)
+    place = np.empty(len(raw), dtype=np.int64)
+    ordered = sector[order]
+    place[order] = ordered * most + np.arange(len(raw)) - (np.cumsum(count) - count)[ordered]
+    system = np.zeros((SECTORS * most, PER_SECTOR + 1))
+    system[place, :-1] = _interpolation(2.0 * (in_sectors - sector) - 1.0)
+    system[place, -1] = raw.length_mm - raw.circle.bar_mm
+    by_sector = system.reshape(SECTORS, most, PER_SECTOR + 1)
+    triangle = np.asarray(np.linalg.qr(by_sector, mode="r"), dtype=np.float64)
+    return Nodes(
+        run=run,
+        coarse=replace(run, raw=nodes),
+        weights=np.ascontiguousarray(by_sector[:, :, :-1]),
+        place=place,
+        roots=np.ascontiguousarray(triangle[:, :-1, :-1]),
+        seen=np.ascontiguousarray(triangle[:, :-1, -1]),
+        unseen=float(np.linalg.norm(triangle[:, -1, -1])),
+    )
+
+
+def smooth(values: NDArray[np.float64]) -> bool:
+    """Whether quantities at the nodes, shape (m, k), are polynomials within each sector and join between sectors.
+
+    What is smaller than a billionth counts as smooth: readings in mm that agree with the nominal length, and
+    derivatives that ought to be zero, are rounding only.
+    """
+    by_sector = values.reshape(SECTORS, PER_SECTOR, -1)
+    last = np.abs(np.einsum("p,spk->sk", _LAST, by_sector)).max(axis=0)
+    # A step between the outermost nodes of two neighbours shows in neither of them.
+    begin, end = np.einsum("ep,spk->esk", _interpolation(np.array([-1.0, 1.0])), by_sector)
+    step = np.abs(begin[1:] - end[:-1]).max(axis=0)
+    return bool(np.all(np.maximum(last, step) <= SMOOTH * np.abs(values).max(axis=0) + NOTHING))
+
+
+def _interpolation(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Polynomials that are one at one node and zero at the others, at places from -1 to 1, shape (n, nodes)."""
+    distance = place[:, None] - _PLACES
+    exact = distance == 0.0
+    terms = _WEIGHTS / np.where(exact, 1.0, distance)
+    values: NDArray[np.float64] = terms / terms.sum(axis=1, keepdims=True)
+    on_node = exact.any(axis=1)
+    values[on_node] = exact[on_node]
+    return values

@@ -1,0 +1,65 @@
+"""Runs and balls that do not belong: found one at a time, named, and kept from pulling the fit.
+
+What is found is freed, not weighted: a ball that stands where it should not may stand anywhere, a run that is no
+circle of this machine is left out. The rest is fitted as before, so that one solver serves and the intervals of
+what remains are those of sound data.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.calibration.outliers.strange_runs import leave_out, strange_runs
+from dbbstation.calibration.outliers.stray_balls import ball_moved, off_its_place
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.calibration.outliers.outlier import Fit, Outlier, Step
+    from dbbstation.model.observation import Observation
+
+MOST = 8
+"""Outliers that are looked for; more are no outliers but another machine or plan."""
+
+
+def calibrate_robust(
+    fit: Fit,
+    observations: Sequence[Observation],
+    *,
+    balls: bool = True,
+    begun: tuple[Calibration, tuple[Outlier, ...]] | None = None,
+) -> tuple[Calibration, tuple[Outlier, ...]]:
+    """Fit, and fit again without what does not belong.
+
+    Args:
+        fit: calibrates runs.
+        observations: all runs.
+        balls: look for balls off their place too, not only for runs that are no circle of this machine.
+        begun: what was returned for these runs without balls, to go on from.
+
+    Returns:
+        The last fit, and what was found, in the order in which it stood out.
+
+    Raises:
+        CalibrationError: as `fit` does.
+    """
+    calibration, before = begun or (fit(list(observations)), ())
+    runs, found = list(calibration.observations), list(before)
+    while len(found) < MOST:
+        step = _next(fit, calibration, runs, balls=balls)
+        if step is None:
+            break
+        outlier, runs, calibration = step
+        found.append(outlier)
+    return calibration, tuple(found)
+
+
+def _next(fit: Fit, calibration: Calibration, runs: Sequence[Observation], *, balls: bool) -> Step | None:
+    """Return what stands out most, the runs without its pull, and their fit; None where nothing does."""
+    strange = strange_runs(calibration)
+    if strange:
+        return leave_out(fit, runs, strange)
+    if not balls:
+        return None
+    return ball_moved(fit, calibration, runs) or off_its_place(fit, calibration, runs)

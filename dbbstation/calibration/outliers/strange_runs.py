@@ -1,0 +1,160 @@
+"""Runs that are no circle of this machine: found, left out, and taken back where physics explains them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.checks.noise_level import fine_noise_mm
+from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Kind, Outlier
+from dbbstation.calibration.outliers.run_remainder import left_of, rms_um, without_shift
+from dbbstation.inference.square_root import solve
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.calibration.outliers.outlier import Fit, Step
+    from dbbstation.model.observation import Observation
+
+FALLS, AT_NOISE = 4.0, 4.0
+"""A test does not belong without which the others' mean square falls by the first, to less than the second in units of
+the noise. Physics that the model lacks stays in the others."""
+
+ALONE = 1.2
+"""One run of a test is to blame where leaving it out does nearly all that leaving the test out does."""
+
+
+def strange_runs(calibration: Calibration) -> list[int]:
+    """Indices of the runs of one test that are no circle of this machine; empty where all are."""
+    return _strange_test(calibration) or _strange_run(calibration)
+
+
+def _strange_test(calibration: Calibration) -> list[int]:
+    """Indices of the runs of a test without which all others fall into place; empty where there is none.
+
+    Both directions filed under the wrong test bend the whole fit and hardly stand out of it.
+    """
+    if rms_um(np.concatenate(calibration.residual_mm)) < LEAST_UM:
+        return []
+    noise = max(fine_noise_mm(calibration), 1e-3 * LEAST_UM / STANDS_OUT)
+    known, held = calibration.layout.known, calibration.solution.held
+    tests: dict[tuple[str, str], list[int]] = {}
+    for k, run in enumerate(calibration.observations):
+        tests.setdefault((run.setup.session, run.test), []).append(k)
+
+    def misfit(left_out: Sequence[int]) -> float:
+        blocks = [block for k, block in enumerate(calibration.blocks) if k not in left_out]
+        return solve(blocks, known, noise, held).chi2 / sum(block.count for block in blocks)
+
+    without = {name: misfit(own) for name, own in tests.items()}
+    best = min(without, key=without.__getitem__)
+    falls = misfit([]) / without[best]
+    in_place = falls > FALLS and without[best] < AT_NOISE
+    if not (in_place or falls > STANDS_OUT**2):
+        return []
+    alone = [k for k in tests[best] if misfit([k]) < ALONE * without[best]]
+    return alone[:1] or tests[best]
+
+
+def _strange_run(calibration: Calibration) -> list[int]:
+    """Index of the run that leaves most beside a shift of its own ball, if that is far more than usual."""
+    rest = _rests_um(calibration)
+    worst = int(np.argmax(rest))
+    return [worst] if rest[worst] > _strange_from_um(rest) else []
+
+
+def _rests_um(calibration: Calibration) -> NDArray[np.float64]:
+    """What every run leaves beside a shift of its own ball, shape (r,) [µm]."""
+    return np.array([rms_um(without_shift(run, left)) for run, left in left_of(calibration)])
+
+
+def _strange_from_um(rests_um: NDArray[np.float64]) -> float:
+    """What a run must leave to be no circle of the machine [µm]."""
+    return max(STANDS_OUT * float(np.median(rests_um)), LEAST_UM)
+
+
+def in_place_after_all(
+    calibration: Calibration, runs: Sequence[Observation], outliers: Sequence[Outlier]
+) -> tuple[list[Observation], tuple[Outlier, ...]]:
+    """Runs that belong, and the outliers that stay, where a fit knows physics that was not known when runs were left out.
+
+    Args:
+        calibration: of the runs that were kept, with that physics.
+        runs: all runs.
+        outliers: runs that were left out; others stay as they are.
+    """
+
+    def named(run: Observation) -> tuple[str, str]:
+        return run.setup.session, run.label
+
+    kept = {named(run) for run in calibration.observations}
+    limit_um = _strange_from_um(_rests_um(calibration))
+
+    def fits(run: Observation) -> bool:
+        left = run.raw.length_mm - calibration.model.bar(run.motion()).length_mm
+        return rms_um(without_shift(run, left)) < limit_um
+
+    out = {named(run) for run in runs if named(run) not in kept and not fits(run)}
+    labels = {label for _, label in out}
+    staying = tuple(o for o in outliers if o.freed or labels & set(o.run.split(", ")))
+    return [run for run in runs if named(run) not in out], staying
+
+
+def leave_out(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> Step:
+    """Leave runs of one test out, and see under the fit of the others what they are."""
+    kept = [run for i, run in enumerate(runs) if i not in strange]
+    again = fit(kept)
+    run = runs[strange[0]]
+    residual = run.raw.length_mm - again.model.bar(run.motion()).length_mm
+    size = rms_um(residual)
+    kind, look = _looks_like(again, kept, run, residual)
+    labels = ", ".join(runs[k].label for k in strange)
+    return Outlier(kind, run.test, labels, size, None, f"{labels} leaves {size:.1f} µm rms: {look}"), kept, again
+
+
+def _looks_like(
+    calibration: Calibration, others: Sequence[Observation], run: Observation, residual: NDArray[np.float64]
+) -> tuple[Kind, str]:
+    """What a run that does not belong most resembles."""
+    noise = _strange_from_um(np.array([rms_um(left) for _, left in left_of(calibration)]))
+    best, where = np.inf, run
+    for other in others:
+        if other.raw.circle == run.raw.circle or other.raw.circle.bar_mm != run.raw.circle.bar_mm:
+            continue
+        there = replace(other, raw=replace(run.raw, circle=other.raw.circle), commanded=None)
+        left = run.raw.length_mm - calibration.model.bar(there.motion()).length_mm
+        rest = rms_um(without_shift(there, left))
+        if rest < best:
+            best, where = rest, other
+    if best < noise:
+        what = f"it is what test {where.test} {where.raw.circle.direction} should read, to {best:.1f} µm"
+        if where.test == run.test:
+            return Kind.WRONG_PLACE, f"{what}; was the other direction run?"
+        return Kind.WRONG_PLACE, f"{what}; the ball stood in that bore, or the run was filed under the wrong test"
+    step, at = _step(residual)
+    if rms_um(_without_step(residual, at)) < 0.5 * rms_um(residual - residual.mean()):
+        return (
+            Kind.RUN,
+            f"the reading steps by {1e3 * step:.1f} µm at {run.raw.theta_deg[at]:.0f}°; bar or holder was bumped",
+        )
+    return Kind.RUN, "no circle of this machine and no step; a bump, a loose ball, or another machine's run?"
+
+
+def _step(residual: NDArray[np.float64]) -> tuple[float, int]:
+    """Largest difference of means before and after a sample, and that sample; ends of a twentieth are not looked at."""
+    count = len(residual)
+    at = np.arange(count // 20 + 1, count - count // 20)
+    total = np.cumsum(residual)
+    difference = (total[-1] - total[at - 1]) / (count - at) - total[at - 1] / at
+    weight = np.sqrt(at * (count - at))
+    k = int(np.argmax(np.abs(difference) * weight))
+    return float(difference[k]), int(at[k])
+
+
+def _without_step(residual: NDArray[np.float64], at: int) -> NDArray[np.float64]:
+    return np.concatenate([residual[:at] - residual[:at].mean(), residual[at:] - residual[at:].mean()])

@@ -1,0 +1,234 @@
+"""Balls that are off their place, and bars that are off their length: found and set free."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import chdtri, ndtr
+
+from dbbstation.calibration.checks.scatter import LEAST_STATED_MM, UNKNOWN_MM, Seat, seats_of
+from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Kind, Outlier
+from dbbstation.calibration.outliers.run_remainder import left_of, shift_of
+from dbbstation.errors import CalibrationError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.calibration.outliers.outlier import Fit, Step
+    from dbbstation.model.observation import Observation
+
+SIGMAS = 5.0
+"""Of the stated scatter, or of the usual one where that is more, by which a ball must be off its place."""
+
+_TAIL = 2.0 * float(ndtr(-SIGMAS))
+
+SAME_SIGMAS = 3.0
+"""Two puttings-up of a ball that differ by less stand at the same wrong place."""
+
+UNKNOWN_BAR_MM = LEAST_STATED_MM
+"""Stated size of the error of a bar that nobody set on a calibrator: no scatter that anybody states [mm]."""
+
+
+def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
+    """Give the run whose ball moved within its putting-up one of its own.
+
+    None where none moved, or where its mounting has no other run to be apart from.
+    """
+    k = _moved_in(calibration)
+    if k is None:
+        return None
+    run = runs[k]
+    others = [o for i, o in enumerate(runs) if i != k and o.setup.mounting == run.setup.mounting]
+    if not others:
+        return None
+    own = replace(run, setup=replace(run.setup, mounting=f"{run.setup.mounting}, {run.label}"))
+    apart = [own if i == k else o for i, o in enumerate(runs)]
+    again = fit(apart)
+    seats = {seat.mounting: seat for seat in seats_of(again)}
+    shift = seats[own.setup.mounting].shift_mm - seats[others[0].setup.mounting].shift_mm
+    size = 1e3 * float(np.hypot(*shift[:2]))
+    text = (
+        f"the ball of test {run.test} moved by {_towards(shift)} between run {run.label} and {others[0].label}: "
+        "holder or cup loose, or touched"
+    )
+    return Outlier(Kind.MOVED, run.test, run.label, size, _um(shift), text), apart, again
+
+
+def _moved_in(calibration: Calibration) -> int | None:
+    """Index of the run whose ball stands elsewhere than in the other runs of its putting-up."""
+    shifts = np.array([shift_of(o, r) for o, r in left_of(calibration)])
+    away = np.hypot(*shifts.T)
+    worst = int(np.argmax(away))
+    limit = max(STANDS_OUT * float(np.median(away)), 1e-3 * LEAST_UM)
+    return worst if away[worst] > limit else None
+
+
+def off_its_place(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:
+    """Free the ball that is furthest off its place in units of what is usual."""
+    seats = [seat for seat in seats_of(calibration) if seat.freedom > 0]
+    if not seats:
+        return None
+    # By chance half of them lie beyond their median: a model that lacks physics scatters all balls.
+    usual = max(1.0, float(np.median([seat.square / float(chdtri(seat.freedom, 0.5)) for seat in seats])))
+    worst = max(seats, key=lambda seat: seat.square / seat.freedom)
+    beyond = float(chdtri(worst.freedom, _TAIL))
+    if worst.square < usual * beyond or np.hypot(*worst.shift_mm[:2]) < 1e-3 * LEAST_UM:
+        return None
+    return free_ball(fit, runs, worst.mounting, seats)
+
+
+def free_ball(
+    fit: Fit, runs: Sequence[Observation], mounting: str, seats: Sequence[Seat], *, together: bool | None = None
+) -> Step:
+    """Let the ball of a mounting stand anywhere, with all its other mountings if it stands alike in them.
+
+    Args:
+        fit: calibrates runs.
+        runs: all runs.
+        mounting: name of the putting-up that is off.
+        seats: of a fit of these runs.
+        together: whether it stands alike in all of them, where that is known; seen from the seats if None.
+
+    Returns:
+        What was found, the runs without its pull, and their fit.
+    """
+    worst = next(seat for seat in seats if seat.mounting == mounting)
+    alike = [seat for seat in seats if seat.ball == worst.ball and seat is not worst]
+    if together is None:
+        together = bool(alike) and all(_same(seat, worst) for seat in alike)
+    names = {worst.mounting} | ({seat.mounting for seat in alike} if together else set())
+    freed = [_freed(run) if run.setup.mounting in names else run for run in runs]
+    if together:
+        why = f", in all {len(names)} mountings alike: its CMM row, or it is another ball or holder"
+    elif alike:
+        why = ", but not when it was put up again: badly seated"
+    else:
+        why = ": badly seated, or its CMM row is wrong; put it up again to tell"
+    kind = Kind.BALL if together else Kind.MOUNTING
+    again = fit(freed)
+    return _ball(again, kind, (mounting, *sorted(names - {mounting})), why, sure=bool(alike)), freed, again
+
+
+def set_free(fit: Fit, before: Calibration, source: str, of: str) -> Step | None:
+    """Let what is off be anything from here on; None where the runs cannot be fitted without knowing it.
+
+    Args:
+        fit: calibrates runs.
+        before: the last fit.
+        source: `mounting`, `ball-coordinate` or `bar-offset`.
+        of: name of the mounting, ball or session that is off.
+    """
+    runs = before.observations
+    try:
+        if source == "bar-offset":
+            return free_bar(fit, runs, of)
+        together = source == "ball-coordinate"
+        of_the_ball = {o.setup.mounting for o in runs if of == (o.setup.ball if together else o.setup.mounting)}
+        return free_ball(fit, runs, min(of_the_ball), seats_of(before), together=together)
+    except CalibrationError:
+        return None
+
+
+def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
+    """Let the bar of a session have any length.
+
+    Args:
+        fit: calibrates runs.
+        runs: all runs.
+        session: whose bar is off.
+
+    Returns:
+        What was found, the runs without its pull, and their fit.
+    """
+    of = [run for run in runs if run.setup.session == session]
+    why = f", and ± {1e3 * of[0].setup.bar_uncertainty_mm:.2f} was stated: put it on its calibrator again"
+    freed = [
+        replace(run, setup=replace(run.setup, bar_uncertainty_mm=UNKNOWN_BAR_MM)) if run in of else run for run in runs
+    ]
+    again = fit(freed)
+    return _bar(again, session, why), freed, again
+
+
+def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
+    """What was set free as another fit finds it, such as one with the physics that pulled it; others as they are."""
+    if outlier.kind is Kind.BAR:
+        found = _bar(calibration, outlier.freed[0], outlier.why)
+    elif outlier.freed:
+        found = _ball(calibration, outlier.kind, outlier.freed, outlier.why, sure=outlier.sure)
+    else:
+        return outlier
+    return replace(found, alike=outlier.alike)
+
+
+def _ball(calibration: Calibration, kind: Kind, freed: tuple[str, ...], why: str, *, sure: bool) -> Outlier:
+    """A ball that may stand anywhere, as a fit finds it in the first of its mountings."""
+    seat = next(seat for seat in seats_of(calibration) if seat.mounting == freed[0])
+    of = [run for run in calibration.observations if run.setup.mounting in freed]
+    which = f"in run {of[0].label}" if "," in of[0].setup.mounting and len(of) == 1 else f"of test {_tests(of)}"
+    distance = float(np.hypot(*seat.shift_mm[:2]))
+    along = seat.shift_mm[:2] / max(distance, 1e-12)
+    return Outlier(
+        kind=kind,
+        test=of[0].test,
+        run=", ".join(run.label for run in of),
+        size_um=1e3 * distance,
+        shift_um=_um(seat.shift_mm),
+        text=f"the ball {which} stands {_towards(seat.shift_mm)} from its place{why}",
+        sure=sure,
+        uncertainty_um=1e3 * float(np.sqrt(along @ seat.spread_mm2[:2, :2] @ along)),
+        freed=freed,
+        why=why,
+    )
+
+
+def _bar(calibration: Calibration, session: str, why: str) -> Outlier:
+    """A bar that may have any length, as a fit finds it."""
+    terms = {(term.source.name, term.shared): term for term in calibration.layout.terms}
+    column = terms["bar-offset", session].columns.start
+    offset = 1e3 * float(calibration.x[column])
+    sigma = 1e3 * float(np.sqrt(calibration.solution.covariance[column, column]))
+    longer = "long" if offset > 0.0 else "short"
+    return Outlier(
+        kind=Kind.BAR,
+        test=session,
+        run="all runs",
+        size_um=offset,
+        shift_um=None,
+        text=f"the bar of {session} reads {abs(offset):.2f} ± {sigma:.2f} µm too {longer}{why}",
+        uncertainty_um=sigma,
+        freed=(session,),
+        why=why,
+    )
+
+
+def _same(a: Seat, b: Seat) -> bool:
+    sigma = np.sqrt(np.diag(a.spread_mm2)[:2] + np.diag(b.spread_mm2)[:2])
+    return bool(np.all(np.abs(a.shift_mm - b.shift_mm)[:2] < SAME_SIGMAS * sigma))
+
+
+def _freed(run: Observation) -> Observation:
+    """The run about a ball that may stand anywhere, in height only where a raised bar sees it."""
+    size = np.zeros(3) + run.setup.mounting_repeatability_mm
+    seen = 3 if run.raw.circle.elevation_deg != 0.0 else 2
+    size[:seen] = UNKNOWN_MM
+    return replace(run, setup=replace(run.setup, mounting_repeatability_mm=size))
+
+
+def _tests(runs: Sequence[Observation]) -> str:
+    return ", ".join(dict.fromkeys(run.test for run in runs))
+
+
+def _um(shift_mm: NDArray[np.float64]) -> tuple[float, float, float]:
+    x, y, z = (1e3 * shift_mm).tolist()
+    return x, y, z
+
+
+def _towards(shift_mm: NDArray[np.float64]) -> str:
+    """Length and direction of a shift in the plane, such as `31 µm towards 270°`."""
+    angle = np.degrees(np.arctan2(shift_mm[1], shift_mm[0])) % 360.0
+    return f"{1e3 * float(np.hypot(*shift_mm[:2])):.1f} µm towards {angle:.0f}°"

@@ -1,0 +1,166 @@
+"""Figures of circles before and after, and of the machine's plane, as [CAL Table III] and [CAL Fig 7] have them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.fit.calibrate import residuals
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.contract import Motion
+from dbbstation.trace.analysis import CircleFigures, figures
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.model.observation import Observation
+
+PLANE_HALF_WIDTH_MM = 190.0
+"""The 380 x 380 mm over which the paper quotes flatness and parallelism."""
+
+STRAIGHT_POINTS = 39
+"""Points along X at which parallelism is looked at: every 10 mm."""
+
+
+@dataclass(frozen=True)
+class RunFigures:
+    """One run.
+
+    Attributes:
+        test: name of the test.
+        direction: `ccw` or `cw`.
+        repeat: counts runs of this test and direction.
+        measured: of the bar readings themselves.
+        before: of what the nominal machine leaves; the same as measured where a plain circle was commanded.
+        after: of what the model's machine sources leave.
+        before_from_first_um: distance of the centre from that of the first test in the same direction [µm].
+        after_from_first_um: the same under the model [µm].
+    """
+
+    test: str
+    direction: str
+    repeat: int
+    measured: CircleFigures
+    before: CircleFigures
+    after: CircleFigures
+    before_from_first_um: float
+    after_from_first_um: float
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a model makes of recordings.
+
+    Attributes:
+        runs: figures of each run.
+        residual_rms_um: measured minus predicted length over all runs, machine's sources only [µm].
+        nominal_rms_um: the same under the nominal machine [µm].
+    """
+
+    runs: tuple[RunFigures, ...]
+    residual_rms_um: float
+    nominal_rms_um: float
+
+
+def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evaluation:
+    """Compare recordings with the nominal machine and with a model.
+
+    Raises:
+        TraceError: a run that is no circle.
+        ModelError: a source needs what the runs do not give.
+    """
+    nominal = residuals(MachineModel(model.machine), observations)
+    left = residuals(model.of_the_machine(), observations)
+    before = [_figures_of(o, residual) for o, residual in zip(observations, nominal, strict=True)]
+    after = [_figures_of(o, residual) for o, residual in zip(observations, left, strict=True)]
+    first = [_first_in_direction(observations, k) for k in range(len(observations))]
+    runs = tuple(
+        RunFigures(
+            test=o.test,
+            direction=str(o.raw.circle.direction),
+            repeat=o.repeat,
+            measured=figures(o.raw),
+            before=before[k],
+            after=after[k],
+            before_from_first_um=apart_um(before[k], before[first[k]]),
+            after_from_first_um=apart_um(after[k], after[first[k]]),
+        )
+        for k, o in enumerate(observations)
+    )
+    return Evaluation(runs, rms_um(left), rms_um(nominal))
+
+
+def rms_um(residual_mm: Sequence[NDArray[np.float64]]) -> float:
+    """Root mean square over all runs [µm]."""
+    return 1e3 * float(np.sqrt(np.mean(np.concatenate(residual_mm) ** 2)))
+
+
+@dataclass(frozen=True)
+class PlaneFigures:
+    """How true the machine moves over a plane when programs are not compensated [CAL Fig 7].
+
+    Attributes:
+        flatness_um: greatest minus least height over eight points of the square [µm].
+        parallelism_um: greatest minus least sideways deviation of a move along X [µm].
+    """
+
+    flatness_um: float
+    parallelism_um: float
+
+
+def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel | None = None) -> PlaneFigures:
+    """Flatness over eight points of X, Y = ±190 mm and parallelism of a move along X through its middle.
+
+    Of what hangs on the pose alone: backlash has no place of its own, and a machine that warms none that stays.
+
+    Args:
+        model: the machine as it is.
+        height_mm: commanded Z [mm].
+        corrected: what the machine's control believes instead, where a calibration has been entered; the
+            deviation is then what that calibration leaves.
+
+    Raises:
+        KinematicsError: the plane lies outside the workspace.
+    """
+    w = PLANE_HALF_WIDTH_MM
+    ring = np.array([(-w, -w), (0, -w), (w, -w), (w, 0), (w, w), (0, w), (-w, w), (-w, 0)])
+    along = np.column_stack([np.linspace(-w, w, STRAIGHT_POINTS), np.zeros(STRAIGHT_POINTS)])
+    heights = _error_mm(model, ring, height_mm, corrected)[:, 2]
+    sideways = _error_mm(model, along, height_mm, corrected)[:, 1]
+    return PlaneFigures(1e3 * float(np.ptp(heights)), 1e3 * float(np.ptp(sideways)))
+
+
+def _error_mm(
+    model: MachineModel, xy_mm: NDArray[np.float64], height_mm: float, corrected: MachineModel | None
+) -> NDArray[np.float64]:
+    """Actual minus wanted position at points, shape (n, 3) [mm]."""
+    poses = np.zeros((len(xy_mm), 6))
+    poses[:, :2], poses[:, 2] = xy_mm, height_mm
+    motion = Motion(poses)
+    actual = model.anywhere().actual_poses(motion)
+    believed = poses if corrected is None else corrected.anywhere().actual_poses(motion)
+    return actual[:, :3] - believed[:, :3]
+
+
+def _figures_of(observation: Observation, residual_mm: NDArray[np.float64]) -> CircleFigures:
+    """Figures of the circle that has the nominal bar length plus this residual."""
+    return figures(observation.raw, observation.raw.circle.bar_mm + residual_mm)
+
+
+def _first_in_direction(observations: Sequence[Observation], k: int) -> int:
+    """Index of the first run of k's session in its direction."""
+    wanted = observations[k]
+    return next(
+        i
+        for i, o in enumerate(observations)
+        if o.setup.session == wanted.setup.session and o.raw.circle.direction == wanted.raw.circle.direction
+    )
+
+
+def apart_um(a: CircleFigures, b: CircleFigures) -> float:
+    """Distance of two circles' centres [µm]."""
+    return 1e3 * float(np.hypot(a.centre_mm[0] - b.centre_mm[0], a.centre_mm[1] - b.centre_mm[1]))

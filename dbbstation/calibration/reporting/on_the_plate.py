@@ -1,0 +1,134 @@
+"""Circles before and after a calibration, test by test, and where their centres lie over the jig plate [CAL Fig 6]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.checks.scatter import LEAST_STATED_MM, seats_of
+from dbbstation.calibration.fit.calibrate import residuals
+from dbbstation.calibration.reporting.residual_map import names_of_tests
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.trace.analysis import figures
+from dbbstation.trace.average import by_angle
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.model.observation import Observation
+    from dbbstation.plan.circle import Direction
+
+SECTORS = 180
+"""Points of a circle: means of two degrees."""
+
+
+@dataclass(frozen=True, eq=False)
+class CircleBeforeAfter:
+    """One run, by rising angle, shape (s,) each.
+
+    Attributes:
+        direction: sense of travel.
+        theta_deg: angle from +X towards +Y [deg].
+        before_um: measured length less that of the nominal machine; where a plain circle was commanded, less the bar's
+            nominal length [µm].
+        after_um: measured length less that of the model's machine; balls and bar where plan and session say [µm].
+    """
+
+    direction: Direction
+    theta_deg: NDArray[np.float64]
+    before_um: NDArray[np.float64]
+    after_um: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CircleTest:
+    """One test, all its runs together.
+
+    Attributes:
+        name: of the test.
+        ball_mm: centre of the fixed ball as the CMM knows it, machine frame, shape (3,) [mm].
+        circles: its runs.
+        circularity_um: greatest of its runs, before and after [µm].
+        centre_um: centre of the circle from the ball, mean of its runs, before and after, rows of x, y, shape (2, 2)
+            [µm].
+    """
+
+    name: str
+    ball_mm: NDArray[np.float64]
+    circles: tuple[CircleBeforeAfter, ...]
+    circularity_um: tuple[float, float]
+    centre_um: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BallShift:
+    """Where the fit finds a ball that was put up.
+
+    Attributes:
+        tests: those run about it in that mounting.
+        stated_um: standard deviation per axis, as plan and CMM sheet state it [µm].
+        shift_um: found less stated place in X and Y, shape (2,) [µm].
+        sigma_um: standard deviations of that, shape (2,) [µm].
+    """
+
+    tests: tuple[str, ...]
+    stated_um: float
+    shift_um: NDArray[np.float64]
+    sigma_um: NDArray[np.float64]
+
+
+def circle_tests(calibration: Calibration) -> tuple[CircleTest, ...]:
+    """Circles and centres of every test of a fit, in the order of the recordings."""
+    observations, model = calibration.observations, calibration.model
+    nominal = residuals(MachineModel(model.machine), observations)
+    names = names_of_tests(observations)
+    return tuple(
+        _test(
+            name,
+            [
+                (observation, before, after)
+                for observation, before, after, own in zip(
+                    observations, nominal, calibration.machine_residual_mm, names, strict=True
+                )
+                if own == name
+            ],
+        )
+        for name in dict.fromkeys(names)
+    )
+
+
+def ball_shifts(calibration: Calibration) -> tuple[BallShift, ...]:
+    """Where balls stand that are known to stand somewhere: not those put up under the spindle or set free."""
+    tests: dict[str, list[str]] = {}
+    for observation, name in zip(calibration.observations, names_of_tests(calibration.observations), strict=True):
+        tests.setdefault(observation.setup.mounting, []).append(name)
+    return tuple(
+        BallShift(
+            tests=tuple(dict.fromkeys(tests[seat.mounting])),
+            stated_um=1e3 * float(seat.stated_mm[0]),
+            shift_um=1e3 * seat.shift_mm[:2],
+            sigma_um=1e3 * np.sqrt(np.diag(seat.spread_mm2)[:2]),
+        )
+        for seat in seats_of(calibration)
+        if seat.stated_mm[0] < LEAST_STATED_MM
+    )
+
+
+def _test(name: str, runs: list[tuple[Observation, NDArray[np.float64], NDArray[np.float64]]]) -> CircleTest:
+    circles, found = [], []
+    for observation, *both in runs:
+        raw = observation.raw
+        theta, (before, after) = by_angle(raw, [1e3 * left for left in both], SECTORS)
+        circles.append(CircleBeforeAfter(raw.circle.direction, theta, before, after))
+        found.append([figures(raw, raw.circle.bar_mm + left) for left in both])
+    worst = [max(of_run[k].circularity_um for of_run in found) for k in (0, 1)]
+    return CircleTest(
+        name=name,
+        ball_mm=runs[0][0].setup.fixed_ball_mm,
+        circles=tuple(circles),
+        circularity_um=(worst[0], worst[1]),
+        centre_um=1e3 * np.mean([[one.centre_mm for one in of_run] for of_run in found], axis=0),
+    )

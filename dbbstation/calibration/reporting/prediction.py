@@ -1,0 +1,82 @@
+"""Circularity as measured and as a model predicts it, run by run: [GRAV Table 3]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.fit.calibrate import residuals
+from dbbstation.inference.harmonics import smooth
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.trace.analysis import figures
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.model.observation import Observation
+    from dbbstation.trace.circle import RawCircle
+
+UNDULATIONS = 30
+"""Per revolution, up to which form counts: the peak to valley of a bar's noise would hide what a model gets wrong."""
+
+SAMPLES_PER_UNDULATION = 4
+
+
+@dataclass(frozen=True)
+class PredictedCircle:
+    """One run.
+
+    Attributes:
+        measured_um: circularity of the recording up to 30 undulations per revolution [µm].
+        predicted_um: of what the machine's own sources make the bar read, by the same figure [µm].
+        before_um: of what the nominal machine leaves; the same as measured where a plain circle was commanded [µm].
+        after_um: of what the model leaves [µm].
+    """
+
+    measured_um: float
+    predicted_um: float
+    before_um: float
+    after_um: float
+
+
+def predicted_circles(
+    model: MachineModel,
+    observations: Sequence[Observation],
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> tuple[PredictedCircle, ...]:
+    """Compare the circularity of recordings with what a model says of them.
+
+    Args:
+        model: with the machine's own sources.
+        observations: the recordings.
+        progress: told how many of how many runs are done.
+
+    Raises:
+        TraceError: a run that is no circle.
+        ModelError: a source needs what the runs do not give.
+    """
+    nominal = residuals(MachineModel(model.machine), observations)
+    left = residuals(model.of_the_machine(), observations)
+    circles: list[PredictedCircle] = []
+    for o, before, after in zip(observations, nominal, left, strict=True):
+        progress(len(circles), len(observations))
+        circle = PredictedCircle(
+            measured_um=smooth_circularity_um(o.raw, o.raw.length_mm),
+            predicted_um=smooth_circularity_um(o.raw, o.raw.length_mm - after),
+            before_um=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + before),
+            after_um=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + after),
+        )
+        circles.append(circle)
+    progress(len(circles), len(observations))
+    return tuple(circles)
+
+
+def smooth_circularity_um(raw: RawCircle, length_mm: NDArray[np.float64]) -> float:
+    """Circularity up to 30 undulations per revolution of lengths, shape (n,) [mm], at a circle's angles [µm]."""
+    highest = min(UNDULATIONS, max(len(length_mm) // SAMPLES_PER_UNDULATION, 2))
+    bar_mm = raw.circle.bar_mm
+    return figures(raw, bar_mm + smooth(length_mm - bar_mm, np.radians(raw.phi_deg), highest)).circularity_um

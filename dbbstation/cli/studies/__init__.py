@@ -1,1 +1,0 @@
-"""`dbbstation study NAME`: one module per experiment."""

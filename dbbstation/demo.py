@@ -1,0 +1,186 @@
+"""The whole job on a virtual machine, over a real serial line, with the commands that anyone would type.
+
+A virtual hexapod has random errors of its joints and struts, and struts that gravity stretches. It is measured on the
+jig plate, calibrated, diagnosed; compensated programs are written, run on it and measured again.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.errors import StationError
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.model import write_model
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model.identified import IdentifiedModel
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.contract import Fitted
+from dbbstation.sources.registry import known_sources
+from dbbstation.virtual.truth import random_kinematics
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+INSTRUMENT = "streaming-encoder"
+SPEED = ["--time-scale", "80", "--rate-hz", "40"]
+"""Eighty times faster than a real machine: 30 circles in half a minute instead of three quarters of an hour."""
+
+COMPLIANCE_UM_KN = 9.68
+"""Strut compliance with which the reference machine's circles bend as [GRAV Table 4] reports."""
+
+PATIENCE_S = 60.0
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """Files and figures of a demonstration.
+
+    Attributes:
+        folder: where everything is.
+        runs: per test, figures of the first circle in its first direction, before and after, in µm; the circularity with
+            the bar's noise and without, as `evaluate --json` has both.
+        diagnosis: what `diagnose --json` said.
+        calibration: what `calibrate --json` said.
+    """
+
+    folder: Path
+    runs: list[dict[str, Any]]
+    diagnosis: dict[str, Any]
+    calibration: dict[str, Any]
+
+
+def run_demo(folder: Path, seed: int, tell: Callable[[str], None], progress: Callable[[str], None]) -> DemoResult:
+    """Do the whole job into a folder.
+
+    Args:
+        folder: made anew.
+        seed: of the virtual machine's errors.
+        tell: told each command before it runs.
+        progress: told how far a measurement is; each text replaces the one before.
+
+    Raises:
+        StationError: a step failed; what the steps before it wrote stays.
+    """
+    folder.mkdir(parents=True)
+    machine_file = shipped_folder("fixtures") / "machines" / "reference.yaml"
+    plan_file = shipped_folder("protocols") / "plans" / "table2.yaml"
+    _write_truth(folder / "truth.yaml", machine_file, seed)
+    job = _Job(folder, ["--plan", str(plan_file), "--machine", str(machine_file)], tell, progress)
+    # One virtual machine for both measurements: balls and bar stay, every holder is put up anew. It reads programs
+    # when they are started, so that their folder may still be empty.
+    (folder / "programs").mkdir()
+    truth = ["--truth", "truth.yaml", "--seed", str(seed), "--programs", "programs"]
+    with job.emulated(truth) as place:
+        job.measure(place, "measured", [])
+        calibration = job.answer(["calibrate", "measured", "--out", "kinematic.yaml"])
+        diagnosis = job.answer(["diagnose", "measured", "--out", "joint.yaml"])
+        job.answer(["program", *job.what, "--dialect", "linuxcnc", "--model", "joint.yaml", "--out", "programs"])
+        job.measure(place, "verified", ["--programs", "programs"])
+    before = job.answer(["evaluate", "measured", "--model", "joint.yaml"])
+    after = job.answer(["evaluate", "verified", "--model", "joint.yaml"])
+    return DemoResult(folder, _side_by_side(before, after), diagnosis, calibration)
+
+
+def _write_truth(path: Path, machine_file: Path, seed: int) -> None:
+    machine = read_machine(machine_file)
+    gravity = Fitted(known_sources()["gravity"], np.array([COMPLIANCE_UM_KN]))
+    fitted = (*random_kinematics(machine, seed), gravity)
+    rows = tuple((f.source.name, "", p.name) for f in fitted for p in f.source.parameters(machine))
+    exact = np.zeros((len(rows), len(rows)))
+    write_model(path, IdentifiedModel(MachineModel(machine, fitted), rows, exact))
+
+
+@dataclass(frozen=True)
+class _Job:
+    """Runs the program's own commands in the demonstration's folder."""
+
+    folder: Path
+    what: list[str]
+    tell: Callable[[str], None]
+    progress: Callable[[str], None]
+
+    def answer(self, arguments: list[str]) -> dict[str, Any]:
+        """Run a command and return what it printed as JSON."""
+        self.tell("dbbstation " + " ".join(_short(argument) for argument in arguments))
+        done = subprocess.run(
+            [*_PROGRAM, *arguments, "--json"], cwd=self.folder, capture_output=True, text=True, check=False
+        )
+        if done.returncode != 0:
+            raise StationError(done.stderr.strip(), where=f"dbbstation {arguments[0]}")
+        found: dict[str, Any] = json.loads(done.stdout)
+        return found
+
+    def measure(self, place: dict[str, str], session: str, programs: list[str]) -> None:
+        """Measure the virtual machine over its line."""
+        arguments = ["measure", *self.what, "--instrument", INSTRUMENT, "--out", session, *programs]
+        line = ["--port", place["port"], "--auto", place["control"], *SPEED]
+        bar = ["--bar-length-mm", "150", "--bar-uncertainty-um", "0.5"]
+        self.tell("dbbstation " + " ".join(_short(argument) for argument in [*arguments, *line]))
+        with subprocess.Popen(
+            [*_PROGRAM, *arguments, *line, *bar],
+            cwd=self.folder,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            said = []
+            for text in process.stderr or ():
+                said.append(text.rstrip())
+                if " of " in text and ": test " in text:
+                    self.progress(text.strip())
+        if process.returncode != 0:
+            raise StationError("\n".join(said[-5:]), where="dbbstation measure")
+
+    @contextmanager
+    def emulated(self, arguments: list[str]) -> Iterator[dict[str, str]]:
+        """Switch on the virtual machine as a process of its own.
+
+        Yields:
+            Its port and its control address.
+
+        Raises:
+            StationError: it does not start.
+        """
+        command = [*_PROGRAM, "emulate", "--instrument", INSTRUMENT, *self.what, *arguments, *SPEED, "--json"]
+        process = subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        try:
+            first = process.stdout.readline() if process.stdout else ""
+            if not first:
+                _, said = process.communicate(timeout=PATIENCE_S)
+                raise StationError(said.strip() or "it ended at once", where="dbbstation emulate")
+            place: dict[str, str] = json.loads(first)
+            yield place
+        finally:
+            process.terminate()
+            process.communicate(timeout=PATIENCE_S)
+
+
+_PROGRAM = [sys.executable, "-m", "dbbstation"]
+
+
+def _short(argument: str) -> str:
+    """Last part of a path that the package ships, so that commands can be read."""
+    return argument.rpartition("/")[2] if argument.endswith(".yaml") else argument
+
+
+def _side_by_side(before: dict[str, Any], after: dict[str, Any]) -> list[dict[str, Any]]:
+    """Measured figures of the same runs in two sessions, [CAL Table III]."""
+    later = {(run["test"], run["direction"]): _measured(run) for run in after["runs"]}
+    return [
+        {"test": run["test"], "before": _measured(run), "after": later[run["test"], run["direction"]]}
+        for run in before["runs"]
+        if run["direction"] == "ccw"
+    ]
+
+
+def _measured(run: dict[str, Any]) -> dict[str, float]:
+    """Measured figures of a run."""
+    return {**run["measured"], "circularity_30_upr_um": run["circularity_30_upr_um"]["measured"]}

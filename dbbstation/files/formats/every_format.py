@@ -1,0 +1,35 @@
+"""Every YAML format with its schema, and the JSON Schema that editors and other programs take."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.files.formats.jig import JigFile
+from dbbstation.files.formats.machine import MachineFile
+from dbbstation.files.formats.model_schema import ModelFile
+from dbbstation.files.formats.plan import PlanFile
+from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.formats.settings_schema import SettingsFile
+from dbbstation.files.yaml.schema import format_of, versions_of
+
+if TYPE_CHECKING:
+    from dbbstation.files.yaml.schema import Schema
+
+_NEWEST = (JigFile, MachineFile, ModelFile, PlanFile, SessionFile, SettingsFile)
+
+SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _NEWEST}
+"""Schema of each format by its name with its newest version, which has all keys of those before."""
+
+
+def json_schema(name: str) -> dict[str, Any]:
+    """Return the JSON Schema of a format, units and plausible ranges included.
+
+    Args:
+        name: with any version that is read; a schema has the keys of all of them.
+
+    Raises:
+        KeyError: no format has this name.
+    """
+    newest = next((known for known, schema in SCHEMAS.items() if name in versions_of(schema)), name)
+    schema = SCHEMAS[newest].model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": newest}

@@ -1,0 +1,163 @@
+"""`dbb-jig/1`: the jig plate, its holders and the balls that were measured on it."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
+
+from dbbstation.errors import Problem
+from dbbstation.files.formats.quantities import Coordinate, ExpansionUmMK, Point, Quantity, TemperatureDegc
+from dbbstation.files.yaml.schema import Schema, dotted, read_document, validate
+from dbbstation.files.yaml.text import Location, YamlDocument
+
+BY_CMM, UNDER_SPINDLE = "cmm", "under-spindle"
+"""How a ball is placed: where a CMM measured it, or where nobody knows."""
+
+_CLOSEST_BORES_MM = 5.0
+
+_OF_THE_CMM = ("bore", "holder", "uncertainty_um")
+"""What only a ball has that a CMM measured."""
+
+
+def _spaced(bores: dict[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
+    """Refuse bores closer than any ball holder is wide: coordinates in metres, or one bore under two numbers."""
+    names = list(bores)
+    for place, bore in enumerate(names):
+        for other in names[:place]:
+            distance = math.dist(bores[bore], bores[other])
+            if distance < _CLOSEST_BORES_MM:
+                raise PydanticCustomError(
+                    "implausible",
+                    "bores {one} and {two} lie {distance} mm apart, closer than a holder is wide; expected mm",
+                    {"one": other, "two": bore, "distance": f"{distance:g}"},
+                )
+    return bores
+
+
+class JigSchema(Schema):
+    """The plate on the table."""
+
+    bores: Annotated[dict[int, tuple[Coordinate, Coordinate]], AfterValidator(_spaced)]
+    """Number of each bore with its x, y as designed, jig frame [mm]."""
+    origin_in_machine_mm: Point
+    """Where the jig frame's origin stands in the machine frame: x, y, z [mm]."""
+    rotation_about_z_deg: Annotated[float, Quantity("deg", 0, 360, signed=True)] = 0.0
+    """Angle from the machine's +X to the jig's +X, towards +Y positive [deg]."""
+    cmm_temp_c: TemperatureDegc | None = None
+    """Temperature of the plate while its balls were measured [degC]."""
+    plate_expansion_um_m_k: ExpansionUmMK | None = None
+    """Thermal expansion of the plate [µm/(m K)]."""
+
+
+class HolderSchema(Schema):
+    """What a ball stands on."""
+
+    repeatability_um: Annotated[float, Quantity("µm", 0.01, 1_000, or_zero=True)]
+    """Scatter of the ball's place from one putting-up to the next, one standard deviation per axis [µm]."""
+
+
+class BallSchema(Schema):
+    """A ball as the coordinate measuring machine found it, or one that is put up under the spindle."""
+
+    placed: Literal["cmm", "under-spindle"] = "cmm"
+    """`cmm`: a CMM measured where it stands; `under-spindle`: the machine drives there and it is put up at the tool tip,
+    as the standard circular test does: nobody knows where it stands."""
+    bore: int | None = None
+    """Bore that it stands in; null for a ball that stands in none."""
+    holder: str | None = None
+    """Holder that it stands on; only of a ball placed by CMM."""
+    centre_mm: Point
+    """Centre: x, y, z, jig frame; under the spindle, where the machine is told to stand when it is put up [mm]."""
+    uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000, or_zero=True)] | None = None
+    """Uncertainty of each coordinate, one standard deviation; only of a ball placed by CMM [µm]."""
+
+
+class JigFile(Schema):
+    """A jig plate with its holders and the CMM sheet of its balls."""
+
+    format: Literal["dbb-jig/1"]
+    """Name and version of this format."""
+    name: Annotated[str, Field(min_length=1)] | None = None
+    """What people call the plate."""
+    jig: JigSchema
+    """The plate."""
+    holders: dict[str, HolderSchema]
+    """Holders by name."""
+    balls: dict[str, BallSchema]
+    """Balls by name, one per bore and holder used."""
+
+
+def parse_jig(path: Path, faults: list[Problem]) -> JigFile | None:
+    """Read a jig file; None with every fault added to `faults`."""
+    document = read_document(path, JigFile, faults)
+    if document is None:
+        return None
+    jig = validate(document, JigFile, faults)
+    check_balls(document, document.data.get("jig"), document.data.get("holders"), faults)
+    return jig
+
+
+def check_balls(document: YamlDocument, jig: Any, holders: Any, faults: list[Problem]) -> None:  # noqa: ANN401
+    """Check what balls say of bores and holders, on the raw data: other faults must not hide these.
+
+    Args:
+        document: holds `balls`.
+        jig: the mapping with the bores; None where there is no plate.
+        holders: the mapping of holders, or their names.
+        faults: grows.
+    """
+    bores = _plain_bores(jig)
+    for location, ball in document.entries("balls"):
+        _check_placed(document, location, ball, faults)
+        if ball.get("placed") == UNDER_SPINDLE:
+            continue
+        holder = ball.get("holder")
+        if isinstance(holders, dict | set) and isinstance(holder, str) and holder not in holders:
+            known = ", ".join(sorted(map(str, holders))) or "none"
+            what = f"{dotted(location)}: the holder `{holder}` is not in `holders`"
+            faults.append(document.problem((*location, "holder"), what, f"known: {known}"))
+        bore, centre = ball.get("bore"), ball.get("centre_mm")
+        if bores is None or not isinstance(bore, int):
+            continue
+        if bore not in bores:
+            known = ", ".join(map(str, bores))
+            what = f"{dotted(location)}: bore {bore} is not on the jig"
+            faults.append(document.problem((*location, "bore"), what, f"known: {known}"))
+        elif isinstance(centre, tuple) and len(centre) == 3 and all(isinstance(c, int | float) for c in centre):  # noqa: PLR2004
+            nearest = min(bores, key=lambda b: math.dist(bores[b], centre[:2]))
+            # A holder may lean, but never over to the next bore.
+            if math.dist(bores[nearest], centre[:2]) < math.dist(bores[bore], centre[:2]) - _CLOSEST_BORES_MM:
+                off = math.dist(bores[bore], centre[:2])
+                what = (
+                    f"{dotted(location)}: the centre lies {off:.1f} mm from bore {bore}, at bore {nearest}; "
+                    "expected mm in the jig frame"
+                )
+                faults.append(document.problem((*location, "centre_mm"), what, "check bore, centre and unit"))
+
+
+def _check_placed(document: YamlDocument, location: Location, ball: dict[Any, Any], faults: list[Problem]) -> None:
+    """Check that a ball says what is known of its place, and nothing that nobody can know."""
+    if ball.get("placed") == UNDER_SPINDLE:
+        for key in _OF_THE_CMM:
+            if ball.get(key) is not None:
+                what = f"{dotted(location)}: a ball that is put up under the spindle has no `{key}`"
+                remedy = "take it out, or take `placed` out where a CMM measured the ball"
+                faults.append(document.problem((*location, key), what, remedy, at_key=True))
+    elif ball.get("placed", BY_CMM) == BY_CMM:
+        for key in ("holder", "uncertainty_um"):
+            if ball.get(key) is None:
+                what = f"{dotted(location)}: the key `{key}` is missing"
+                faults.append(document.problem((*location, key), what, "add it"))
+
+
+def _plain_bores(jig: Any) -> dict[int, tuple[float, float]] | None:  # noqa: ANN401 - raw data
+    bores = jig.get("bores") if isinstance(jig, dict) else None
+    if not isinstance(bores, dict):
+        return None
+    return {
+        bore: place
+        for bore, place in bores.items()
+        if isinstance(place, tuple) and len(place) == 2 and all(isinstance(c, int | float) for c in place)  # noqa: PLR2004
+    }

@@ -1,0 +1,222 @@
+"""`dbb-machine/2`, which has all of `dbb-machine/1`: the nominal machine, as its controller believes it."""
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+from pydantic_core import PydanticCustomError
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
+from dbbstation.files.yaml.schema import Schema, read_document, validate
+from dbbstation.machine.geometry import Compliance, Hexapod, JointAxes, Machine, Masses, StrutMasses, Travel
+from dbbstation.machine.rotation import Rotation
+
+_Millimetre = Annotated[float, Quantity("mm", 0, 20, signed=True)]
+_Component = Annotated[float, Quantity("", 0, 1, signed=True)]
+
+_UNIT_WITHIN = 0.01
+"""How far the length of a direction may be from one, written with two or three digits."""
+
+
+def _direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Refuse what is no unit vector: a point in mm, or three zeros."""
+    length = math.hypot(*vector)
+    if abs(length - 1.0) > _UNIT_WITHIN:
+        raise PydanticCustomError(
+            "direction", "a direction has the length 1, not {length}", {"length": f"{length:.3g}"}
+        )
+    return vector
+
+
+_Direction = Annotated[tuple[_Component, _Component, _Component], AfterValidator(_direction)]
+
+
+class TravelSchema(Schema):
+    """Limits of the machine; pairs are [least, greatest]."""
+
+    xy_radius_mm: Annotated[float, Quantity("mm", 5, 10_000)]
+    """Greatest distance of the tool tip from the Z axis [mm]."""
+    x_mm: LimitsMm
+    """X of the tool tip, machine frame [mm]."""
+    y_mm: LimitsMm
+    """Y of the tool tip, machine frame [mm]."""
+    z_mm: LimitsMm
+    """Z of the tool tip, machine frame, up positive [mm]."""
+    a_deg: LimitsDeg
+    """Tilt A about X [deg]."""
+    b_deg: LimitsDeg
+    """Tilt B about Y [deg]."""
+    c_deg: LimitsDeg
+    """Turn C about Z [deg]."""
+    strut_mm: LimitsMm
+    """Length of a strut between its joints [mm]."""
+
+
+class MassesSchema(Schema):
+    """What gravity acts on."""
+
+    platform_kg: Annotated[float, Quantity("kg", 1, 100_000)]
+    """Platform with spindle and tool [kg]."""
+    centre_of_gravity_above_tip_mm: Annotated[float, Quantity("mm", 5, 5_000, or_zero=True, signed=True)]
+    """Height of the platform's centre of gravity above the tool tip, along the platform's axis, up positive [mm]."""
+
+
+class ComplianceSchema(Schema):
+    """How much a strut stretches under an axial force, by design."""
+
+    at_1000mm_mm_per_n: Annotated[float, Quantity("mm/N", 1e-9, 1e-2)]
+    """Elongation per force of a strut of 1000 mm between its joints, pulling positive [mm/N]."""
+    growing_share: Annotated[float, Quantity("", 0, 1)] = 0.9
+    """Part of that which grows with the strut's length; the rest is the same at every length [1]."""
+
+
+class StrutMassesSchema(Schema):
+    """What each of the six struts weighs, on the line through its joints."""
+
+    strut_kg: Annotated[float, Quantity("kg", 0, 2_000)]
+    """What lies evenly between base joint and platform joint, whatever the length [kg]."""
+    motor_kg: Annotated[float, Quantity("kg", 0, 2_000)]
+    """What sits behind the base joint, turning with the strut [kg]."""
+    motor_length_mm: Annotated[float, Quantity("mm", 5, 5_000, or_zero=True)]
+    """Length of that part; its centre is half of it behind the joint [mm]."""
+    screw_kg: Annotated[float, Quantity("kg", 0, 2_000)] = 0.0
+    """Screw that ends at the platform joint and slides through the base joint [kg]."""
+    screw_length_mm: Annotated[float, Quantity("mm", 5, 10_000, or_zero=True)] = 0.0
+    """Length of that screw; its rear end sticks out behind the joint [mm]."""
+
+
+class JointAxesSchema(Schema):
+    """Axes of the universal joints of struts 1 to 6 that are fixed in base and platform, as unit vectors."""
+
+    base: tuple[_Direction, _Direction, _Direction, _Direction, _Direction, _Direction]
+    """Of the base joints, machine frame [1]."""
+    platform: tuple[_Direction, _Direction, _Direction, _Direction, _Direction, _Direction]
+    """Of the platform joints, platform frame [1]."""
+
+
+class MachineParts(Schema):
+    """The machine itself: what a machine file holds beside its `format` line, and a model holds inline."""
+
+    name: Annotated[str, Field(min_length=1)]
+    """What people call the machine."""
+    rotation: Literal["Rx(A) Ry(B) Rz(C)", "Rz(C) Ry(B) Rx(A)"]
+    """How the tilt angles turn platform axes into machine axes; the second is that of LinuxCNC's genhexkins."""
+    base_joints_mm: tuple[JointMm, JointMm, JointMm, JointMm, JointMm, JointMm]
+    """Centres of the base joints of struts 1 to 6, machine frame, Z up [mm]."""
+    platform_joints_mm: tuple[JointMm, JointMm, JointMm, JointMm, JointMm, JointMm]
+    """Centres of the platform joints of struts 1 to 6, platform frame with its origin at the tool tip [mm]."""
+    reference_length_error_mm: tuple[_Millimetre, _Millimetre, _Millimetre, _Millimetre, _Millimetre, _Millimetre] = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
+    """Strut errors that the controller already corrects: it drives strut i to F_i(T) minus this; positive where the
+    strut is longer than the controller believed [mm]."""
+    travel: TravelSchema
+    """Limits that plans and programs are checked against."""
+    screw_lead_mm: Annotated[float, Quantity("mm", 0.5, 200)] | None = None
+    """Travel of a strut per turn of its screw [mm]."""
+    joint_tolerance_mm: Annotated[float, Quantity("mm", 1e-4, 10)] | None = None
+    """Standard deviation of each base-joint coordinate after assembly [mm]; without it no weak direction of a
+    calibration is regularised."""
+    greatest_feed_mm_min: Annotated[float, Quantity("mm/min", 100, 500_000)] | None = None
+    """Greatest feed of the tool tip [mm/min]; programs with a larger F are refused. Without it 100000."""
+    greatest_turn_deg_min: Annotated[float, Quantity("deg/min", 10, 500_000)] | None = None
+    """Greatest speed of the tilt angles [deg/min], for the F of moves that only turn. Without it 36000."""
+    masses: MassesSchema | None = None
+    """What gravity acts on; needed by the sources that model it."""
+    compliance: ComplianceSchema | None = None
+    """Compliance of the struts as designed; needed by the sources that model gravity."""
+    strut_masses: StrutMassesSchema | None = None
+    """Weight of struts and motors; needed by the source that models it."""
+    joint_axes: JointAxesSchema | None = None
+    """Axes of universal joints; needed by the source that models how they turn the screws."""
+
+    def to_domain(self) -> Machine:
+        """Return the machine that calculations use."""
+        masses, compliance, strut_masses = self.masses, self.compliance, self.strut_masses
+        axes = self.joint_axes
+        return Machine(
+            name=self.name,
+            hexapod=Hexapod(
+                np.array(self.base_joints_mm, dtype=np.float64),
+                np.array(self.platform_joints_mm, dtype=np.float64),
+                Rotation(self.rotation),
+            ),
+            travel=Travel(**self.travel.model_dump()),
+            reference_length_error_mm=np.array(self.reference_length_error_mm, dtype=np.float64),
+            screw_lead_mm=self.screw_lead_mm,
+            masses=None if masses is None else Masses(**masses.model_dump()),
+            joint_tolerance_mm=self.joint_tolerance_mm,
+            compliance=None if compliance is None else Compliance(**compliance.model_dump()),
+            strut_masses=None if strut_masses is None else StrutMasses(**strut_masses.model_dump()),
+            joint_axes=None if axes is None else JointAxes(np.array(axes.base), np.array(axes.platform)),
+            greatest_feed_mm_min=self.greatest_feed_mm_min,
+            greatest_turn_deg_min=self.greatest_turn_deg_min,
+        )
+
+
+def machine_parts(machine: Machine) -> MachineParts:
+    """Return a machine as files hold it; the inverse of `MachineParts.to_domain`, exact to the last digit."""
+
+    def points(joints: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+        return tuple(tuple(joint) for joint in joints.tolist())
+
+    return MachineParts.model_validate(
+        {
+            "name": machine.name,
+            "rotation": machine.hexapod.rotation.value,
+            "base_joints_mm": points(machine.hexapod.base_joints_mm),
+            "platform_joints_mm": points(machine.hexapod.platform_joints_mm),
+            "reference_length_error_mm": tuple(machine.reference_length_error_mm.tolist()),
+            "travel": asdict(machine.travel),
+            "screw_lead_mm": machine.screw_lead_mm,
+            "joint_tolerance_mm": machine.joint_tolerance_mm,
+            "greatest_feed_mm_min": machine.greatest_feed_mm_min,
+            "greatest_turn_deg_min": machine.greatest_turn_deg_min,
+            "masses": machine.masses and asdict(machine.masses),
+            "compliance": machine.compliance and asdict(machine.compliance),
+            "strut_masses": machine.strut_masses and asdict(machine.strut_masses),
+            "joint_axes": machine.joint_axes
+            and {"base": points(machine.joint_axes.base), "platform": points(machine.joint_axes.platform)},
+        }
+    )
+
+
+def machine_data(parts: MachineParts) -> dict[str, Any]:
+    """Return the keys of a machine in the order of the format, those without a value left out."""
+    return parts.model_dump(exclude_none=True, exclude={"format"})
+
+
+class MachineFile(MachineParts):
+    """A hexapod machine tool as its controller believes it: joints, travel, screws, masses."""
+
+    format: Literal["dbb-machine/1", "dbb-machine/2"]
+    """Name and version of this format."""
+
+
+def read_machine(path: Path) -> Machine:
+    """Read a machine file.
+
+    Raises:
+        InputError: every fault of the file with its place.
+    """
+    faults: list[Problem] = []
+    parts = parse_machine(path, faults)
+    if parts is None or faults:
+        raise InputError(faults)
+    return parts.to_domain()
+
+
+def parse_machine(path: Path, faults: list[Problem]) -> MachineFile | None:
+    """Read a machine file; None with every fault added to `faults`."""
+    document = read_document(path, MachineFile, faults)
+    return None if document is None else validate(document, MachineFile, faults)

@@ -1,0 +1,259 @@
+"""Reading and writing identified models."""
+
+from __future__ import annotations
+
+import difflib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.catalogue import nearest
+from dbbstation.errors import InputError, ModelError, Problem
+from dbbstation.files.atomic import refuse_existing, write_text
+from dbbstation.files.formats.machine import machine_data, machine_parts
+from dbbstation.files.formats.model_schema import CovarianceSchema, ModelFile, SourceSchema
+from dbbstation.files.formats.quantities import Quantity
+from dbbstation.files.yaml.out import yaml_text
+from dbbstation.files.yaml.schema import dotted, format_for, read_document, validate
+from dbbstation.model.identified import IdentifiedModel
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.contract import ErrorSource, Fitted, Owner
+from dbbstation.sources.registry import HOW_TO_ADD
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.files.yaml.text import Location, YamlDocument
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
+
+_ROUNDING = 1e-9
+"""How far rounding may leave a covariance from symmetric, as a correlation."""
+
+_NEGATIVE = 1e-6
+"""How far below zero rounding may leave an eigenvalue of the correlations."""
+
+
+def read_model(path: Path, known_sources: Mapping[str, ErrorSource]) -> IdentifiedModel:
+    """Read a model.
+
+    Args:
+        path: of the file.
+        known_sources: every error source by name.
+
+    Raises:
+        InputError: every fault of the file with its place.
+    """
+    faults: list[Problem] = []
+    model = parse_model(path, known_sources, faults)
+    if model is None or faults:
+        raise InputError(faults)
+    return model
+
+
+def parse_model(path: Path, known_sources: Mapping[str, ErrorSource], faults: list[Problem]) -> IdentifiedModel | None:
+    """Read a model; None with every fault added to `faults`."""
+    document = read_document(path, ModelFile, faults)
+    file = None if document is None else validate(document, ModelFile, faults)
+    if document is None or file is None:
+        return None
+    machine = file.machine.to_domain()
+    reader = _Sources(document, machine, known_sources, faults)
+    fitted = [reader.fitted(("sources", i), source) for i, source in enumerate(file.sources)]
+    effects = enumerate(file.measurement_effects)
+    fitted += [reader.fitted(("measurement_effects", i), effect, effect.shared) for i, effect in effects]
+    covariance = None
+    if _is_square(file.covariance):
+        count = len(file.covariance.rows)  # none at all in a model that was written by hand
+        covariance = np.array(file.covariance.matrix, dtype=np.float64).reshape(count, count)
+    _check_rows(document, file, faults)
+    if covariance is None:
+        what = f"covariance.matrix: {len(file.covariance.rows)} rows of as many numbers were expected, one per row name"
+        faults.append(document.problem(("covariance", "matrix"), what, "restore the file as it was written"))
+    elif (fault := covariance_fault(covariance)) is not None:
+        faults.append(document.problem(("covariance", "matrix"), f"covariance.matrix: {fault}", "restore the file"))
+    if faults or covariance is None:
+        return None
+    return IdentifiedModel(
+        model=MachineModel(machine, tuple(one for one in fitted if one is not None)),
+        covariance_rows=file.covariance.rows,
+        covariance=covariance,
+        directions_lost=file.directions_lost,
+        report=_lists(file.report),
+        sessions=file.sessions,
+    )
+
+
+class _Sources:
+    """Turns named sources of a document into fitted ones."""
+
+    def __init__(
+        self, document: YamlDocument, machine: Machine, known: Mapping[str, ErrorSource], faults: list[Problem]
+    ) -> None:
+        self._document = document
+        self._machine = machine
+        self._known = known
+        self._faults = faults
+        self._seen: set[tuple[str, str]] = set()
+
+    def fitted(self, location: Location, entry: SourceSchema, shared: str = "") -> Fitted | None:
+        source = self._known.get(entry.name)
+        if source is None:
+            remedy = f"{nearest(entry.name, self._known)}; {HOW_TO_ADD}"
+            self._fault((*location, "name"), f"no error source is called `{entry.name}`", remedy)
+            return None
+        if (source.belongs_to is Owner.MACHINE) is bool(shared):
+            right = "sources" if source.belongs_to is Owner.MACHINE else "measurement_effects"
+            what = f"`{entry.name}` belongs to the {source.belongs_to}, not here"
+            self._fault((*location, "name"), what, f"put it under `{right}`")
+            return None
+        if (entry.name, shared) in self._seen:
+            self._fault((*location, "name"), f"`{entry.name}` stands here a second time", "remove one")
+            return None
+        self._seen.add((entry.name, shared))
+        return self._with_values(location, entry, source, shared)
+
+    def _with_values(self, location: Location, entry: SourceSchema, source: ErrorSource, shared: str) -> Fitted | None:
+        try:
+            logged = source.by_temperature()
+            if logged is not None and entry.parameters.keys() == {p.name for p in logged.parameters(self._machine)}:
+                source = logged
+            parameters = source.parameters(self._machine)
+        except ModelError as error:
+            self._fault((*location, "name"), error.what, error.remedy)
+            return None
+        location = (*location, "parameters")
+        expected = {parameter.name: parameter for parameter in parameters}
+        for name, parameter in expected.items():
+            if name not in entry.parameters and not parameter.newer:
+                self._fault(location, f"{dotted(location)}: `{name}` of {source.name} is missing", "add it")
+        for name, given in entry.parameters.items():
+            if name not in expected:
+                near = difflib.get_close_matches(name, expected, n=1, cutoff=0.6)
+                remedy = f"did you mean `{near[0]}`?" if near else f"it has: {', '.join(expected)}"
+                self._fault((*location, name), f"{source.name} has no parameter `{name}`", remedy, at_key=True)
+            elif given.unit != expected[name].unit:
+                what = f"{source.name} {name} is in {expected[name].unit}, not in {given.unit}"
+                self._fault((*location, name, "unit"), what, "convert the number, do not only change the unit")
+            elif source.belongs_to is Owner.MACHINE:
+                self._check_value((*location, name, "value"), source, expected[name], given.value)
+        may_lack = {name for name, parameter in expected.items() if parameter.newer}
+        if set(entry.parameters) | may_lack != set(expected):
+            return None
+        stated = {name: given.value for name, given in entry.parameters.items()}
+        values = np.array([stated.get(name, 0.0) for name in expected], dtype=np.float64)
+        return Fitted(source, values, shared)
+
+    def _check_value(self, location: Location, source: ErrorSource, parameter: Parameter, value: float) -> None:
+        """Add a fault for a value that no machine has: it would be compensated."""
+        size = Quantity(parameter.unit, 0.0, parameter.largest, signed=True)
+        if not size.fits(value):
+            what = f"{source.name} {parameter.name}: {value:g} {parameter.unit} is not plausible, expected {size.range}"
+            self._fault(location, what, "check the number and its unit")
+
+    def _fault(self, location: Location, what: str, remedy: str, *, at_key: bool = False) -> None:
+        self._faults.append(self._document.problem(location, what, remedy, at_key=at_key))
+
+
+def _is_square(covariance: CovarianceSchema) -> bool:
+    count = len(covariance.rows)
+    return len(covariance.matrix) == count and all(len(row) == count for row in covariance.matrix)
+
+
+def _check_rows(document: YamlDocument, file: ModelFile, faults: list[Problem]) -> None:
+    named = {(source.name, "", parameter) for source in file.sources for parameter in source.parameters}
+    named |= {(e.name, e.shared, parameter) for e in file.measurement_effects for parameter in e.parameters}
+    seen: set[tuple[str, str, str]] = set()
+    for index, row in enumerate(file.covariance.rows):
+        shown = " ".join(part for part in row if part)
+        if row in seen:
+            what = f"the covariance row `{shown}` stands here a second time"
+            faults.append(document.problem(("covariance", "rows", index), what, "remove one"))
+        elif row not in named:
+            what = f"the covariance row `{shown}` names no parameter of this model"
+            faults.append(document.problem(("covariance", "rows", index), what, "restore the file"))
+        seen.add(row)
+
+
+def covariance_fault(covariance: NDArray[np.float64]) -> str | None:
+    """Say why a matrix, shape (k, k), is no covariance; None where it is one."""
+    variance = np.diag(covariance)
+    if (variance < 0).any():
+        return f"the variance in row {int(np.argmax(variance < 0)) + 1} is negative"
+    known = variance > 0
+    if covariance[~known].any() or covariance[:, ~known].any():
+        row = int(np.argmax(~known & (covariance.any(axis=1) | covariance.any(axis=0)))) + 1
+        return f"row {row} has no variance, but covariances"
+    scale = np.sqrt(variance[known])
+    correlation = covariance[np.ix_(known, known)] / np.outer(scale, scale)
+    skew = np.abs(correlation - correlation.T)
+    if skew.size and skew.max() > _ROUNDING:
+        row, column = np.flatnonzero(known)[list(np.unravel_index(int(np.argmax(skew)), skew.shape))] + 1
+        return f"it is not symmetric: row {row} and column {column} differ"
+    if correlation.size and np.linalg.eigvalsh(correlation).min() < -_NEGATIVE:
+        return "it is not positive: some combination of parameters would have a negative variance"
+    return None
+
+
+def write_model(
+    path: Path, model: IdentifiedModel, *, provenance: Provenance | None = None, force: bool = False
+) -> None:
+    """Write a model, every number exact to the last digit, with where it comes from.
+
+    Raises:
+        OutputError: the file exists and `force` is not given, or it cannot be written.
+        ValueError: the model could not be read back: its covariance is none, or does not fit its rows.
+    """
+    refuse_existing(path, force=force)
+    data = model_data(model)
+    if provenance is not None:
+        data["provenance"] = provenance.data()
+    write_text(path, yaml_text({**data, "format": format_for(ModelFile, data)}), force=force)
+
+
+def model_data(model: IdentifiedModel) -> dict[str, Any]:
+    """Return a model as its file holds it."""
+    count = len(model.covariance_rows)
+    fault = None if model.covariance.shape == (count, count) else f"{model.covariance.shape} for {count} rows"
+    if fault := fault or covariance_fault(model.covariance):
+        raise ValueError(f"a model cannot be written with this covariance: {fault}")
+    machine = model.model.machine
+    own = [one for one in model.model.sources if one.source.belongs_to is Owner.MACHINE]
+    others = [one for one in model.model.sources if one.source.belongs_to is not Owner.MACHINE]
+    nominal = machine_data(machine_parts(machine))
+    return {
+        "format": format_for(ModelFile, nominal),
+        "machine": nominal,
+        "sources": [_source_data(one, machine) for one in own],
+        "measurement_effects": [_source_data(one, machine) for one in others],
+        "covariance": {
+            "rows": [list(row) for row in model.covariance_rows],
+            "matrix": [row.tolist() for row in model.covariance],
+        },
+        "directions_lost": list(model.directions_lost),
+        "report": dict(model.report),
+        "sessions": dict(model.sessions),
+    }
+
+
+def _source_data(fitted: Fitted, machine: Machine) -> dict[str, Any]:
+    parameters = fitted.source.parameters(machine)
+    return {
+        "name": fitted.source.name,
+        **({"shared": fitted.shared} if fitted.shared else {}),
+        "parameters": {
+            parameter.name: {"value": float(value), "unit": parameter.unit}
+            for parameter, value in zip(parameters, fitted.values, strict=True)
+        },
+    }
+
+
+def _lists(value: Any) -> Any:  # noqa: ANN401 - what fits report is theirs
+    """Return the report with lists as they were written: reading makes tuples of all sequences."""
+    if isinstance(value, dict):
+        return {key: _lists(item) for key, item in value.items()}
+    return [_lists(item) for item in value] if isinstance(value, tuple) else value

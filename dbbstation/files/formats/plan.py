@@ -1,0 +1,316 @@
+"""`dbb-plan/2`, which has all of `dbb-plan/1`: which circles are measured, about which balls."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, Tag
+from pydantic_core import PydanticCustomError
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.jig import (
+    BY_CMM,
+    UNDER_SPINDLE,
+    BallSchema,
+    HolderSchema,
+    JigFile,
+    JigSchema,
+    check_balls,
+    parse_jig,
+)
+from dbbstation.files.formats.quantities import Quantity, twice
+from dbbstation.files.yaml.schema import Schema, dotted, read_document, validate
+from dbbstation.files.yaml.text import YamlDocument
+from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.plan import LARGEST_LOSS_PERCENT, Ball, Plan, PlannedTest, Plate
+
+NO_PLATE = JigSchema(bores={}, origin_in_machine_mm=(0.0, 0.0, 0.0))
+"""A plan that puts all its balls up under the spindle needs no plate: places are in the machine frame."""
+
+_RADIANS_BELOW_DEG = 0.6
+"""A plan whose greatest tilt is smaller than this was written in radians: 0.6 rad is 34 deg."""
+
+
+def _once(directions: tuple[str, ...]) -> tuple[str, ...]:
+    if twice(directions):
+        raise PydanticCustomError("twice", "a direction stands here twice", {})
+    return directions
+
+
+_Radius = Annotated[float, Quantity("mm", 20, 2_000)]
+_Feed = Annotated[float, Quantity("mm/min", 20, 100_000)]
+_Start = Annotated[float, Quantity("deg", 0, 720, signed=True)]
+_Overshoot = Annotated[float, Quantity("deg", 1, 360, or_zero=True)]
+_FeedIn = Annotated[float, Quantity("mm", 0.01, 50, or_zero=True)]
+_Directions = Annotated[tuple[Literal["ccw", "cw"], ...], Field(min_length=1), AfterValidator(_once)]
+_Tilt = Annotated[float, Quantity("deg", 0, 180, signed=True)]
+_Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+
+
+class PathSchema(Schema):
+    """How every circle is travelled."""
+
+    radius_mm: _Radius
+    """Length of the bar R, distance between the ball centres [mm]."""
+    feed_mm_min: _Feed
+    """Speed of the tool tip along its path [mm/min]."""
+    start_deg: _Start = 0.0
+    """Angle where the full turn starts, from +X towards +Y positive [deg]."""
+    overshoot_deg: _Overshoot = 0.0
+    """Arc travelled before and after the full turn [deg]."""
+    feed_in_mm: _FeedIn = 0.0
+    """How far outside the circle the feed-in starts, along the bar, outwards positive [mm]."""
+    directions: _Directions = ("ccw", "cw")
+    """Senses of travel in the order they are run."""
+
+
+class PathOverride(Schema):
+    """Parts of the path that one test has otherwise."""
+
+    radius_mm: _Radius | None = None
+    """Length of the bar R [mm]."""
+    feed_mm_min: _Feed | None = None
+    """Speed of the tool tip along its path [mm/min]."""
+    start_deg: _Start | None = None
+    """Angle where the full turn starts, from +X towards +Y positive [deg]."""
+    overshoot_deg: _Overshoot | None = None
+    """Arc travelled before and after the full turn [deg]."""
+    feed_in_mm: _FeedIn | None = None
+    """How far outside the circle the feed-in starts [mm]."""
+    directions: _Directions | None = None
+    """Senses of travel in the order they are run."""
+
+
+class TestSchema(Schema):
+    """One test: a circle about a ball."""
+
+    __test__ = False  # pytest takes the name for one of its own
+
+    name: _Name
+    """Unique in the plan; part of file names."""
+    ball: str
+    """Ball that the bar turns about."""
+    a_deg: _Tilt = 0.0
+    """Tool tilt A about X, held over the circle [deg]."""
+    b_deg: _Tilt = 0.0
+    """Tool tilt B about Y, held over the circle [deg]."""
+    c_deg: _Tilt = 0.0
+    """Turn C about Z, held over the circle [deg]."""
+    elevation_deg: Annotated[float, Quantity("deg", 0.6, 80, or_zero=True, signed=True)] = 0.0
+    """Angle of the bar above the horizontal, moving ball higher positive [deg]: the tool tip's circle then has the
+    radius R cos e and lies R sin e above the ball."""
+    path: PathOverride | None = None
+    """Parts of the plan's path that this test has otherwise."""
+
+
+class PlanFile(Schema):
+    """Circles to be measured: jig, holders, balls and tests."""
+
+    format: Literal["dbb-plan/1", "dbb-plan/2"]
+    """Name and version of this format."""
+    name: Annotated[str, Field(min_length=1)]
+    """What people call the plan."""
+    path: PathSchema
+    """How the circles are travelled."""
+    jig: (
+        Annotated[
+            Annotated[JigSchema, Tag("inline")] | Annotated[str, Tag("path")],
+            Discriminator(lambda jig: "path" if isinstance(jig, str) else "inline"),
+        ]
+        | None
+    ) = None
+    """The plate; or the path of a `dbb-jig/1` file, from this file's folder, that holds plate, holders and balls. Absent
+    where every ball is put up under the spindle: places are in the machine frame then."""
+    holders: dict[str, HolderSchema] = Field(default_factory=dict)
+    """Holders by name."""
+    balls: dict[str, BallSchema] = Field(default_factory=dict)
+    """Balls by name, one per bore and holder used."""
+    tests: Annotated[tuple[TestSchema, ...], Field(min_length=1)]
+    """Tests in the order they are run."""
+    repeat_at_end: tuple[str, ...] = ()
+    """Tests measured once more after all others, so that drift and height do not mix."""
+    largest_loss_percent: Annotated[float, Quantity("%", 0.001, 100, or_zero=True)] | None = None
+    """Share of a run's samples that may be lost; a run that lost more is repeated [%]. Absent: 0.5."""
+
+
+@dataclass(frozen=True)
+class InlinePlan:
+    """A plan with its jig inline, whatever files it came from.
+
+    Attributes:
+        plan: as the file has it; its `jig` is no path any more.
+        jig: the plate; one without bores where the plan has none.
+    """
+
+    plan: PlanFile
+    jig: JigSchema
+
+    def to_domain(self) -> Plan:
+        """Return the plan that calculations use: balls in the machine frame, every circle complete."""
+        balls = {name: self._ball(name, ball) for name, ball in self.plan.balls.items()}
+        tests = {test.name: _planned(test, balls[test.ball], self.plan.path) for test in self.plan.tests}
+        limit = self.plan.largest_loss_percent
+        largest = LARGEST_LOSS_PERCENT if limit is None else limit
+        return Plan(self.plan.name, tests, self.plan.repeat_at_end, largest)
+
+    def _ball(self, name: str, ball: BallSchema) -> Ball:
+        x, y, z = ball.centre_mm
+        origin = self.jig.origin_in_machine_mm
+        turn = math.radians(self.jig.rotation_about_z_deg)
+        centre = (
+            origin[0] + x * math.cos(turn) - y * math.sin(turn),
+            origin[1] + x * math.sin(turn) + y * math.cos(turn),
+            origin[2] + z,
+        )
+        if ball.holder is None or ball.uncertainty_um is None:
+            # Only a ball under the spindle comes without them. How well it stands is for a micrometer to say.
+            return Ball(name, None, "", centre, 0.0, 0.0, place_known=False)
+        repeatability = self.plan.holders[ball.holder].repeatability_um / 1e3
+        plate = None if ball.bore is None else Plate(origin, self.jig.plate_expansion_um_m_k)
+        return Ball(name, ball.bore, ball.holder, centre, ball.uncertainty_um / 1e3, repeatability, plate=plate)
+
+
+def plan_data(plan: InlinePlan) -> dict[str, Any]:
+    """Return a plan as its file holds it, the jig inline."""
+    data = plan.plan.model_dump(exclude_none=True)
+    for ball in data["balls"].values():
+        if ball["placed"] != UNDER_SPINDLE:
+            del ball["placed"]  # the usual case goes without saying
+    return data
+
+
+def _planned(test: TestSchema, ball: Ball, general: PathSchema) -> PlannedTest:
+    override = {} if test.path is None else test.path.model_dump(exclude_none=True)
+    path = general.model_copy(update=override)
+    directions = tuple(Direction(direction) for direction in path.directions)
+    x, y, z = ball.centre_mm
+    circle = Circle(
+        ball_mm=ball.centre_mm,
+        centre_mm=(x, y, z + path.radius_mm * math.sin(math.radians(test.elevation_deg))),
+        bar_mm=path.radius_mm,
+        tilt_deg=(test.a_deg, test.b_deg, test.c_deg),
+        feed_mm_min=path.feed_mm_min,
+        start_deg=path.start_deg,
+        overshoot_deg=path.overshoot_deg,
+        feed_in_mm=path.feed_in_mm,
+        elevation_deg=test.elevation_deg,
+        direction=directions[0],
+    )
+    return PlannedTest(test.name, ball, circle, directions)
+
+
+def read_plan(path: Path) -> Plan:
+    """Read a test plan and the jig file that it names.
+
+    Raises:
+        InputError: every fault of both files with its place.
+    """
+    return read_inline_plan(path).to_domain()
+
+
+def read_inline_plan(path: Path) -> InlinePlan:
+    """Read a test plan with the jig file that it names put into it.
+
+    Raises:
+        InputError: every fault of both files with its place.
+    """
+    faults: list[Problem] = []
+    plan = parse_plan(path, faults)
+    if plan is None or faults:
+        raise InputError(faults)
+    return plan
+
+
+def parse_plan(path: Path, faults: list[Problem]) -> InlinePlan | None:
+    """Read a test plan; None with every fault added to `faults`."""
+    document = read_document(path, PlanFile, faults)
+    if document is None:
+        return None
+    before = len(faults)
+    plan = validate(document, PlanFile, faults)
+    named = document.data.get("jig")
+    jig_file = parse_jig(path.parent / named, faults) if isinstance(named, str) else None
+    holders, balls = _merged(document, jig_file, faults)
+    check_balls(document, jig_file.model_dump()["jig"] if jig_file else named, holders, faults)
+    if named is None and any(ball.get("placed", BY_CMM) == BY_CMM for _, ball in document.entries("balls")):
+        remedy = "add it; only a plan that puts all its balls up under the spindle needs none"
+        faults.append(document.problem((), "the key `jig` is missing", remedy))
+    if jig_file is not None or not isinstance(named, str):
+        _check_tests(document, balls, faults)
+        _check_under_spindle(document, jig_file, faults)
+    if plan is None or len(faults) > before:
+        return None
+    if jig_file is None:
+        return None if isinstance(plan.jig, str) else InlinePlan(plan, plan.jig or NO_PLATE)
+    whole = {"jig": jig_file.jig, "holders": jig_file.holders | plan.holders, "balls": jig_file.balls | plan.balls}
+    return InlinePlan(plan.model_copy(update=whole), jig_file.jig)
+
+
+def _merged(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) -> tuple[set[str], set[str]]:
+    """Names of holders and balls of the plan and its jig file; one in both is a fault."""
+    merged = []
+    for kind in ("holders", "balls"):
+        there = document.data.get(kind)
+        own = set(there) if isinstance(there, dict) else set()
+        shared = set() if jig is None else set(getattr(jig, kind))
+        for name in sorted(own & shared):
+            what = f"{kind}: `{name}` stands in the jig file as well"
+            faults.append(document.problem((kind, name), what, "remove one", at_key=True))
+        merged.append(own | shared)
+    return merged[0], merged[1]
+
+
+def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem]) -> None:
+    """Check what tests say of balls and of each other, on the raw data: other faults must not hide these."""
+    tests = document.entries("tests")
+    names = [test.get("name") for _, test in tests]
+    for index in twice(names):
+        location = (*tests[index][0], "name")
+        faults.append(document.problem(location, f"the test name `{names[index]}` stands here a second time", "rename"))
+    for location, test in tests:
+        ball = test.get("ball")
+        if isinstance(ball, str) and ball not in balls:
+            what = f"{dotted(location)}: the ball `{ball}` is not in `balls`"
+            faults.append(document.problem((*location, "ball"), what, f"known: {', '.join(sorted(balls)) or 'none'}"))
+    repeats = document.data.get("repeat_at_end")
+    for index, name in enumerate(repeats if isinstance(repeats, tuple) else ()):
+        if name not in names:
+            what = f"repeat_at_end: there is no test `{name}`"
+            faults.append(document.problem(("repeat_at_end", index), what, "name tests of this plan"))
+    _check_tilt_unit(document, faults)
+
+
+def _check_under_spindle(document: YamlDocument, jig: JigFile | None, faults: list[Problem]) -> None:
+    """Refuse a ball that is put up under the spindle at one tilt and measured at another.
+
+    Errors of the machine lie between the two; what a micrometer reads against the spindle holds for one tilt alone.
+    """
+    balls = document.entries("balls")
+    under = {location[-1] for location, ball in balls if ball.get("placed") == UNDER_SPINDLE}
+    under |= set() if jig is None else {name for name, ball in jig.balls.items() if ball.placed == UNDER_SPINDLE}
+    first: dict[Any, tuple[tuple[Any, ...], Any]] = {}
+    for location, test in document.entries("tests"):
+        ball, tilt = test.get("ball"), tuple(test.get(key, 0) for key in ("a_deg", "b_deg", "c_deg"))
+        if not isinstance(ball, str) or ball not in under:
+            continue
+        tilt_then, name_then = first.setdefault(ball, (tilt, test.get("name")))
+        if tilt != tilt_then:
+            what = (
+                f"{dotted(location)}: the ball `{ball}` is put up under the spindle at the tilt of test `{name_then}`"
+            )
+            faults.append(document.problem((*location, "ball"), what, "give each tilt a ball of its own"))
+
+
+def _check_tilt_unit(document: YamlDocument, faults: list[Problem]) -> None:
+    """Refuse a plan in radians: single small tilts are possible, a plan of nothing else is not."""
+    tilts = [
+        ((*location, key), test[key])
+        for location, test in document.entries("tests")
+        for key in ("a_deg", "b_deg", "c_deg")
+        if isinstance(test.get(key), int | float) and test[key] != 0
+    ]
+    if tilts and max(abs(tilt) for _, tilt in tilts) < _RADIANS_BELOW_DEG:
+        location, tilt = tilts[0]
+        what = f"{dotted(location)}: {tilt:g} deg, and no tilt of the plan is greater than {_RADIANS_BELOW_DEG:g} deg"
+        faults.append(document.problem(location, f"{what} (it looks like rad)", "give tilts in degrees"))

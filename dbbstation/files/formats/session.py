@@ -1,0 +1,150 @@
+"""`dbb-session/2`, which has all of `dbb-session/1`: what was done in a session, one entry per run."""
+
+from datetime import datetime
+from pathlib import PurePosixPath
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from dbbstation.files.formats.quantities import ExpansionUmMK, Point, Quantity, TemperatureDegc
+from dbbstation.files.yaml.schema import Schema
+
+
+def _inside(path: str) -> str:
+    parts = PurePosixPath(path).parts
+    if not parts or PurePosixPath(path).is_absolute() or ".." in parts or "\\" in path:
+        raise PydanticCustomError(
+            "outside", "`{path}` must be a path inside the session folder, with forward slashes", {"path": path}
+        )
+    return path
+
+
+def _moment(text: str) -> str:
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        moment = None
+    if moment is None or moment.tzinfo is None:
+        raise PydanticCustomError(
+            "moment", "`{text}` is no time with its zone, expected such as 2026-11-20T08:04:11Z", {"text": text}
+        )
+    return text
+
+
+_NOT_READ = (None, None, None)
+
+InsidePath = Annotated[str, AfterValidator(_inside)]
+Moment = Annotated[str, AfterValidator(_moment), Field(json_schema_extra={"format": "date-time"})]
+Sha256Hex = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+
+
+class BarSchema(Schema):
+    """The bar and how its length was calibrated: held against the plan, nothing of it is added to readings."""
+
+    serial_number: str = ""
+    """Of the bar."""
+    calibrated_length_mm: Annotated[float, Quantity("mm", 20, 2_000)]
+    """Distance between the ball centres that the calibration found [mm]."""
+    calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
+    """Uncertainty of that length, one standard deviation [mm]."""
+    stroke_mm: Annotated[float, Quantity("mm", 0.1, 100)] | None = None
+    """How far its gauge travels from that length, either way; circles of other radii cannot have been run with it [mm]."""
+    calibrated: Moment | None = None
+    """When."""
+    temp_c: TemperatureDegc | None = None
+    """Temperature of the bar then [degC]."""
+    expansion_um_m_k: ExpansionUmMK | None = None
+    """Thermal expansion of the bar [µm/(m K)]."""
+
+
+class ProgramSchema(Schema):
+    """The NC program that was commanded where it was not the plan's nominal circle."""
+
+    file: InsidePath
+    """Path in the session folder."""
+    sha256: Sha256Hex
+    """Of the program file."""
+    model_sha256: Sha256Hex | None = None
+    """Of the model file that it was compensated with."""
+
+
+class RunSchema(Schema):
+    """One run: one circle in one direction."""
+
+    test: str
+    """Test of the plan."""
+    direction: Literal["ccw", "cw"]
+    """Sense of travel, seen from +Z."""
+    repeat: Annotated[int, Field(ge=1)]
+    """Counts the runs of this test and direction, from 1."""
+    mounting: Annotated[int, Field(ge=1)] | None = None
+    """Counts how often a ball was put up; runs with one number at one ball share the ball's place. Absent: one
+    mounting per test."""
+    file: InsidePath
+    """Path in the session folder."""
+    started: Moment | None = None
+    """When the first sample was taken."""
+    state: Literal["recording", "complete", "accepted", "rejected"]
+    """`recording`: the station died here; `complete`: not judged yet."""
+    reason: str | None = None
+    """Why it was rejected."""
+    sha256: Sha256Hex | None = None
+    """Of the run file; absent only while recording."""
+    program: ProgramSchema | None = None
+    """What was commanded, where that was not the plan's nominal circle."""
+    centre_mm: Point | None = None
+    """Centre of the circle as programmed: x, y, z, machine frame, where rounding in the program makes it differ from
+    the plan [mm]."""
+
+    @model_validator(mode="after")
+    def _sealed(self) -> Self:
+        if self.state != "recording" and self.sha256 is None:
+            raise PydanticCustomError(
+                "unsealed",
+                "the run is {state} but has no sha256; only a run in recording has none",
+                {"state": self.state},
+            )
+        return self
+
+
+_Reading = Annotated[float, Quantity("µm", 0, 5_000, signed=True)]
+
+
+class SetUpErrorsSchema(Schema):
+    """What a micrometer read of balls that were put up under the spindle, for one mounting."""
+
+    test: str
+    """A test that was run on the mounting."""
+    mounting: Annotated[int, Field(ge=1)] | None = None
+    """Number of the mounting as the runs have it; absent where they have none."""
+    fixed_ball_um: tuple[_Reading | None, _Reading | None, _Reading | None] = _NOT_READ
+    """Fixed ball less tool tip while the machine stands at the ball's commanded place: x, y, z, machine frame; null where
+    nobody measured [µm]."""
+    moving_ball_um: tuple[_Reading | None, _Reading | None, _Reading | None] = _NOT_READ
+    """Moving ball less tool tip: x, y, z, platform frame; null where nobody measured [µm]."""
+    uncertainty_um: Annotated[float, Quantity("µm", 0.01, 1_000)]
+    """Of each reading, one standard deviation [µm]."""
+
+
+class SessionFile(Schema):
+    """What was done: where the machine and plan stand, the bar, one entry per run."""
+
+    format: Literal["dbb-session/1", "dbb-session/2"]
+    """Name and version of this format."""
+    machine: InsidePath
+    """The nominal model that the controller had while measuring, `dbb-machine/1`."""
+    plan: InsidePath
+    """The test plan as run, `dbb-plan/1`."""
+    serial_number: str = ""
+    """Of the machine."""
+    operator: str = ""
+    """Who measured."""
+    ambient_temp_c: TemperatureDegc | None = None
+    """Temperature of the shop [degC]."""
+    bar: BarSchema | None = None
+    """The bar."""
+    set_up_errors: tuple[SetUpErrorsSchema, ...] = ()
+    """Micrometer readings of balls that were put up under the spindle, one entry per mounting."""
+    runs: tuple[RunSchema, ...] = ()
+    """Runs in the order they were started."""

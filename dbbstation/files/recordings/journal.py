@@ -1,0 +1,195 @@
+"""The journal of a run: every sample reaches the file as it arrives, and the disk at least once a second.
+
+Each line carries its own CRC-32, because after a power cut the pages of a file can come back mixed. While it is being
+recorded the file ends in `.csv.part`; sealing renames it. Nothing is ever overwritten.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import time
+import zlib
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Self
+
+from dbbstation.errors import OutputError
+from dbbstation.files.atomic import sync_folder
+from dbbstation.files.recordings.run_csv import PART
+from dbbstation.trace import columns
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from dbbstation.plan.circle import Direction
+
+SYNC_INTERVAL_S = 1.0
+"""Longest time that a sample stays where a power cut reaches it."""
+
+
+def run_name(test: str, direction: Direction, repeat: int) -> str:
+    """Return the file name of a run once it is sealed."""
+    return f"{test}-{direction}-{repeat}.csv"
+
+
+def run_header(test: str, direction: Direction, repeat: int, names: Sequence[str]) -> bytes:
+    """Return the lines that a run file starts with.
+
+    Raises:
+        ValueError: a column that the format does not know, or one of the required ones is missing.
+    """
+    unknown = [name for name in names if name not in columns.COLUMNS and name != columns.STATUS]
+    missing = [name for name in columns.REQUIRED if name not in names]
+    if unknown or missing:
+        raise ValueError(f"columns of a run: {unknown} are not known, {missing} are missing")
+    top = f"# test: {test}\n# direction: {direction}\n# repeat: {repeat}\n"
+    return (top + ",".join([*names, columns.CRC]) + "\n").encode()
+
+
+def run_line(values: Sequence[float | str], names: Sequence[str]) -> bytes:
+    """Return one line of a run file with its checksum.
+
+    Raises:
+        ValueError: a number that is not finite, or a text with a comma or line end in it.
+    """
+    fields = []
+    for name, value in zip(names, values, strict=True):
+        if isinstance(value, str):
+            if any(character in value for character in ",\r\n\0"):
+                raise ValueError(f"{name} cannot hold {value!r}")
+            fields.append(value)
+            continue
+        if not math.isfinite(value):
+            raise ValueError(f"{name} is {value}; a sample without a value has no place in a run")
+        fields.append(f"{value:.{columns.COLUMNS[name].decimals}f}")
+    body = ",".join(fields).encode()
+    return body + f",{zlib.crc32(body):08x}\n".encode()
+
+
+class RunWriter:
+    """Appends samples to one run; a context manager that leaves the `.part` in place unless it was sealed.
+
+    Args:
+        folder: the session's `runs` folder.
+        test: name of the test.
+        direction: sense of travel.
+        repeat: of this test and direction; must be free.
+        names: columns in order, without the checksum; `t_s` and `length_mm` among them.
+        clock: seconds that rise; for tests.
+
+    Raises:
+        OutputError: the run exists already, or its file cannot be made.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        test: str,
+        direction: Direction,
+        repeat: int,
+        names: Sequence[str],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.names = tuple(names)
+        self.sealed_path = folder / run_name(test, direction, repeat)
+        self.path = self.sealed_path.with_name(self.sealed_path.name + PART)
+        self.samples = 0
+        self._clock = clock
+        self._last_t_s = -math.inf
+        self._time_at = self.names.index(columns.TIME)
+        header = run_header(test, direction, repeat, names)
+        if self.sealed_path.exists():
+            raise OutputError("this run exists already", where=str(self.sealed_path), remedy="take the next repeat")
+        with self._told():
+            # Unbuffered: a killed program loses nothing, only a power cut can.
+            self._file = self.path.open("xb", buffering=0)
+            self._write(header)
+            os.fsync(self._file.fileno())
+            sync_folder(folder)
+        self._synced_at = clock()
+
+    def __enter__(self) -> Self:
+        """Return the writer."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file; what was not sealed stays a `.part`."""
+        self.close()
+
+    def append(self, values: Sequence[float | str]) -> None:
+        """Write one sample, and sync when the last sync is a second old.
+
+        Args:
+            values: one per column, numbers in the columns' units.
+
+        Raises:
+            OutputError: the disk refuses; what was written before stays.
+            ValueError: a value that is not finite, or a time that does not rise.
+        """
+        line = run_line(values, self.names)
+        t_s = float(line.split(b",")[self._time_at])
+        if t_s <= self._last_t_s:
+            raise ValueError(f"t_s must rise: {t_s} after {self._last_t_s}")
+        with self._told():
+            self._write(line)
+        self._last_t_s = t_s
+        self.samples += 1
+        self.sync_if_due()
+
+    def sync_if_due(self) -> None:
+        """Sync when the last sync is a second old; to be called while no samples arrive, too."""
+        if self._clock() - self._synced_at >= SYNC_INTERVAL_S:
+            self.sync()
+
+    def sync(self) -> None:
+        """Bring everything to disk; nothing is left to do once the file is closed.
+
+        Raises:
+            OutputError: the disk refuses.
+        """
+        if self._file.closed:
+            return
+        with self._told():
+            os.fsync(self._file.fileno())
+        self._synced_at = self._clock()
+
+    def seal(self) -> str:
+        """Finish the run: sync, hash what is on disk, give the file its final name; return its SHA-256.
+
+        Raises:
+            OutputError: there is no sample, the final name is taken, or the disk refuses; the `.part` stays then.
+        """
+        if not self.samples:
+            raise OutputError("no sample was recorded", where=str(self.path), remedy="check the instrument's line")
+        self.sync()
+        self.close()
+        with self._told():
+            digest = hashlib.sha256(self.path.read_bytes()).hexdigest()
+            if self.sealed_path.exists():
+                raise OutputError("this run exists already", where=str(self.sealed_path), remedy="take the next repeat")
+            self.path.rename(self.sealed_path)
+            sync_folder(self.sealed_path.parent)
+        return digest
+
+    def close(self) -> None:
+        """Close the file as it is."""
+        self._file.close()
+
+    def _write(self, line: bytes) -> None:
+        left = memoryview(line)
+        while left:
+            left = left[self._file.write(left) :]
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except FileExistsError as error:
+            what = "this run is being recorded, or was when the station died"
+            raise OutputError(what, where=str(self.path), remedy="take the next repeat") from error
+        except OSError as error:
+            why = (error.strerror or str(error)).lower()
+            remedy = "free room on the disk or choose another folder"
+            raise OutputError(f"cannot be written: {why}", where=str(self.path), remedy=remedy) from error

@@ -1,0 +1,431 @@
+"""Reading a session folder: what was done, with which machine and plan, and each run when it is asked for."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from datetime import datetime
+from enum import StrEnum
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.machine import parse_machine
+from dbbstation.files.formats.plan import parse_plan
+from dbbstation.files.formats.quantities import Quantity
+from dbbstation.files.formats.session import BarSchema, ProgramSchema, RunSchema, SessionFile
+from dbbstation.files.recordings.run_csv import PART, RunFile, read_run, sealed_or_part
+from dbbstation.files.recordings.run_lines import split_file
+from dbbstation.files.recordings.session_checks import check_bar, check_runs
+from dbbstation.files.recordings.session_set_up import SetUpReadings, check_set_up_errors, mounted_name, set_up_readings
+from dbbstation.files.source_text import read_bytes
+from dbbstation.files.yaml.schema import read_document, validate
+from dbbstation.plan.circle import Direction
+from dbbstation.sources.contract import Setup
+from dbbstation.trace.cut import lost_on_turn
+from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.circle import Circle
+    from dbbstation.plan.plan import Plan
+    from dbbstation.trace.recording import Recording
+
+SESSION_FILE = "session.yaml"
+"""What a session folder is known by."""
+
+_UNLIKE_RADIUS = 0.2
+"""Share of the bar's length that readings may be off; no ball bar reaches that far."""
+
+_SLOWEST, _FASTEST = 50.0, 0.05
+"""Times as long as the circle should take, between which a recording's duration is plausible."""
+
+
+class RunState(StrEnum):
+    """How far a run has come."""
+
+    RECORDING = "recording"
+    COMPLETE = "complete"
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class Program:
+    """An NC program that was commanded.
+
+    Attributes:
+        path: of its file.
+        sha256: of its file.
+        model_sha256: of the model that it was compensated with; empty where none.
+    """
+
+    path: Path
+    sha256: str
+    model_sha256: str
+
+
+@dataclass(frozen=True)
+class RunEntry:
+    """What the session says of one run.
+
+    Attributes:
+        test: name of the test.
+        direction: sense of travel.
+        repeat: counts the runs of this test and direction, from 1.
+        mounting: counts how often a ball was put up; None: one mounting per test.
+        state: how far it has come.
+        reason: why it was rejected; empty otherwise.
+        started: when the first sample was taken; None where not noted.
+        path: of its file.
+        sha256: of its file; empty while recording.
+        program: what was commanded where it was not the plan's circle.
+        centre_mm: centre of the circle as programmed, machine frame (x, y, z) [mm]; None: as planned.
+    """
+
+    test: str
+    direction: Direction
+    repeat: int
+    mounting: int | None
+    state: RunState
+    reason: str
+    started: datetime | None
+    path: Path
+    sha256: str
+    program: Program | None
+    centre_mm: tuple[float, float, float] | None
+
+    @property
+    def label(self) -> str:
+        """Name of the run in messages."""
+        return f"{self.test} {self.direction} {self.repeat}"
+
+
+@dataclass(frozen=True)
+class Bar:
+    """The bar: nothing of it is added to readings; its length is held against the plan's radii.
+
+    Attributes:
+        serial_number: of the bar.
+        calibrated_length_mm: distance between the ball centres that its calibration found [mm].
+        calibrator_uncertainty_mm: of that length, one standard deviation [mm].
+        calibrated: when; None where not noted.
+        temp_c: of the bar then [degC]; None where not noted.
+        expansion_um_m_k: thermal expansion [µm/(m K)]; None where not noted.
+        stroke_mm: travel of its gauge from that length, either way [mm]; None where not noted.
+    """
+
+    serial_number: str
+    calibrated_length_mm: float
+    calibrator_uncertainty_mm: float
+    calibrated: datetime | None
+    temp_c: float | None
+    expansion_um_m_k: float | None
+    stroke_mm: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SessionFolder:
+    """A session with its machine and plan; runs are read when asked for.
+
+    Attributes:
+        name: of the folder.
+        folder: where it is.
+        machine: the nominal model that the controller had.
+        plan: the plan as run.
+        machine_path: of the machine's file.
+        plan_path: of the plan's file.
+        runs: in the order they were started, of every state.
+        sha256: of the session file.
+        serial_number: of the machine; empty where not noted.
+        operator: empty where not noted.
+        ambient_temp_c: temperature of the shop [degC]; None where not noted.
+        bar: None where not noted.
+        set_up_errors: micrometer readings of balls that were put up under the spindle, at most one per mounting.
+    """
+
+    name: str
+    folder: Path
+    machine: Machine
+    plan: Plan
+    machine_path: Path
+    plan_path: Path
+    runs: tuple[RunEntry, ...]
+    sha256: str
+    serial_number: str = ""
+    operator: str = ""
+    ambient_temp_c: float | None = None
+    bar: Bar | None = None
+    set_up_errors: tuple[SetUpReadings, ...] = ()
+
+    def in_state(self, *states: RunState) -> tuple[RunEntry, ...]:
+        """Return the runs in one of these states."""
+        return tuple(run for run in self.runs if run.state in states)
+
+    def circle(self, run: RunEntry) -> Circle:
+        """Return the circle that a run was commanded, its centre as programmed."""
+        circle = self.plan.tests[run.test].run(run.direction)
+        return circle if run.centre_mm is None else replace(circle, centre_mm=run.centre_mm)
+
+    def setup(self, run: RunEntry) -> Setup:
+        """Return ball, mounting and bar of a run, named so that no other session has the same names."""
+        ball = self.plan.tests[run.test].ball
+        mounted = mounted_name(self.plan, run.test, run.mounting)
+        readings = (r for r in self.set_up_errors if mounted_name(self.plan, r.test, r.mounting) == mounted)
+        return Setup(
+            session=self.name,
+            mounting=f"{self.name}: {mounted}",
+            ball=f"{self.name}: {ball.name}",
+            instrument=f"{self.name}: bar" if self.bar is None else self.bar.serial_number or f"{self.name}: bar",
+            fixed_ball_mm=np.array(ball.centre_mm, dtype=np.float64),
+            mounting_repeatability_mm=ball.repeatability_mm,
+            ball_uncertainty_mm=ball.uncertainty_mm,
+            bar_uncertainty_mm=0.0 if self.bar is None else self.bar.calibrator_uncertainty_mm,
+            place_known=ball.place_known,
+            set_up_errors=next((reading.to_domain() for reading in readings), None),
+            plate=ball.plate,
+            moving_s=self.moving_s,
+        )
+
+    def started_s(self, run: RunEntry) -> float | None:
+        """Start of a run after that of the session's first [s]; None where not noted."""
+        moments = [other.started for other in self.runs if other.started is not None]
+        return None if run.started is None else (run.started - min(moments)).total_seconds()
+
+    @cached_property
+    def moving_s(self) -> tuple[tuple[float, float], ...]:
+        """Beginning and end of every run whose start is noted, kept or not, on the clock of `started_s` [s].
+
+        It ends when its circle is through at the plan's feed: a second or two do not count here.
+        """
+        circles = [(began, self.circle(run)) for run in self.runs if (began := self.started_s(run)) is not None]
+        return tuple(sorted((began, began + circle.swept_deg / circle.turning_deg_s) for began, circle in circles))
+
+    def load(self, run: RunEntry) -> RunFile:
+        """Read a run and hold it against what session and plan say of it.
+
+        Raises:
+            InputError: the file was changed, is damaged, or holds another run; every fault with its line.
+        """
+        read = read_run(run.path, sha256=run.sha256)
+        faults = [*_header_faults(run, read.header), *self._implausible(run, read.recording)]
+        if faults:
+            raise InputError(faults)
+        return read
+
+    def load_all(
+        self, runs: Sequence[RunEntry], progress: Callable[[int, int], None] = lambda _done, _of: None
+    ) -> list[RunFile]:
+        """Read several runs.
+
+        Args:
+            runs: which.
+            progress: told how many of how many are read.
+
+        Raises:
+            InputError: every fault of all their files.
+        """
+        read: list[RunFile] = []
+        faults: list[Problem] = []
+        for done, run in enumerate(runs):
+            progress(done, len(runs))
+            try:
+                read.append(self.load(run))
+            except InputError as error:
+                faults += error.problems
+        progress(len(runs), len(runs))
+        if faults:
+            raise InputError(faults)
+        return read
+
+    def loss(self, run: RunEntry, recording: Recording) -> list[Problem]:
+        """Return what is to be said of samples that a run lost, where they are more than the plan allows."""
+        lost, kept = lost_on_turn(recording, self.circle(run))
+        what = too_many_lost(lost, kept, self.plan.largest_loss_percent)
+        return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
+
+    def _implausible(self, run: RunEntry, recording: Recording) -> list[Problem]:
+        """Units that the file itself cannot tell: only the planned circle says how long and how far."""
+        circle, file = self.circle(run), str(run.path)
+        faults = []
+        bar = circle.bar_mm
+        length = float(np.median(recording.length_mm))
+        likely = Quantity("mm", (1.0 - _UNLIKE_RADIUS) * bar, (1.0 + _UNLIKE_RADIUS) * bar)
+        if not likely.fits(length):
+            what = f"length_mm is about {length:g}, the plan's test {run.test} has a bar of {bar:g} mm"
+            guess = likely.guess(length)
+            if not guess and abs(length) < _UNLIKE_RADIUS * bar:
+                guess = " (it looks like a deviation from the radius)"
+            remedy = "give the whole distance between the balls in mm, nothing taken off"
+            faults.append(Problem(file, 0, 0, what + guess, remedy))
+        if run.state is RunState.RECORDING:
+            return faults
+        expected = 360.0 / circle.turning_deg_s
+        duration = float(recording.t_s[-1] - recording.t_s[0])
+        if not _FASTEST * expected < duration < _SLOWEST * expected:
+            what = f"t_s spans {duration:g}, a turn takes {expected:.1f} s at the plan's feed"
+            faults.append(Problem(file, 0, 0, what, "give t_s in seconds, and the feed that was programmed"))
+        if recording.theta_deg is not None and np.ptp(recording.theta_deg) < np.pi * 2.0 + 0.1:
+            what = f"theta_deg spans {np.ptp(recording.theta_deg):.3f} only (it looks like rad)"
+            faults.append(Problem(file, 0, 0, what, "give a full turn in degrees"))
+        return faults
+
+
+def read_session(path: Path) -> SessionFolder:
+    """Read a session: its folder, or the session file in it.
+
+    Hashes of all files are checked here; the runs' content when they are loaded.
+
+    Raises:
+        InputError: every fault of session, machine and plan, every missing or changed file.
+    """
+    faults: list[Problem] = []
+    session = parse_session(path, faults)
+    if session is None or faults:
+        raise InputError(faults)
+    return session
+
+
+def no_session(folder: Path) -> Problem:
+    """What is wrong with a folder that is no session, with the sessions that stand in it, around it or beside it."""
+    inside = sorted(file.parent for file in folder.glob(f"*/{SESSION_FILE}"))
+    around = [folder.parent] if (folder.parent / SESSION_FILE).is_file() else []
+    beside = sorted(file.parent for file in folder.parent.glob(f"*/{SESSION_FILE}"))
+    near = ", ".join(str(session) for session in (inside or around or beside)[:MOST_NAMED])
+    what = f"this folder is no session: there is no {SESSION_FILE} in it"
+    return Problem(str(folder), 0, 0, what, f"did you mean {near}?" if near else "name a session folder")
+
+
+MOST_NAMED = 4
+"""Sessions that are named beside a folder that is none."""
+
+
+def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
+    """Read a session; None with every fault added to `faults`."""
+    if path.is_dir() and not (path / SESSION_FILE).exists():
+        faults.append(no_session(path))
+        return None
+    file = path / SESSION_FILE if path.is_dir() else path
+    folder = file.parent
+    document = read_document(file, SessionFile, faults)
+    if document is None:
+        return None
+    session = validate(document, SessionFile, faults)
+    data = document.data
+    named = {key: data.get(key) for key in ("machine", "plan")}
+    machine = parse_machine(folder / named["machine"], faults) if isinstance(named["machine"], str) else None
+    plan = parse_plan(folder / named["plan"], faults) if isinstance(named["plan"], str) else None
+    planned = None if plan is None else plan.to_domain()
+    check_runs(document, planned, folder, faults)
+    check_set_up_errors(document, planned, faults)
+    if session is not None and planned is not None and session.bar is not None:
+        check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, planned, faults)
+    if session is None or machine is None or planned is None:
+        return None
+    entries = [run_entry(run, folder) for run in session.runs]
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    return SessionFolder(
+        name=folder.resolve().name,
+        folder=folder,
+        machine=machine.to_domain(),
+        plan=planned,
+        machine_path=folder / session.machine,
+        plan_path=folder / session.plan,
+        runs=(*entries, *_unlisted(folder, entries, planned, faults)),
+        sha256=digest,
+        serial_number=session.serial_number,
+        operator=session.operator,
+        ambient_temp_c=session.ambient_temp_c,
+        bar=None if session.bar is None else _bar(session.bar),
+        set_up_errors=tuple(map(set_up_readings, session.set_up_errors)),
+    )
+
+
+def run_entry(run: RunSchema, folder: Path) -> RunEntry:
+    """Return the entry of a run as the rest of the program takes it."""
+    return RunEntry(
+        test=run.test,
+        direction=Direction(run.direction),
+        repeat=run.repeat,
+        mounting=run.mounting,
+        state=RunState(run.state),
+        reason=run.reason or "",
+        started=None if run.started is None else datetime.fromisoformat(run.started),
+        path=sealed_or_part(folder / run.file),
+        sha256=run.sha256 or "",
+        program=None if run.program is None else _program(run.program, folder),
+        centre_mm=run.centre_mm,
+    )
+
+
+def _program(program: ProgramSchema, folder: Path) -> Program:
+    return Program(folder / program.file, program.sha256, program.model_sha256 or "")
+
+
+def _bar(bar: BarSchema) -> Bar:
+    moment = None if bar.calibrated is None else datetime.fromisoformat(bar.calibrated)
+    return Bar(**{**bar.model_dump(), "calibrated": moment})
+
+
+def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Problem]) -> list[RunEntry]:
+    """Runs that were being recorded when the station died before it could note them."""
+    listed = {run.path.name for run in entries}
+    found = []
+    for path in sorted(folder.glob(f"runs/*.csv{PART}")):
+        entry = None if path.name in listed else part_entry(path)
+        if entry is None or path.name in listed:
+            continue
+        if entry.test not in plan.tests:
+            faults.append(
+                Problem(str(path), 1, 0, f"the plan has no test `{entry.test}`: this is a run of another plan")
+            )
+        else:
+            found.append(entry)
+    return found
+
+
+def unlisted_sealed(session: SessionFolder) -> tuple[Path, ...]:
+    """Return the sealed runs in a session's folder that its session file does not list."""
+    listed = {run.path.name for run in session.runs}
+    return tuple(path for path in sorted((session.folder / "runs").glob("*.csv")) if path.name not in listed)
+
+
+def part_entry(path: Path) -> RunEntry | None:
+    """Return what the file of a run says of itself; None where it does not say which run it is."""
+    data = read_bytes(path, [])
+    lines = None if data is None else split_file(data, str(path), [])
+    header = {} if lines is None else lines.header
+    if (
+        not header.get("test")
+        or header.get("direction") not in set(Direction)
+        or not header.get("repeat", "").isdigit()
+    ):
+        return None
+    return RunEntry(
+        test=header["test"],
+        direction=Direction(header["direction"]),
+        repeat=int(header["repeat"]),
+        mounting=None,
+        state=RunState.RECORDING,
+        reason="",
+        started=None,
+        path=path,
+        sha256="",
+        program=None,
+        centre_mm=None,
+    )
+
+
+def _header_faults(run: RunEntry, header: Mapping[str, str]) -> list[Problem]:
+    """Compare what the run file says of itself with its entry."""
+    faults = []
+    for key, expected in (("test", run.test), ("direction", str(run.direction)), ("repeat", str(run.repeat))):
+        if header.get(key, expected) != expected:
+            what = f"the file is {key} `{header[key]}`, the session calls it {key} `{expected}`"
+            faults.append(Problem(str(run.path), 0, 0, what, "check which file belongs to which run"))
+    return faults

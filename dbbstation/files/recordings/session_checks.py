@@ -1,0 +1,71 @@
+"""What a session file says, held against its plan and the disk."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.files.formats.quantities import twice
+from dbbstation.files.recordings.bar_reach import unlike_bar
+from dbbstation.files.recordings.run_csv import changed, sealed_or_part
+from dbbstation.files.source_text import read_bytes
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.errors import Problem
+    from dbbstation.files.yaml.text import Location, YamlDocument
+    from dbbstation.plan.plan import Plan
+
+
+def check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: list[Problem]) -> None:
+    """Check runs against each other, the plan and the disk, on the raw data: other faults must not hide these."""
+    runs = document.entries("runs")
+    for key, what in ((("test", "direction", "repeat"), "this run"), (("file",), "this file")):
+        values = [tuple(map(str, map(run.get, key))) for _, run in runs]
+        for index in twice(values):
+            shown = " ".join(values[index])
+            text = f"{what} ({shown}) stands here a second time"
+            faults.append(document.problem(runs[index][0], text, "give each run its own repeat and file"))
+    for location, run in runs:
+        test, direction = run.get("test"), run.get("direction")
+        if plan is not None and isinstance(test, str):
+            if test not in plan.tests:
+                what = f"the plan has no test `{test}`: this is a run of another plan"
+                faults.append(document.problem((*location, "test"), what, f"its tests: {', '.join(plan.tests)}"))
+            elif direction in {"ccw", "cw"} and direction not in plan.tests[test].directions:
+                what = f"the plan does not run test {test} {direction}: this is a run of another plan"
+                faults.append(document.problem((*location, "direction"), what, "check plan and run"))
+        _check_file(document, location, run, folder, faults)
+        if isinstance(run.get("program"), dict):
+            _check_file(document, (*location, "program"), run["program"], folder, faults)
+
+
+def check_bar(
+    document: YamlDocument, length_mm: float, stroke_mm: float | None, plan: Plan, faults: list[Problem]
+) -> None:
+    """Check that the bar can run the circles of the plan."""
+    fault = unlike_bar(length_mm, stroke_mm, plan)
+    if fault is not None:
+        faults.append(document.problem(("bar", "calibrated_length_mm"), *fault))
+
+
+def _check_file(
+    document: YamlDocument,
+    location: Location,
+    entry: dict[str, Any],
+    folder: Path,
+    faults: list[Problem],
+) -> None:
+    """Check that a file is there and is the one whose hash was noted."""
+    file, expected = entry.get("file"), entry.get("sha256")
+    if not isinstance(file, str):
+        return
+    path = sealed_or_part(folder / file)
+    if not path.is_file():
+        what = f"there is no file `{file}` in the session folder"
+        faults.append(document.problem((*location, "file"), what, "restore it, or take the entry out"))
+    elif isinstance(expected, str):
+        data = read_bytes(path, faults, is_input=False)
+        if data is not None and hashlib.sha256(data).hexdigest() != expected:
+            faults.append(changed(str(path)))

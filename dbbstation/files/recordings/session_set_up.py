@@ -1,0 +1,121 @@
+"""Micrometer readings of balls that were put up under the spindle, as a session keeps them, one entry per mounting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+
+from dbbstation.errors import InputError
+from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.yaml.schema import dotted, read_document, validate
+from dbbstation.sources.contract import SetUpErrors
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    from dbbstation.errors import Problem
+    from dbbstation.files.formats.session import SetUpErrorsSchema
+    from dbbstation.files.yaml.text import Location, YamlDocument
+    from dbbstation.plan.plan import Plan
+
+Readings: TypeAlias = tuple[float | None, float | None, float | None]
+"""x, y, z [µm]; None where nobody measured."""
+
+
+@dataclass(frozen=True)
+class SetUpReadings:
+    """What a micrometer read at one mounting, in the file's unit, so that it is written again as it was.
+
+    Attributes:
+        test: a test that was run on the mounting.
+        mounting: number of the mounting; None: the one of that test's runs without a number.
+        fixed_ball_um: fixed ball less tool tip while the machine stood at the ball's commanded place, machine frame [µm].
+        moving_ball_um: moving ball less tool tip, platform frame [µm].
+        uncertainty_um: of each reading, one standard deviation [µm].
+    """
+
+    test: str
+    mounting: int | None
+    fixed_ball_um: Readings
+    moving_ball_um: Readings
+    uncertainty_um: float
+
+    def to_domain(self) -> SetUpErrors:
+        """Return the readings as calculations use them."""
+        return SetUpErrors(_mm(self.fixed_ball_um), _mm(self.moving_ball_um), self.uncertainty_um / 1e3)
+
+
+def set_up_readings(entry: SetUpErrorsSchema) -> SetUpReadings:
+    """Return an entry of a session file as the rest of the program takes it."""
+    return SetUpReadings(entry.test, entry.mounting, entry.fixed_ball_um, entry.moving_ball_um, entry.uncertainty_um)
+
+
+def readings_in(file: Path, plan: Plan) -> tuple[SetUpReadings, ...]:
+    """Return the readings that a session file holds now, whatever its runs are.
+
+    Raises:
+        InputError: every fault of the file's text and of its readings.
+    """
+    faults: list[Problem] = []
+    document = read_document(file, SessionFile, faults)
+    session = None if document is None else validate(document, SessionFile, faults)
+    if document is not None:
+        check_set_up_errors(document, plan, faults)
+    if session is None or faults:
+        raise InputError(faults)
+    return tuple(map(set_up_readings, session.set_up_errors))
+
+
+def mounted_name(plan: Plan, test: str, mounting: int | None) -> str:
+    """Name of one putting-up of a ball within its session: runs of one number share it, without numbers those of a test."""
+    return f"{plan.tests[test].ball.name}, {f'test {test}' if mounting is None else f'mounting {mounting}'}"
+
+
+def check_set_up_errors(document: YamlDocument, plan: Plan | None, faults: list[Problem]) -> None:
+    """Check readings against runs, plan and each other, on the raw data: other faults must not hide these."""
+    mountings: dict[Any, list[Any]] = {}
+    for _, run in document.entries("runs"):
+        mountings.setdefault(run.get("test"), []).append(run.get("mounting"))
+    first: dict[str, Location] = {}
+    for location, entry in document.entries("set_up_errors"):
+        test, mounting = entry.get("test"), entry.get("mounting")
+        if plan is None or not isinstance(test, str):
+            continue
+        if test not in plan.tests:
+            what = f"{dotted(location)}: the plan has no test `{test}`"
+            faults.append(document.problem((*location, "test"), what, f"its tests: {', '.join(plan.tests)}"))
+            continue
+        ball = plan.tests[test].ball
+        if ball.place_known:
+            what = f"{dotted(location)}: the ball `{ball.name}` of test {test} was measured by the CMM"
+            remedy = "set-up errors are read of balls that the plan puts up under the spindle"
+            faults.append(document.problem((*location, "test"), what, remedy))
+        if mounting not in mountings.get(test, []):
+            faults.append(_no_such_mounting(document, location, test, mounting, mountings.get(test, [])))
+        other = first.setdefault(mounted_name(plan, test, mounting), location)
+        if other is not location:
+            what = f"{dotted(location)}: this is the mounting of {dotted(other)} a second time"
+            faults.append(document.problem(location, what, "keep one of the two"))
+
+
+def _no_such_mounting(
+    document: YamlDocument, location: Location, test: str, mounting: object, there: list[Any]
+) -> Problem:
+    numbers = ", ".join(str(number) for number in dict.fromkeys(there) if number is not None)
+    if not there:
+        return document.problem((*location, "test"), f"{dotted(location)}: test {test} has no run", "check the test")
+    if mounting is None:
+        what = f"{dotted(location)}: the runs of test {test} have mounting numbers, the entry has none"
+        return document.problem(location, what, f"give `mounting`: {numbers}")
+    what = f"{dotted(location)}: no run of test {test} has the mounting {mounting}"
+    remedy = f"its mountings: {numbers}" if numbers else "its runs have no numbers: leave `mounting` out"
+    return document.problem((*location, "mounting"), what, remedy)
+
+
+def _mm(readings: Readings) -> NDArray[np.float64]:
+    return np.array([np.nan if reading is None else reading / 1e3 for reading in readings])

@@ -1,0 +1,237 @@
+"""What all schemas share: strict, nothing unknown, frozen; and how their complaints become placed problems."""
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from dbbstation.errors import Problem
+from dbbstation.files.yaml.text import Location, YamlDocument, load_yaml
+
+FORMATS = {
+    "dbb-session": "a session",
+    "dbb-machine": "a machine",
+    "dbb-plan": "a test plan",
+    "dbb-jig": "a jig",
+    "dbb-model": "a model",
+    "dbb-settings": "a shop's settings",
+}
+"""Every format by the name before its version, with what it is called in messages."""
+
+
+_OF_MACHINES = {"greatest_feed_mm_min": 2, "greatest_turn_deg_min": 2}
+
+SINCE: dict[str, dict[str, int]] = {
+    "dbb-plan": {"largest_loss_percent": 2},
+    "dbb-session": {"stroke_mm": 2},
+    "dbb-instrument": {"stroke_mm": 2},
+    "dbb-machine": _OF_MACHINES,
+    "dbb-model": {**_OF_MACHINES, "provenance": 3},
+}
+"""Keys that came after the first version of a format, with the version. A file of an older version must not have them: a
+program of that time would refuse it without saying that a newer one reads it."""
+
+
+class Schema(BaseModel):
+    """Base of every part of a file format; the docstring under each field tells its unit and sign."""
+
+    model_config = ConfigDict(
+        strict=True,
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+    )
+
+
+S = TypeVar("S", bound=Schema)
+
+
+def read_document(path: Path, schema: type[Schema], faults: list[Problem]) -> YamlDocument | None:
+    """Read a YAML file of the format that `schema` describes; None where it is no such file."""
+    document = load_yaml(path, faults)
+    if document is None:
+        return None
+    if not isinstance(document.data, dict):
+        what = "the file holds no `key: value` lines"
+        faults.append(document.problem((), what, "compare it with the example of its format"))
+        return None
+    return document if _has_format(document, versions_of(schema), faults) else None
+
+
+def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> S | None:
+    """Return a document's data as its schema has it; None with every fault added to `faults`."""
+    newer = _newer_keys(document, schema)
+    if newer:
+        faults.extend(newer)
+        return None
+    try:
+        return schema.model_validate(document.data)
+    except ValidationError as error:
+        faults.extend(_problem(document, schema, detail) for detail in error.errors(include_url=False))
+        return None
+
+
+def format_of(schema: type[Schema]) -> str:
+    """Return the format's name with its newest version, such as `dbb-plan/2`."""
+    return versions_of(schema)[-1]
+
+
+def versions_of(schema: type[Schema]) -> tuple[str, ...]:
+    """Return the format's name with every version that is read, oldest first."""
+    return tuple(map(str, schema.model_fields["format"].annotation.__args__))  # type: ignore[union-attr]  # a Literal
+
+
+def format_for(schema: type[Schema], data: Mapping[str, Any]) -> str:
+    """Return the format's name with the oldest version that has all keys of some data, so that older programs read it."""
+    versions = versions_of(schema)
+    since = SINCE.get(versions[0].partition("/")[0], {})
+    return versions[max((since[key] for key in _keys(data) if key in since), default=1) - 1]
+
+
+def _keys(data: object) -> Iterator[str]:
+    """Keys of all mappings in plain data."""
+    if isinstance(data, Mapping):
+        for key, value in data.items():
+            yield str(key)
+            yield from _keys(value)
+    elif isinstance(data, list | tuple):
+        for value in data:
+            yield from _keys(value)
+
+
+def _newer_keys(document: YamlDocument, schema: type[Schema]) -> list[Problem]:
+    """Faults of keys that the version of the file has not yet."""
+    given = document.data.get("format") if isinstance(document.data, dict) else None
+    if "format" not in schema.model_fields or given not in versions_of(schema):
+        return []
+    name, _, version = str(given).partition("/")
+    found = []
+    for location in document.key_places:
+        since = SINCE.get(name, {}).get(str(location[-1]), 1)
+        if since > int(version):
+            what = f"the key `{location[-1]}` came with {name}/{since}, and this file is {given}"
+            remedy = f"write `format: {name}/{since}`"
+            found.append(document.problem(location, what, remedy, at_key=True))
+    return found
+
+
+def _has_format(document: YamlDocument, known: Sequence[str], faults: list[Problem]) -> bool:
+    expected = known[-1]
+    name = expected.partition("/")[0]
+    wanted = FORMATS[name]
+    if "format" not in document.data:
+        what = f"the file does not say what format it has, {wanted} was expected"
+        faults.append(document.problem((), what, f"begin it with `format: {expected}`"))
+        return False
+    given = document.data["format"]
+    if given in known:
+        return True
+    given_name = str(given).partition("/")[0]
+    if given_name == name:
+        what = f"`{given}` is a version that this program does not know"
+        remedy = f"it reads {', '.join(known)}; a newer dbbstation reads the file"
+    elif given_name in FORMATS:
+        what = f"this file is {FORMATS[given_name]} (`{given}`), {wanted} (`{expected}`) was expected"
+        remedy = "check which file is given where"
+    else:
+        what, remedy = f"`{given}` is no format that this program knows", f"write `format: {expected}`"
+    faults.append(document.problem(("format",), what, remedy))
+    return False
+
+
+def _problem(document: YamlDocument, schema: type[Schema], detail: ErrorDetails) -> Problem:
+    """Put one complaint of pydantic into plain words at its place."""
+    location = _known_part(document, detail["loc"])
+    kind, given, context = detail["type"], detail["input"], detail.get("ctx", {})
+    if kind == "missing":
+        missing = str(detail["loc"][-1])
+        return document.problem(location, f"{_within(location)}the key `{missing}` is missing", "add it")
+    if kind in {"extra_forbidden", "invalid_key"}:
+        allowed = list(keys_at(schema, location[:-1]))
+        near = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
+        remedy = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(sorted(allowed))}"
+        what = f"{_within(location[:-1])}the key `{location[-1]}` is not known"
+        return document.problem(location, what, remedy, at_key=True)
+    what, remedy = _in_words(kind, given, context, detail["msg"])
+    return document.problem(location, f"{dotted(location)}: {what}", remedy)
+
+
+def _in_words(kind: str, given: object, context: dict[str, Any], message: str) -> tuple[str, str]:  # noqa: PLR0911
+    """What is wrong with a value and what to do, for the kinds of fault that files have."""
+    if kind in {"float_type", "int_type", "int_from_float", "finite_number"}:
+        number = "a whole number" if kind.startswith("int") else "a number"
+        return f"{number} was expected, not {_shown(given)}", "write digits with a dot as decimal sign"
+    if kind == "string_type":
+        remedy = "put it in quotes" if isinstance(given, int | float) else "write one word or text in quotes"
+        return f"text was expected, not {_shown(given)}", remedy
+    if kind == "literal_error":
+        return f"{_shown(given)} is not one of {context['expected']}", "use one of these"
+    if kind in {"tuple_type", "list_type"}:
+        return f"a list [...] was expected, not {_shown(given)}", "put the values in brackets"
+    if kind in {"model_type", "dict_type", "model_attributes_type"}:
+        return f"`key: value` entries were expected, not {_shown(given)}", "compare it with the example of its format"
+    if kind in {"too_long", "too_short"}:
+        limit = context.get("max_length", context.get("min_length"))
+        return f"{limit} values were expected, not {context['actual_length']}", "check the list"
+    if kind == "implausible":
+        return message, "check the unit"
+    return message[:1].lower() + message[1:], ""
+
+
+def dotted(location: Location) -> str:
+    """Write a location as people do: `tests[3].ball`."""
+    text = ""
+    for step in location:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else str(step)
+    return text
+
+
+def _within(location: Location) -> str:
+    return f"{dotted(location)}: " if location else ""
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "nothing"
+    if isinstance(value, dict | tuple):
+        return "`key: value` entries" if isinstance(value, dict) else f"a list of {len(value)}"
+    if isinstance(value, str):
+        return f"the text `{value}`"
+    return f"`{str(value).lower() if isinstance(value, bool) else value}`"
+
+
+def _known_part(document: YamlDocument, location: tuple[int | str, ...]) -> Location:
+    """Drop what pydantic puts into a location beside keys and indices: names of union members, `[key]`."""
+    known: Location = ()
+    for step in location:
+        if (*known, step) in document.value_places:
+            known = (*known, step)
+    return known
+
+
+def keys_at(schema: type[Schema], location: Location) -> Iterator[str]:
+    """Keys that a schema knows for the mapping at a location."""
+    root = schema.model_json_schema()
+    definitions = root.get("$defs", {})
+
+    def alternatives(part: dict[str, Any]) -> list[dict[str, Any]]:
+        if "$ref" in part:
+            return alternatives(definitions[part["$ref"].rsplit("/", maxsplit=1)[-1]])
+        options = part.get("anyOf") or part.get("oneOf")
+        return [found for option in options for found in alternatives(option)] if options else [part]
+
+    parts = alternatives(root)
+    for step in location:
+        inner: list[dict[str, Any]] = []
+        for part in parts:
+            if isinstance(step, int) and "prefixItems" in part:
+                inner += part["prefixItems"][step : step + 1]
+            inner += [part[name] for name in ("items", "additionalProperties") if isinstance(part.get(name), dict)]
+            inner += [part["properties"][step]] if step in part.get("properties", {}) else []
+        parts = [found for option in inner for found in alternatives(option)]
+    for part in parts:
+        yield from part.get("properties", {})

@@ -1,0 +1,215 @@
+"""YAML text to plain data that knows the line and column of every key and value.
+
+Composed by ruamel.yaml into nodes and turned into data here, so that nothing is guessed: YAML 1.2 scalars only, no
+tags, no merge keys, no key twice. Sequences become tuples, times stay text: the schemas say what they want.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
+
+from dbbstation.errors import Problem
+from dbbstation.files.source_text import decode, read_bytes
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+Location = tuple[str | int, ...]
+"""Keys and indices from the top of a document down to a value."""
+
+_TAG = "tag:yaml.org,2002:"
+_PLAIN_TEXT = {"str", "timestamp", "value"}
+
+
+@dataclass(frozen=True)
+class YamlDocument:
+    """Data of one YAML file with the place of everything in it.
+
+    Attributes:
+        file: as named in messages.
+        data: mappings, tuples, text, numbers, booleans and None.
+        value_places: (line, column), from 1, where each value starts.
+        key_places: (line, column), from 1, where the key of each mapping entry starts.
+    """
+
+    file: str
+    data: Any
+    value_places: dict[Location, tuple[int, int]] = field(repr=False)
+    key_places: dict[Location, tuple[int, int]] = field(repr=False)
+
+    def problem(self, location: Location, what: str, remedy: str = "", *, at_key: bool = False) -> Problem:
+        """Return a problem placed at a value (or its key), or at the nearest thing around it that exists."""
+        if at_key and location in self.key_places:
+            return Problem(self.file, *self.key_places[location], what, remedy)
+        around = location
+        while around and around not in self.value_places:
+            around = around[:-1]
+        return Problem(self.file, *self.value_places.get(around, (1, 1)), what, remedy)
+
+    def entries(self, *location: str | int) -> list[tuple[Location, dict[Any, Any]]]:
+        """Mappings that stand in the sequence or mapping at a location; nothing where it is something else.
+
+        Checks across entries use this, so that they work on a file that has other faults as well.
+        """
+        within = self.data
+        for step in location:
+            within = within.get(step) if isinstance(within, dict) else None
+        pairs = within.items() if isinstance(within, dict) else enumerate(within if isinstance(within, tuple) else ())
+        return [((*location, key), entry) for key, entry in pairs if isinstance(entry, dict)]
+
+
+LARGEST_BYTES = 20_000_000
+"""Largest YAML file that is read: plans, models and settings have some hundred kilobytes at the most."""
+
+MOST_VALUES = 500_000
+"""Values that a document may have, aliases written out: nine aliases of nine aliases and so on would fill any memory."""
+
+
+def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
+    """Read a YAML file; None with the reasons added to `faults` where that is impossible."""
+    data = read_bytes(path, faults, LARGEST_BYTES)
+    text = None if data is None else decode(data, str(path), faults)
+    return None if text is None else parse_yaml(text, str(path), faults)
+
+
+def parse_yaml(text: str, file: str, faults: list[Problem]) -> YamlDocument | None:
+    """Parse YAML text; None with the reasons added to `faults` where that is impossible."""
+    try:
+        root = YAML(typ="safe", pure=True).compose(text)
+    except YAMLError as error:
+        faults.append(_syntax_problem(error, text, file))
+        return None
+    except RecursionError:
+        faults.append(Problem(file, 0, 0, "brackets or lists are nested too deeply", "check that it is the right file"))
+        return None
+    if root is None:
+        faults.append(Problem(file, 1, 1, "the file is empty", "start it with `format: ` and the format's name"))
+        return None
+    walk = _Walk(file)
+    data = walk.value(root, ())
+    if walk.faults:
+        faults.extend(walk.faults)
+        return None
+    return YamlDocument(file, data, walk.value_places, walk.key_places)
+
+
+def _syntax_problem(error: YAMLError, text: str, file: str) -> Problem:
+    if isinstance(error, ReaderError):
+        before = text[: error.position]
+        line, column = before.count("\n") + 1, error.position - (before.rfind("\n") + 1) + 1
+        return Problem(file, line, column, f"character {error.character:#04x} is not allowed", "remove it")
+    mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
+    if not isinstance(error, MarkedYAMLError) or mark is None:
+        return Problem(file, 0, 0, f"not YAML: {error}", "compare it with the example of its format")
+    place = (mark.line + 1, mark.column + 1)
+    said = error.problem or ""
+    if "'\\t'" in said:
+        return Problem(file, *place, "a tab is used for indentation", "indent with spaces")
+    if "another document" in said:
+        return Problem(file, *place, "a second document starts here", "keep one document per file, remove `---`")
+    return Problem(file, *place, f"not YAML: {said}", "check brackets, quotes and indentation here and just above")
+
+
+class _Walk:
+    """Turns nodes into data and notes their places."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.faults: list[Problem] = []
+        self.value_places: dict[Location, tuple[int, int]] = {}
+        self.key_places: dict[Location, tuple[int, int]] = {}
+        self._open: set[int] = set()
+        self._left = MOST_VALUES
+
+    def value(self, node: Node, location: Location) -> Any:  # noqa: ANN401 - what a document holds is not known yet
+        self._left -= 1
+        if self._left <= 0:
+            if self._left == 0:
+                self._fault(node, f"more than {MOST_VALUES:,} values, aliases written out", "write fewer aliases")
+            return None
+        self.value_places[location] = _place(node)
+        if isinstance(node, ScalarNode):
+            return self._scalar(node)
+        if id(node) in self._open:
+            self._fault(node, "this alias contains itself", "write the value out")
+            return None
+        self._open.add(id(node))
+        data: Any = None
+        if isinstance(node, SequenceNode):
+            self._untagged(node, "seq")
+            data = tuple(self.value(item, (*location, index)) for index, item in enumerate(node.value))
+        elif isinstance(node, MappingNode):
+            self._untagged(node, "map")
+            data = self._mapping(node, location)
+        self._open.discard(id(node))
+        return data
+
+    def _mapping(self, node: MappingNode, location: Location) -> dict[Any, Any]:
+        data: dict[Any, Any] = {}
+        for key_node, value_node in node.value:
+            if not isinstance(key_node, ScalarNode):
+                self._fault(key_node, "a key must be one word or number", "write it as `key: value`")
+                continue
+            key = self._scalar(key_node)
+            if key in data:
+                line = self.key_places[*location, key][0]
+                self._fault(key_node, f"the key `{key}` stands here a second time, first in line {line}", "remove one")
+                continue
+            self.key_places[*location, key] = _place(key_node)
+            data[key] = self.value(value_node, (*location, key))
+        return data
+
+    def _scalar(self, node: ScalarNode) -> Any:  # noqa: ANN401 - the type stands in the file
+        kind, text = (node.tag or "").removeprefix(_TAG), node.value
+        if kind in _PLAIN_TEXT:
+            return text
+        if kind == "null":
+            return None
+        if kind == "bool":
+            return text.lower() == "true"
+        if kind in {"int", "float"}:
+            return self._number(node, kind, text.replace("_", "").lower())
+        if kind == "merge":
+            self._fault(node, "merge keys `<<` are not allowed", "write the entries out")
+        else:
+            self._fault(node, f"the tag `{node.tag}` is not allowed", "remove it, values need no tags here")
+        return None
+
+    def _number(self, node: ScalarNode, kind: str, digits: str) -> float | int | None:
+        try:
+            if kind == "float":
+                return float(digits.replace(".inf", "inf").replace(".nan", "nan"))
+            whole = int(digits, 0) if digits.lstrip("+-")[:2] in {"0o", "0x", "0b"} else int(digits)
+            float(whole)  # beyond what any quantity can be
+        except OverflowError:
+            self._fault(node, "this number is too large", "check its digits")
+        except ValueError:
+            self._fault(node, f"`{shortened(node.value)}` is not a number", "write digits with a dot as decimal sign")
+        else:
+            return whole
+        return None
+
+    def _untagged(self, node: Node, kind: str) -> None:
+        if node.tag != _TAG + kind:
+            self._fault(node, f"the tag `{node.tag}` is not allowed", "remove it, values need no tags here")
+
+    def _fault(self, node: Node, what: str, remedy: str) -> None:
+        self.faults.append(Problem(self.file, *_place(node), what, remedy))
+
+
+def shortened(text: str) -> str:
+    """Text as it is quoted in a message: of a long one its beginning."""
+    return text if len(text) <= LONGEST_QUOTED else f"{text[:LONGEST_QUOTED]}…"
+
+
+LONGEST_QUOTED = 60
+
+
+def _place(node: Node) -> tuple[int, int]:
+    return node.start_mark.line + 1, node.start_mark.column + 1

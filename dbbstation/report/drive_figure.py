@@ -1,0 +1,94 @@
+"""Figure of one drive: force over time as measured and modelled, what is left, friction against speed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from dbbstation.diagnosis.drive.findings import DriveDiagnosis
+
+MOST_POINTS = 3000
+"""Points of a line that are drawn: more make a large file and the same picture."""
+
+
+def drive_figure(diagnosis: DriveDiagnosis, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+    """Draw a diagnosis of a drive, as SVG."""
+    with in_style():
+        figure = Figure(figsize=(11.0, 6.2), layout="constrained")
+        grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0))
+        force = figure.add_subplot(grid[0, 0])
+        left = figure.add_subplot(grid[1, 0], sharex=force)
+        _force(force, diagnosis)
+        _left(left, diagnosis)
+        _friction(figure.add_subplot(grid[:, 1]), diagnosis)
+        return in_format(figure, wanted)
+
+
+def _force(axes: Axes, diagnosis: DriveDiagnosis) -> None:
+    table = diagnosis.table()
+    t, step = table["t_s"], max(len(table["t_s"]) // MOST_POINTS, 1)
+    lines = (
+        ("measured", "force_n"),
+        ("mass and viscous friction", "base_force_n"),
+        (_named(diagnosis), "model_force_n"),
+    )
+    for colour, (label, column) in zip((MEASURED, BEFORE, AFTER), lines, strict=True):
+        axes.plot(t[::step], table[column][::step], color=colour, label=label, linewidth=0.8)
+    axes.axvspan(*diagnosis.held_back_s, color="#eeeeee", zorder=0)
+    axes.set_ylabel("force, N")
+    axes.set_title("force in the band of the comparison; grey: held back")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3)
+
+
+def _left(axes: Axes, diagnosis: DriveDiagnosis) -> None:
+    table = diagnosis.table()
+    t, step = table["t_s"], max(len(table["t_s"]) // MOST_POINTS, 1)
+    for colour, column in zip((BEFORE, AFTER), ("base_force_n", "model_force_n"), strict=True):
+        axes.plot(t[::step], (table["force_n"] - table[column])[::step], color=colour, linewidth=0.8)
+    before, after = diagnosis.steps[0].relative_force_error, diagnosis.steps[-1].relative_force_error
+    axes.axvspan(*diagnosis.held_back_s, color="#eeeeee", zorder=0)
+    axes.set_xlabel("time, s")
+    axes.set_ylabel("measured less model, N")
+    axes.set_title(f"what is left; held back {100 * before:.1f} % -> {100 * after:.1f} % of the force")
+
+
+def _friction(axes: Axes, diagnosis: DriveDiagnosis) -> None:
+    table, curve = diagnosis.table(), diagnosis.curve
+    base, after = diagnosis.before, diagnosis.after
+    mass = after["mass_kg"].value.value
+    # Inertia taken off: what is left hangs on friction, load and noise.
+    friction = table["force_n"] - mass * 1e-3 * table["acceleration_mm_s2"]
+    step = max(len(friction) // MOST_POINTS, 1)
+    axes.plot(table["speed_mm_s"][::step], friction[::step], ".", color=MEASURED, markersize=1.5, label="less inertia")
+    axes.plot(
+        1e3 * curve.speed_m_s,
+        base["viscous_n_s_m"].value.value * curve.speed_m_s,
+        color=BEFORE,
+        label="mass and viscous friction",
+        linewidth=1.0,
+    )
+    for part in (curve.speed_m_s < 0.0, curve.speed_m_s > 0.0):
+        speed, force, sigma = (1e3 * curve.speed_m_s[part], curve.force_n[part], curve.uncertainty_n[part])
+        label = _named(diagnosis) if part[-1] else None
+        axes.plot(speed, force, color=AFTER, linewidth=1.2, label=label)
+        axes.fill_between(speed, force - 2 * sigma, force + 2 * sigma, color=AFTER, alpha=0.25, linewidth=0)
+    low, high = np.percentile(friction, [0.5, 99.5])
+    margin = 0.2 * (high - low)
+    axes.set_ylim(low - margin, high + margin)
+    axes.set_xlabel("speed, mm/s")
+    axes.set_ylabel("force less inertia, N")
+    axes.set_title("friction (band: two standard uncertainties)")
+    axes.legend(loc="upper left")
+
+
+def _named(diagnosis: DriveDiagnosis) -> str:
+    count = len(diagnosis.chosen)
+    return f"with {count} named cause{'' if count == 1 else 's'}" if count else "nothing more was found"

@@ -1,0 +1,1 @@
+"""Physical causes of error, one file each; the registry finds them by looking."""

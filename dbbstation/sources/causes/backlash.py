@@ -1,0 +1,111 @@
+"""Error source: play of the strut drives at reversal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.compiled import compiled
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Texts, of_each_strut
+from dbbstation.sources.laws.play_ends import first_side
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
+
+MM_PER_UM = 1e-3
+
+
+class Backlash(ErrorSource):
+    """After a reversal a strut stays behind by its play, and goes on only when the drive has travelled through it.
+
+    With x the commanded travel of a strut and w its play, the strut stands at y, which the drive takes along at
+    either end of the play: y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2. The error y - x is -w/2 while the strut
+    grows and +w/2 while it shrinks, and passes from one to the other over a travel of w. The friction wind-up of an
+    elastic drive has the same form.
+
+    A run is taken to begin in a movement that was already under way. A negative w is a strut that overshoots at
+    reversal; the effect is that of |w| with its sign turned, so that a fit may pass through zero.
+    """
+
+    name = "backlash"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    needs = frozenset({Need.POSE, Need.PATH})
+    varies_with = "strut-speed-sign"
+    form_uncertainty = 0.2  # friction and wear differ along the screw and between directions, as play does
+    texts = Texts(
+        what="A strut's drive has play, or winds up against friction, each time the strut turns from growing to "
+        "shrinking.",
+        shows="A step in the circle where one strut turns round, not where X or Y does; clockwise and "
+        "counter-clockwise runs differ by the play, however well the machine is calibrated.",
+        confirm="Put a dial gauge or a linear scale on that strut, move it by 0.1 mm to and fro and compare with its "
+        "encoder.",
+        cure="Tighten or exchange nut, bearing or joint of that strut; until then enter its backlash in the control.",
+        equation="actual minus driven length: y - x, y_k = min(max(y_k-1, x_k - w/2), x_k + w/2)",
+        origin="play operator (hysteresis of play, Krasnosel'skii and Pokrovskii 1983), of each strut's travel",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Six plays, full width."""
+        return of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: it stays behind")
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Lag of each strut.
+
+        Raises:
+            ModelError: the motion is no path.
+        """
+        lag, _ = self._lag(motion, machine, values)
+        return Effect(strut_mm=lag)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Each strut answers to its own play; analytic but for the samples at which a strut is taken along again.
+
+        Raises:
+            ModelError: the motion is no path.
+        """
+        _, by_width = self._lag(motion, machine, values)
+        return Effect(strut_mm=MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS))
+
+    def _lag(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lag [mm] and its derivative by the width [mm/mm], shapes (n, 6)."""
+        self.require(motion)
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        travel = inverse(machine.hexapod, frames).length_mm
+        lag, by_width = np.empty_like(travel), np.empty_like(travel)
+        follow(travel, MM_PER_UM * np.abs(values), lag, by_width)
+        return np.where(values < 0.0, -lag, lag), by_width
+
+
+@compiled
+def follow(
+    travel: NDArray[np.float64],
+    width: NDArray[np.float64],
+    lag: NDArray[np.float64],
+    by_width: NDArray[np.float64],
+) -> None:
+    """Play operator of each column: lag y - x and its derivative by the width.
+
+    Shapes: travel x (n, m), width (m,) and not negative, lag and by_width (n, m), which are written.
+    """
+    count, columns = travel.shape
+    for i in range(columns):
+        half = 0.5 * width[i]
+        side = first_side(travel[:, i])
+        place = travel[0, i] + side * width[i]
+        for k in range(count):
+            if place < travel[k, i] - half:
+                place, side = travel[k, i] - half, -0.5
+            elif place > travel[k, i] + half:
+                place, side = travel[k, i] + half, 0.5
+            lag[k, i] = place - travel[k, i]
+            by_width[k, i] = side

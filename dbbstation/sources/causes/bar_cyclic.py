@@ -1,0 +1,124 @@
+"""Error source: interpolation error of the bar's encoder."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+SIGNAL_PERIODS_UM = (2.0, 4.0, 8.0, 10.0, 16.0, 20.0, 40.0, 80.0, 100.0, 200.0)
+"""Signal periods of length encoders that are sold [µm]."""
+
+
+class BarCyclic(ErrorSource):
+    """The reading is off by a wave along the encoder's scale: a sin(2 pi x / p) + b cos(2 pi x / p), p its signal period.
+
+    The encoder's two signals are not quite alike, and what is interpolated between two of their periods repeats in the
+    next. x is what the bar shows, less the whole millimetre that the run's readings lie about; that it has the error
+    in it changes the wave by parts in a hundred. Phase and amplitude belong to the session: the display is set on the
+    calibrator anew, which moves the zero of x. A run whose readings sweep less than a period shows a part of one wave,
+    which looks like anything else.
+    """
+
+    name = "bar-cyclic"
+    belongs_to = Owner.SESSION
+    needs = frozenset({Need.READING})
+    varies_with = "reading"
+    form_uncertainty = 0.2  # the wave of an encoder changes along the scale
+    texts = Texts(
+        what="The encoder in the bar divides its signal period unevenly: its two signals differ in size, zero or phase.",
+        shows="A fine ripple in the readings, quick where they change fast; the same at the same reading, wherever the "
+        "circle is. A machine so good that a circle sweeps less than a signal period does not show it.",
+        confirm="Move the bar slowly by some signal periods against a better length gauge; or look at its two signals on "
+        "an oscilloscope: they must draw a circle about zero.",
+        cure="Clean the scale and let the encoder be adjusted; else average over several circles whose readings lie "
+        "differently.",
+        equation="reading = distance + a sin(2 pi x / p) + b cos(2 pi x / p), x the reading within its millimetre",
+        origin="interpolation error of quadrature signals, Heydemann, Applied Optics 20 (1981) 3382, to first order",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Sine, cosine and signal period; usual encoders interpolate to a hundredth of their period."""
+        return (
+            Parameter("sine_um", "µm", 0.2, "sine of the reading's error along the encoder's scale"),
+            Parameter("cosine_um", "µm", 0.2, "cosine of the reading's error along the encoder's scale"),
+            Parameter(
+                "signal_period_um",
+                "µm",
+                20.0,
+                "signal period of the bar's encoder",
+                shape=SIGNAL_PERIODS_UM,
+                listed=True,
+            ),
+        )
+
+    def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:
+        """Whether half of the runs sweep a signal period: a part of one wave follows the reading's own error."""
+        swept = [np.ptp(m.reading_mm[m.kept]) for m in motions if m.reading_mm is not None]
+        return bool(np.median(swept) >= MM_PER_UM * nonlinear[0])
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Wave in the reading.
+
+        Raises:
+            ModelError: the motion has no reading.
+        """
+        waves, _ = self._waves(motion, values[2])
+        return Effect(reading_mm=MM_PER_UM * waves @ values[:2])
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """By sine, cosine and period.
+
+        Raises:
+            ModelError: the motion has no reading.
+        """
+        waves, by_period = self._waves(motion, values[2])
+        sine, cosine = waves.T
+        period = by_period * (values[0] * cosine - values[1] * sine)
+        return Effect(reading_mm=MM_PER_UM * np.column_stack([sine, cosine, period]))
+
+    def _waves(self, motion: Motion, period_um: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Sine and cosine, shape (n, 2) [1], and derivative of the phase by the period, shape (n,) [rad/µm].
+
+        A period of zero (or less, which a fit may try) makes no wave.
+        """
+        self.require(motion)
+        reading = _without_noise(motion)
+        if period_um <= 0.0:
+            return np.zeros((len(reading), 2)), np.zeros(len(reading))
+        place_um = (reading - np.round(np.median(reading))) / MM_PER_UM
+        phase_rad = 2.0 * np.pi * place_um / period_um
+        return np.column_stack([np.sin(phase_rad), np.cos(phase_rad)]), -phase_rad / period_um
+
+
+WINDOWS = 40
+"""Stretches of a run over which its readings are a cubic: nine degrees of a circle."""
+
+
+def _without_noise(motion: Motion) -> NDArray[np.float64]:
+    """What the bar showed, less most of its noise, shape (n,) [mm].
+
+    A wave taken at readings with their noise in them resembles that noise, and would be found where there is none.
+    """
+    reading = np.array(motion.reading_mm, dtype=np.float64)
+    own = reading[motion.kept]
+    window = 2 * (len(own) // (2 * WINDOWS)) + 1
+    if motion.reading_is_measured and window > CUBIC:
+        from scipy.signal import savgol_filter  # noqa: PLC0415 - takes half a second; every command knows all sources
+
+        reading[motion.kept] = savgol_filter(own, window, CUBIC)
+    return reading
+
+
+CUBIC = 3

@@ -1,0 +1,82 @@
+"""Error source: the bar warms up while it measures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.laws import by_temperature
+from dbbstation.sources.laws.by_temperature import FollowsTemperature
+from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+
+class BarDrift(ErrorSource):
+    """The bar's reading drifts as its body takes the temperature of hand, machine and air.
+
+    It follows the growth of `warm_up`, counted from the session's first sample, where the drift is zero by definition: what the bar was off then is its
+    offset. Sessions with the same bar share the drift, as they begin with the same handling.
+    """
+
+    name = "bar-drift"
+    belongs_to = Owner.INSTRUMENT
+    needs = frozenset({Need.TIME})
+    varies_with = "time"
+    form_uncertainty = 0.2  # a warm-up has its own law, in stages
+    texts = Texts(
+        what="The bar itself changes its length while it warms up or cools down after having been handled. The drift "
+        "given is counted from the first sample of the session.",
+        shows="Every circle is a little larger (or smaller) than the one before it, wherever it is and however the "
+        "spindle is tilted, quickly at first and then ever more slowly. Nothing is shifted or deformed.",
+        confirm="Put the bar on its calibrator before, during and after the session and compare the readings; a bar of "
+        "steel of 150 mm reads 1.6 µm more or less per kelvin.",
+        cure="Lay bar and calibrator on the machine table an hour before; touch the bar with gloves only; put it on the "
+        "calibrator between the tests.",
+        equation=f"reading = distance + g(t), g = {EQUATION}; {by_temperature.EQUATION}",
+        origin=ORIGIN,
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Drift in the end, time constant, what pauses take back."""
+        meaning = "reading minus true distance, from the first sample to the end of warm-up"
+        return warm_up_parameters(Parameter("drift_um", "µm", 2.0, meaning), "pause_loss_um", 1800.0)
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Drift of the reading.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        self.require(motion)
+        return Effect(reading_mm=MM_PER_UM * grown(motion, values))
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """By the three parameters of the law.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        self.require(motion)
+        return Effect(reading_mm=MM_PER_UM * grown_by(motion, values))
+
+    def by_temperature(self) -> ErrorSource:
+        """The bar by the thermometer in it."""
+        return _ByTemperature()
+
+
+class _ByTemperature(FollowsTemperature, cause=BarDrift):
+    """reading = distance + c (T - T_0)."""
+
+    thermometers = (("bar",),)
+    growth = Parameter("drift_um_k", "µm/K", 1.6, "drift of the reading for each kelvin that the bar is warmer")
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Drift per unit."""
+        return Effect(reading_mm=MM_PER_UM * self.warmer_k(motion))

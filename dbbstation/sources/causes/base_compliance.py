@@ -1,0 +1,67 @@
+"""Error source: the frame that carries the base joints yields."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.statics import base_loads
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, stated_tensions
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+
+class BaseCompliance(LinearSource):
+    """Each base joint gives way under the force that its strut puts on it: dQ_i = C F_i, C = diag(h, h, v).
+
+    The frame is taken as springs under each joint, equal in all horizontal directions, without coupling from joint to
+    joint. Where both compliances are equal this is exactly a strut that is softer by the same amount at every
+    length, so only their difference, or gravity's growth with length, tells frame and struts apart.
+    """
+
+    name = "base-compliance"
+    belongs_to = Owner.MACHINE
+    form_uncertainty = 0.05  # a frame is no spring at one point
+    detail_mm = SMOOTH_MM
+    weighs = True
+    texts = Texts(
+        what="The frame above is elastic: the base joints move with the forces of their struts.",
+        shows="Circles deformed like those of gravity, the same in both directions, growing with the tilt.",
+        confirm="Put a dial gauge between frame and floor beside a base joint and tilt the spindle from one side to "
+        "the other: the joint moves.",
+        cure="Tighten or stiffen the frame, and level the machine so that all feet carry; otherwise compensate.",
+        equation="dQ_i = diag(h, h, v) F_i, F_i = T_i u_i and what the strut's own weight puts on its joint",
+        origin="Hooke's law at each joint, loads from the platform's equilibrium [GRAV eq 1, 6]",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Two compliances.
+
+        Raises:
+            ModelError: the machine file has no masses.
+        """
+        platform_masses(self.name, machine)
+        return tuple(
+            Parameter(f"{way}_um_kn", "µm/kN", 3.0, f"{way} shift of a base joint per {way} force on it", positive=True)
+            for way in ("horizontal", "vertical")
+        )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shift of each base joint per compliance.
+
+        Raises:
+            ModelError: the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        struts = inverse(machine.hexapod, frames)
+        force = base_loads(struts, stated_tensions(self.name, machine, frames, struts), machine.strut_masses)
+        horizontal, vertical = np.diag([1.0, 1.0, 0.0]), np.diag([0.0, 0.0, 1.0])
+        return Effect(base_joint_mm=MM_PER_N * np.stack([force @ horizontal, force @ vertical], axis=-1))

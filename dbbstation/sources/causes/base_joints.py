@@ -1,0 +1,54 @@
+"""Error source: places of the base joints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+USUAL_MM = 0.2
+"""Usual error of a joint's coordinate where the machine file states no tolerance [mm]."""
+
+
+class BaseJoints(LinearSource):
+    """A base joint is not where the design has it: dQ_i, i = 1 to 6, three coordinates each [CAL II-C 2]."""
+
+    name = "base-joints"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    texts = Texts(
+        what="The centres of the base joints are not where the controller has them.",
+        shows="Circles shifted, deformed and differently so at every place and tilt; the same in both directions.",
+        confirm="Measure the joints' centres with a coordinate measuring machine or a laser tracker.",
+        cure="Enter the identified joints in the control, or export compensated programs.",
+        equation="Q_i = nominal Q_i + dQ_i",
+        origin="[CAL II-C 2]",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Eighteen coordinates; their usual size is the machine file's joint tolerance where it has one."""
+        stated = machine.joint_tolerance_mm
+        return tuple(
+            Parameter(
+                name=f"joint_{i + 1}_{axis}_mm",
+                unit="mm",
+                plausible=stated or USUAL_MM,
+                meaning=f"base joint {i + 1} actual minus nominal {axis.upper()}",
+                tolerance=stated,
+                strut=i + 1,
+            )
+            for i in range(STRUTS)
+            for axis in "xyz"
+        )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each coordinate its own parameter."""
+        return Effect(base_joint_mm=np.eye(3 * STRUTS).reshape(STRUTS, 3, 3 * STRUTS))

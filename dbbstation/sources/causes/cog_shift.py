@@ -1,0 +1,77 @@
+"""Error source: the platform's centre of gravity."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.statics import DOWN, GRAVITY_M_S2, Load, stretch_mm, strut_tensions
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.laws.weights import for_such_struts, platform_masses, strut_compliance
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+
+class CogShift(LinearSource):
+    """The platform's weight acts beside the point that the machine file states: a moment d x W more [GRAV 3.2].
+
+    The shift d is fixed in the platform's frame. [GRAV] has its part along the axis alone and finds it from motor
+    currents, which show the moment itself; circles show it multiplied by the struts' compliance: the one that the
+    source gravity of the same model has, else the machine file's.
+    """
+
+    name = "cog-shift"
+    belongs_to = Owner.MACHINE
+    form_uncertainty = 0.02  # weights are known to a per cent, compliance is linear
+    detail_mm = SMOOTH_MM
+    weighs = True
+    loads_struts = True
+    texts = Texts(
+        what="The platform's centre of gravity is not where the machine file has it: another spindle, tool, hose or "
+        "motor than the drawing's.",
+        shows="Circles deformed like those of gravity, the same in both directions: a shift along the axis tells in "
+        "tilted circles only, one across it in upright ones too.",
+        confirm="Compare the six motor currents at rest, upright and tilted: they show the moment directly. Or take the "
+        "tool out and repeat a tilted circle.",
+        cure="Enter the centre of gravity in the machine file and fit gravity again; export compensated programs for "
+        "the tool that is used.",
+        equation="J^T dT = [0, (R d) x W]; actual minus driven length = c(L) dT",
+        origin="[GRAV 3.1, 3.2], with three coordinates where the paper has the one along the axis",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Three coordinates.
+
+        Raises:
+            ModelError: the machine file has no masses.
+        """
+        platform_masses(self.name, machine)
+        counted = for_such_struts(machine)
+        return tuple(
+            Parameter(f"{axis}_mm", "mm", 20.0, f"centre of gravity actual minus stated, platform {axis}; {counted}")
+            for axis in "xyz"
+        )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each coordinate its own moment.
+
+        Raises:
+            ModelError: the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        weight = platform_masses(self.name, machine).platform_kg * GRAVITY_M_S2 * DOWN
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        struts = inverse(machine.hexapod, frames)
+        stretch, tensions = [], []
+        for axis in range(3):
+            moment = np.cross(frames.rotation[:, :, axis], weight)
+            tension = strut_tensions(struts, Load(np.zeros_like(moment), moment))
+            stretch.append(stretch_mm(struts, strut_compliance(machine), tension))
+            tensions.append(tension)
+        return Effect(strut_mm=np.stack(stretch, axis=-1), load_n=np.stack(tensions, axis=-1))

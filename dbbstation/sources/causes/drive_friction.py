@@ -1,0 +1,179 @@
+"""Error source: what lies between the load of a strut and the current of its motor."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import strut_lengths
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.causes.backlash import follow
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
+from dbbstation.sources.laws.weights import platform_masses, stated_loads
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+N_PER_KN = 1e3
+
+TURNED_OVER_MM = 0.05
+"""Travel after a reversal within which friction turns over. Rolling contacts and seals, which are elastic before they
+slide, need some micrometres, belts and couplings some tens [Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30
+(1994) 1083, sec. 2.2, and the wind-up of the drive on top]."""
+
+PER_MOTOR = ("gain_a_kn", "coulomb_n", "viscous_ns_mm", "load_share_n_kn", "asymmetry_n")
+"""Parameters of a motor, in their order."""
+
+
+def of_motor(motor: int, kind: str) -> str:
+    """Return the name of a parameter of one motor, 1 to 6; `kind` is of `PER_MOTOR`."""
+    return f"motor_{motor}_{kind}"
+
+
+MOTOR_OF_GAIN = {of_motor(motor, PER_MOTOR[0]): motor for motor in range(1, STRUTS + 1)}
+"""Motor, 1 to 6, by the name of its gain."""
+
+
+class DriveFriction(ErrorSource):
+    """A motor holds its strut's load with a current, and friction of its drive helps or hinders it.
+
+    I = k (F - s (F_c + e |F|) - b v - a): F the load, positive where the platform pulls; v the speed and s the direction
+    of the strut, positive where it grows. Friction carries part of the load while the strut is paid out and is added to
+    it while the strut is drawn in. The share e of the load is the loss of the screw, 1 / efficiency - 1 while it works
+    against its load and 1 - efficiency while its load turns it, nearly the same for good screws. a is half of what
+    Coulomb friction is larger one way than the other; an offset of the current's zero looks the same.
+
+    The load is what the machine file's weights, a centre of gravity that sits elsewhere and weights of struts make of
+    it, at the pose where the machine really is. Gain and weight are known as a product only: the weight is taken from
+    the machine file. After a reversal friction turns over linearly, within TURNED_OVER_MM of travel; what is measured
+    there says nothing of these parameters.
+
+    It changes nothing but currents: bars and poses are predicted without it.
+    """
+
+    name = "drive-friction"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    needs = frozenset({Need.POSE, Need.PATH, Need.TIME, Need.CURRENT})
+    varies_with = "strut-speed-sign"
+    form_uncertainty = 0.2  # friction differs along the screw and with temperature
+    texts = Texts(
+        what="Between the load of a strut and the current of its motor lie the gain of the drive and friction: a constant "
+        "part, one that grows with the speed and one that grows with the load.",
+        shows="In the motor currents only: at one place of a circle the current of a strut is lower while it grows than "
+        "while it shrinks. Half the sum of both directions is the load, half the difference the friction.",
+        confirm="Move one strut up and down slowly at one place and read the current both ways, then at twice the speed.",
+        cure="None needed: it is what stands between currents and the weights that they tell of. Friction that is larger "
+        "in one drive, or grows from month to month, is a screw, nut or bearing that wears or lacks grease.",
+        equation="I = k (F - s (F_c + e |F|) - b v - a), s and v positive where the strut grows",
+        origin="[GRAV 3.2] with friction, which the paper does not mention; Coulomb, viscous and load friction as in "
+        "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Five for each motor.
+
+        Raises:
+            ModelError: the machine file has no masses.
+        """
+        platform_masses(self.name, machine)
+        found = []
+        for motor in range(1, STRUTS + 1):
+            kinds = (
+                ("A/kN", 2.5, f"current of motor {motor} per force that pulls its strut"),
+                ("N", 100.0, f"constant friction of drive {motor}, positive: against the motion"),
+                ("Ns/mm", 2.0, f"friction of drive {motor} per speed, positive: against the motion"),
+                ("N/kN", 50.0, f"friction of drive {motor} per load, positive: against the motion"),
+                (
+                    "N",
+                    50.0,
+                    f"friction of drive {motor} growing less that shrinking, half of it, or zero of the current",
+                ),
+            )
+            found += [Parameter(of_motor(motor, name), *kind) for name, kind in zip(PER_MOTOR, kinds, strict=True)]
+        return tuple(found)
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Currents of the motors.
+
+        Raises:
+            ModelError: the motion has no time; the machine file has no masses.
+        """
+        carried, _ = _carried(self._driven(motion, machine), values)
+        return Effect(current_a=_by_motor(values)[0] / N_PER_KN * carried)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Each motor answers to its own parameters.
+
+        Raises:
+            ModelError: the motion has no time; the machine file has no masses.
+        """
+        carried, frictions = _carried(self._driven(motion, machine), values)
+        gain = _by_motor(values)[0][:, None] / N_PER_KN
+        answers = np.concatenate([carried[:, :, None] / N_PER_KN, -gain * frictions], axis=2)
+        by_parameter = np.zeros((len(answers), STRUTS, STRUTS, len(PER_MOTOR)))
+        own = np.arange(STRUTS)
+        by_parameter[:, own, own] = answers
+        return Effect(current_a=by_parameter.reshape(len(answers), STRUTS, -1))
+
+    def current_per_load(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gain, less what friction takes of a load that grows.
+
+        Raises:
+            ModelError: the motion has no time; the machine file has no masses.
+        """
+        gain, share = _by_motor(values)[[0, 3]] / N_PER_KN
+        load, direction, _ = self._driven(motion, machine)
+        answer: NDArray[np.float64] = gain * (1.0 - share * direction * np.sign(load))
+        return answer
+
+    def _driven(
+        self, motion: Motion, machine: Machine
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Load of each strut [N], its direction from -1 to 1, positive where it grows, and its speed [mm/s], (n, 6)."""
+        if motion.time_s is None:
+            self.require(motion)
+        time_s, length, place = driven_in_time(motion, machine)
+        load = motion.load_n
+        if load is None:
+            frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+            load = stated_loads(self.name, machine, frames, machine.hexapod)
+        return load, directions(length)[place], speed_mm_s(time_s, length)[place]
+
+
+def directions(length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Direction in which friction acts on struts, from -1 (shrinking) to 1 (growing), shape (n, 6).
+
+    Args:
+        length_mm: driven, in time order, shape (n, 6) [mm].
+    """
+    lag, by_width = np.empty_like(length_mm), np.empty_like(length_mm)
+    follow(length_mm, np.full(length_mm.shape[1], TURNED_OVER_MM), lag, by_width)
+    return -2.0 / TURNED_OVER_MM * lag
+
+
+def driven_directions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    """Direction of friction along a motion, shape (n, 6).
+
+    Between -1 and 1, within TURNED_OVER_MM after a reversal, a reading says nothing of a drive's friction.
+    """
+    return directions(strut_lengths(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation)))
+
+
+def _by_motor(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Parameters by kind and motor, shape (5, 6)."""
+    return values.reshape(STRUTS, len(PER_MOTOR)).T
+
+
+def _carried(
+    driven: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What the current carries of the load, shape (n, 6) [N], and each friction per parameter, shape (n, 6, 4)."""
+    load, direction, speed = driven
+    frictions = np.stack([direction, speed, direction * np.abs(load) / N_PER_KN, np.ones_like(load)], axis=-1)
+    return load - np.einsum("nik,ki->ni", frictions, _by_motor(values)[1:]), frictions

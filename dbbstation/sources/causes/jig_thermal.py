@@ -1,0 +1,57 @@
+"""Error source: the jig plate is warmer than it was on the CMM."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.laws.by_temperature import STEEL_UM_M_K
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM_M = 1e-6
+"""One µm/m in mm/mm."""
+
+
+class JigThermal(LinearSource):
+    """Balls move away from the plate's origin as plate, holders and risers grow: db = a T (b - b_0).
+
+    T is how much warmer the plate is than it was when its balls were measured, a the jig file's expansion. Plate and
+    holders are taken as evenly warm and of the same material. They grow about the origin of the jig's frame; growth
+    about any other point is the same and a shift of the whole plate, and where the plate stands as a whole defines
+    the machine's coordinates. A ball that stands in no bore stays where it is.
+    """
+
+    name = "jig-thermal"
+    belongs_to = Owner.SESSION
+    form_uncertainty = 0.03  # plate and holders are of one material and warm alike to a few per cent
+    texts = Texts(
+        what="The jig plate is warmer or colder on the machine than it was on the coordinate measuring machine: its "
+        "balls stand further apart and higher, or closer and lower.",
+        shows="Circles at the outer bores are shifted outwards, those on long holders and risers upwards, in proportion; "
+        "nothing is deformed. A ball off the tool tip looks almost the same.",
+        confirm="Put a thermometer on the plate and compare with the `cmm_temp_c` of the jig file.",
+        cure="Leave the plate on the machine table over night and measure in the morning; or scale the CMM sheet to the "
+        "plate's temperature.",
+        equation="b = CMM centre + a T (CMM centre - origin of the jig)",
+        origin="linear expansion, ISO 1: lengths are stated at 20 degC",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """One temperature difference."""
+        return (Parameter("warmer_k", "K", 2.0, "temperature of the plate on the machine minus that on the CMM"),)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shift of the ball per kelvin."""
+        setup = motion.setup
+        if setup is None or setup.plate is None:
+            return Effect(fixed_ball_mm=np.zeros((3, 1)))
+        stated = setup.plate.expansion_um_m_k
+        # Plate, holders and risers are of steel where the jig file does not say otherwise.
+        per_kelvin = MM_PER_UM_M * (STEEL_UM_M_K if stated is None else stated)
+        return Effect(fixed_ball_mm=per_kelvin * (setup.fixed_ball_mm - setup.plate.origin_mm)[:, None])

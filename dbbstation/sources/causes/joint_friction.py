@@ -1,0 +1,128 @@
+"""Error source: friction in the base joints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.statics import stretch_mm, strut_tensions, transverse_load
+from dbbstation.sources.causes.backlash import follow
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Need, Owner, Texts, of_each_strut
+from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Hexapod, Machine
+    from dbbstation.machine.kinematics import Struts
+    from dbbstation.sources.contract import Parameter
+
+LEVER_MM = 1000.0
+"""Arm at which the parameter is a force: 1 N there is a moment of 1 N m."""
+
+WIND_UP_RAD = 1e-4
+"""Angle over which a joint's friction changes from one direction to the other: that of preloaded rolling bearings, a
+tenth of a millimetre at the platform. The step of friction spreads over about two degrees of a circle of 150 mm."""
+
+
+class JointFriction(LinearSource):
+    """A base joint resists being turned, so that its strut drags at the platform, and all six struts stretch for it.
+
+    The joint has two axes, as a universal joint has: e1 fixed in the base, level and square to the line from base
+    joint to platform joint as it lies when the platform stands upright in the middle, and e2 square to e1 and to the
+    strut. Machines with other axes have the same steps at other places. About either axis the moment is M z_a: z is -1
+    while the angle grows and +1 while it falls, and changes over a small wind-up (stop operator, the complement of
+    play). A strut that is free to turn at the platform hands a moment on as a force across itself: by virtual work
+    f = M (z_1 dq_1/dp + z_2 dq_2/dp), with p the platform joint and q the joint's angles. Tensions follow from the
+    platform's equilibrium, J^T T = [sum f, sum (R P) x f], and lengths from the struts' compliance, for which the
+    machine file's value stands here; circles show the product of friction and compliance only.
+
+    The platform's joints, with three axes, turn by nearly the same angles on a circle at constant tilt; what they add
+    is found with the base joints'.
+    """
+
+    name = "joint-friction"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    needs = frozenset({Need.POSE, Need.PATH})
+    varies_with = "joint-angle-speed-sign"
+    form_uncertainty = 0.3  # friction of joints differs with load and angle
+    texts = Texts(
+        what="The joints at the base turn heavily. Friction drags at the platform against its movement, and the struts "
+        "stretch under that.",
+        shows="Small steps of some tenths of a µm where a strut's joint reverses its swing, which is where the strut "
+        "lies farthest to one side, not where it is longest or shortest. Clockwise and counter-clockwise runs differ.",
+        confirm="Prop the platform up, take one strut off it, and measure with a spring balance at the strut's end what "
+        "it takes to swing it in either direction.",
+        cure="Lubricate the joints, or lower the preload of their bearings.",
+        equation="J^T T = [sum f, sum (R P) x f], f = M (z_1 dq_1/dp + z_2 dq_2/dp), z nearly minus the sign of dq/dt; "
+        "actual minus driven length = c(L) T; one axis of each joint is taken to be level and square to its strut",
+        origin="Coulomb's friction about both axes of a universal joint, virtual work, and the equilibrium of the "
+        "platform as in [GRAV eq 1, 6, 7]",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Friction of six joints."""
+        meaning = f"force that swings strut {{}}, 1 m from its base joint; {for_such_struts(machine)}"
+        return of_each_strut("strut_{}_n", "N", 10.0, meaning, positive=True)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Stretch of all struts per friction of each joint.
+
+        Raises:
+            ModelError: the motion is no path.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        self.require(motion)
+        struts = inverse(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+        drag = friction_drag(struts, outer_axes(machine.hexapod))
+        by_joint = []
+        for i in range(STRUTS):
+            alone = np.zeros_like(drag)
+            alone[:, i] = drag[:, i]
+            tension = strut_tensions(struts, transverse_load(struts, alone))
+            by_joint.append(stretch_mm(struts, strut_compliance(machine), tension))
+        return Effect(strut_mm=np.stack(by_joint, axis=-1))
+
+
+def outer_axes(hexapod: Hexapod) -> NDArray[np.float64]:
+    """Axes of the base joints that are fixed in the base, unit vectors of the machine frame, shape (6, 3)."""
+    across = hexapod.platform_joints_mm[:, :2] - hexapod.base_joints_mm[:, :2]
+    across[np.linalg.norm(across, axis=1) == 0.0] = [0.0, 1.0]  # a strut that is plumb there: any level axis is as good
+    axes = np.column_stack([-across[:, 1], across[:, 0], np.zeros(STRUTS)])
+    unit: NDArray[np.float64] = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    return unit
+
+
+def friction_drag(struts: Struts, axes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Forces on the platform's joints where each base joint has a friction of 1 N m about each axis, (n, 6, 3) [N].
+
+    Args:
+        struts: along a path, in time order.
+        axes: outer axes of the base joints, shape (6, 3) [1].
+    """
+    unit = struts.unit
+    aside = np.einsum("nij,ij->ni", unit, axes)  # sine of the second angle
+    round_axis = np.cross(axes, unit)
+    # The strut's part square to e1 turns about e1 by q1, which is counted from straight down: no strut points up.
+    level = np.cross(axes, np.array([0.0, 0.0, -1.0]))
+    first = np.arctan2(np.einsum("nij,ij->ni", unit, level), -unit[:, :, 2])
+    part = 1.0 - aside**2  # square of that part
+    length = struts.length_mm[:, :, None]
+    by_first = round_axis / (length * part[:, :, None])
+    by_second = (axes - aside[:, :, None] * unit) / (length * np.sqrt(part)[:, :, None])
+    drag: NDArray[np.float64] = LEVER_MM * (
+        resistance(first)[:, :, None] * by_first + resistance(np.arcsin(aside))[:, :, None] * by_second
+    )
+    return drag
+
+
+def resistance(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of a joint's friction that acts, against its movement, from -1 to 1, shape as the angles (n, m)."""
+    lag, by_width = np.empty_like(angle_rad), np.empty_like(angle_rad)
+    follow(np.ascontiguousarray(angle_rad), np.full(angle_rad.shape[1], WIND_UP_RAD), lag, by_width)
+    return 2.0 * lag / WIND_UP_RAD

@@ -1,0 +1,111 @@
+"""Error source: joints that are no points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.travel import middle
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+WAYS = ("upward", "sideways", "skew")
+ENDS = ("base", "platform")
+
+USUAL_UM = 20.0
+
+
+class JointRunout(LinearSource):
+    """The axes of a joint do not meet, or its ball is not round: the strut's length changes as the joint swings.
+
+    Let the second axis of a universal joint pass the first at the distance e, towards the strut. Swung by the angle
+    beta about the second axis, the strut reaches e cos(beta) beyond the first, which the controller takes for its
+    end: dL = e (cos(beta) - 1) = -e/2 sin²(beta) for small angles, with sin(beta) = u a, u the strut's direction and a
+    the first axis. An offset that is fixed in the strut is another length.
+
+    Where the axes point need not be known. With d the strut's direction in base or platform, less what it is in the
+    middle of the travel, along v (in the strut's vertical plane) and h (level), both across the strut there,
+
+        dL = -1/2 (e_vv d_v² + e_hh d_h² + 2 e_vh d_v d_h),
+
+    which holds for a universal joint whose first axis a lies across the strut there (e_vv = e a_v² and so on), and for an
+    oval ball, whose radius is another quadratic form of the direction; all to second order in the swing. Three numbers
+    for each of the twelve joints.
+
+    Where the strut's end is offset across the strut and goes round the first axis with it, as a crank does, its length
+    changes in the first order, dL = f_v d_v + f_h d_h: what a joint in another place does. In the base that is a part
+    of `base-joints` and left to it; in the platform two numbers more for each strut, and these tests can hardly tell
+    them from `platform-joints`.
+    """
+
+    name = "joint-runout"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    varies_with = "joint-angle"
+    form_uncertainty = 0.2  # a joint out of true has more than one harmonic
+    texts = Texts(
+        what="A joint is not a point: the two axes of a universal joint do not meet, or the ball of a ball joint is oval.",
+        shows="Circles shifted and deformed by a few micrometres, the same in both directions, growing with the square "
+        "of the swing of the joint: with the tilt for platform joints, with the way off the middle for base joints.",
+        confirm="Take the strut off at its other end, put a dial gauge on the joint's housing towards the strut and "
+        "swing the strut about one axis of the joint, then about the other.",
+        cure="Exchange or shim the joint.",
+        equation="actual minus driven length = -1/2 (e_vv d_v² + e_hh d_h² + 2 e_vh d_v d_h) for each joint, and f_v d_v + "
+        "f_h d_h for that of the platform, d the strut's direction less that in the middle of the travel",
+        origin="geometry of a universal (Hooke's) joint with offset axes, e (cos(beta) - 1), to second order in the swing",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Three offsets for each joint of each strut, and two across the strut for that of the platform."""
+        swings = dict(zip(WAYS, ("up and down", "sideways", "both ways at once"), strict=True))
+        towards = "offset of the axes of its {} joint, as the strut swings {}; positive: towards the strut"
+        across = "offset of the strut's end across it, which goes round the first axis of its platform joint: {} part"
+        found: list[Parameter] = []
+        for i in range(STRUTS):
+            of = f"strut_{i + 1}"
+            for end in ENDS:
+                found += [
+                    Parameter(f"{of}_{end}_{way}_um", "µm", USUAL_UM, towards.format(end, swings[way]), strut=i + 1)
+                    for way in WAYS
+                ]
+            found += [
+                Parameter(f"{of}_platform_across_{way}_um", "µm", USUAL_UM, across.format(way), strut=i + 1)
+                for way in WAYS[:2]
+            ]
+        return tuple(found)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each strut answers to the offsets of its own two joints."""
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        unit, rest = inverse(machine.hexapod, frames).unit, inverse(machine.hexapod, middle(machine)).unit[0]
+        across = _across(rest)
+        in_platform = np.einsum("nji,nkj->nki", frames.rotation, unit)
+        swings = [np.einsum("nki,kai->nka", seen - rest, across) for seen in (unit, in_platform)]
+        lengths = np.concatenate([*(-_forms(swing) for swing in swings), swings[1]], axis=2)
+        own = lengths[:, :, None, :] * np.eye(STRUTS)[:, :, None]
+        return Effect(strut_mm=MM_PER_UM * own.reshape(len(motion), STRUTS, -1))
+
+
+def _across(rest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions v and h across struts of the directions `rest`, shape (6, 3); shape (6, 2, 3) [1]."""
+    level = np.cross(rest, [0.0, 0.0, 1.0])
+    size = np.linalg.norm(level, axis=1, keepdims=True)
+    # A strut that hangs plumb has no vertical plane of its own: take that of X.
+    level = np.where(size > 1e-9, level / np.maximum(size, 1e-9), [0.0, -1.0, 0.0])  # noqa: PLR2004
+    return np.stack([np.cross(level, rest), level], axis=1)
+
+
+def _forms(swing: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Half of v², half of h² and v h of swings (v, h), shape (n, 6, 2); shape (n, 6, 3) [1]."""
+    v, h = swing[..., 0], swing[..., 1]
+    return np.stack([v**2 / 2.0, h**2 / 2.0, v * h], axis=-1)

@@ -1,0 +1,57 @@
+"""Error source: places of the platform joints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+
+class PlatformJoints(LinearSource):
+    """A platform joint is not where the design has it: dP_i, i = 1 to 6, three coordinates each.
+
+    [CAL II-C] leaves them out: with strut lengths and base joints fitted, circles with the spindle upright show
+    nothing of them, and tilted ones only how far the tilt turns the same shift away from a base joint's.
+    """
+
+    name = "platform-joints"
+    belongs_to = Owner.MACHINE
+    form_uncertainty = 0.0  # a rigid shift is exact
+    detail_mm = SMOOTH_MM
+    texts = Texts(
+        what="The centres of the platform joints are not where the controller has them, seen from the tool tip.",
+        shows="Upright circles show nothing that base joints and strut lengths could not do as well. The spindle tilted, "
+        "circles are shifted and a little deformed, the same in both directions.",
+        confirm="Measure the joints' centres on the platform with a coordinate measuring machine, the tool's length with "
+        "a setting gauge: all six joints wrong by the same amount are a tool that is longer or set aside.",
+        cure="Enter the measured joints in the control; circles tell only part of them.",
+        equation="P_i = nominal P_i + dP_i; the strut feels -u_i (R dP_i)",
+        origin="[CAL eq 1] differentiated by the platform joints, which [CAL II-C] takes as known",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Eighteen coordinates; their usual size is that of base joints, which are assembled alike."""
+        usual = machine.joint_tolerance_mm or 0.2
+        return tuple(
+            Parameter(
+                f"joint_{i + 1}_{axis}_mm",
+                "mm",
+                usual,
+                f"platform joint {i + 1} actual minus nominal, platform {axis}",
+                strut=i + 1,
+            )
+            for i in range(STRUTS)
+            for axis in "xyz"
+        )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each coordinate its own parameter."""
+        return Effect(platform_joint_mm=np.eye(3 * STRUTS).reshape(STRUTS, 3, 3 * STRUTS))

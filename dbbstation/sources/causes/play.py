@@ -1,0 +1,152 @@
+"""Error source: play of the strut drives that the load closes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.compiled import compiled
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
+from dbbstation.sources.contract import (
+    SMOOTH_MM,
+    Effect,
+    ErrorSource,
+    Motion,
+    Need,
+    Owner,
+    Parameter,
+    Texts,
+    of_each_strut,
+)
+from dbbstation.sources.laws.play_ends import first_side
+from dbbstation.sources.laws.weights import platform_masses
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+FRICTION_N = (0.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
+"""Frictions worth trying, from none to more than a strut carries in upright circles [N]."""
+
+
+class Play(ErrorSource):
+    """What has play in a strut lies where the load puts it; only where friction holds the load does it stay behind.
+
+    With w the play, T the tension that the drive holds and R the friction of what lies behind the play, a strut that is
+    pulled by more than R is longer by w/2, one that is pushed by more than R is shorter by w/2, wherever the drive
+    goes: the load keeps the play closed and a reversal does nothing. Where |T| < R friction holds the strut, the drive
+    takes it along at either end of the play, and it is `backlash`. Tensions are those of the nominal machine at the
+    commanded poses, with the weights of strut and motor where the machine file has them.
+
+    A run is taken to begin in a movement that was already under way. A negative w is the mirror image, so that a fit
+    may pass through zero. The friction is looked for among stated values; between them the error does not change but
+    at single samples, so a fit leaves it where it starts.
+    """
+
+    name = "play"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    needs = frozenset({Need.POSE, Need.PATH})
+    varies_with = "strut-force"
+    form_uncertainty = 0.2  # play differs with load and place
+    texts = Texts(
+        what="Nut, bearing or joint of a strut has play that the platform's weight keeps closed. Where the force in the "
+        "strut changes from pull to push, the strut gives way by the play.",
+        shows="Steps in circles with the spindle tilted, where the force in one strut changes its sign: at the same "
+        "places clockwise and counter-clockwise. With friction a step comes sooner, as soon as the force is small enough "
+        "to be held. Circles in which no force comes near zero show nothing, at reversals neither.",
+        confirm="Stand still, hang a weight on the spindle so that the strut's force changes its sign, and watch the "
+        "strut with a dial gauge: it jumps by the play.",
+        cure="Preload or exchange the part; until then balance the platform so that the struts' forces keep their sign "
+        "in the work.",
+        equation="actual minus driven length = +w/2 where T > R, -w/2 where T < -R; between, y_k - x_k with y_k = "
+        "min(max(y_k-1, x_k - w/2), x_k + w/2)",
+        origin="play closed by the load, held by Coulomb's friction; T from the platform's equilibrium "
+        "[GRAV eq 1, 6], whose signs turn in 12 of the 15 circles of [CAL Table II] on the reference machine",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Six plays, full width, and one friction.
+
+        Raises:
+            ModelError: the machine file has no masses.
+        """
+        platform_masses(self.name, machine)
+        plays = of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: load closes it")
+        meaning = "force in a strut below which friction holds it, all struts alike"
+        return (*plays, Parameter("friction_n", "N", 100.0, meaning, FRICTION_N))
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Where each strut lies in its play.
+
+        Raises:
+            ModelError: the motion is no path, or the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        place, _ = self._places(motion, machine, values)
+        return Effect(strut_mm=place)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Each strut answers to its own play; the friction changes nothing but the samples at which a strut lets go.
+
+        Raises:
+            ModelError: the motion is no path, or the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        _, by_width = self._places(motion, machine, values)
+        by_play = MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS)
+        return Effect(strut_mm=np.concatenate([by_play, np.zeros((*by_width.shape, 1))], axis=2))
+
+    def _places(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Error of each strut [mm] and its derivative by the width [mm/mm], shapes (n, 6)."""
+        self.require(motion)
+        masses = platform_masses(self.name, machine)
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        struts = inverse(machine.hexapod, frames)
+        load = platform_weight(frames, masses)
+        if machine.strut_masses is not None:
+            load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))
+        tension = motor_loads(struts, strut_tensions(struts, load), machine.strut_masses)
+        width = MM_PER_UM * values[:STRUTS]
+        place, by_width = np.empty_like(tension), np.empty_like(tension)
+        settle(struts.length_mm, tension, np.abs(width), max(float(values[STRUTS]), 0.0), place, by_width)
+        return np.where(width < 0.0, -place, place), by_width
+
+
+@compiled
+def settle(
+    travel: NDArray[np.float64],
+    tension: NDArray[np.float64],
+    width: NDArray[np.float64],
+    friction: float,
+    place: NDArray[np.float64],
+    by_width: NDArray[np.float64],
+) -> None:
+    """Follow each column through its play: error y - x and its derivative by the width.
+
+    Shapes: travel x (n, m), tension (n, m), width (m,) and not negative, place and by_width (n, m), which are written.
+    """
+    count, columns = travel.shape
+    for i in range(columns):
+        half = 0.5 * width[i]
+        # Where friction holds the strut at first.
+        side = first_side(travel[:, i])
+        at = travel[0, i] + side * width[i]
+        for k in range(count):
+            error = at - travel[k, i]
+            if tension[k, i] < -friction or (tension[k, i] <= friction and error < -half):
+                error, side = -half, -0.5
+            elif tension[k, i] > friction or error > half:
+                error, side = half, 0.5
+            at = travel[k, i] + error
+            place[k, i] = error
+            by_width[k, i] = side

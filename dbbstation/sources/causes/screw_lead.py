@@ -1,0 +1,61 @@
+"""Error source: lead of the struts' screws."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import strut_lengths
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Texts, of_each_strut
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
+
+MM_PER_UM_M = 1e-6
+"""One µm/m in mm/mm."""
+
+
+class ScrewLead(LinearSource):
+    """A strut travels a little more than its controller counts, in proportion to the travel: dL_i = e_i (L_i - L_0).
+
+    L_0 is the middle of the strut's travel in the machine file, where the error is zero by definition: what a strut
+    is off there belongs to its reference length. 10 µm/m are 1 µm over 100 mm.
+    """
+
+    name = "screw-lead"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    varies_with = "strut-length"
+    form_uncertainty = 0.02  # the lead of a ground screw is even to a few per cent of its error
+    texts = Texts(
+        what="The lead of a strut's screw, or the scale that measures it, is not the one in the control: the strut "
+        "travels too far or not far enough.",
+        shows="Circles off the middle and at other heights are shifted and deformed, the same in both directions. Base "
+        "joints and strut lengths can do almost all of it, so that a calibration hides it.",
+        confirm="Measure the travel of that strut over its whole stroke with a laser interferometer.",
+        cure="Enter the lead, or a table of screw errors, in the control.",
+        equation="actual minus driven length = e_i (L_i - L_0), L_0 the middle of the travel",
+        origin="travel deviation of a ball screw over its length, ISO 3408-3",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Six lead errors; the usual one is that of a screw of tolerance grade 3, 12 µm over 300 mm [ISO 3408-3]."""
+        zero = f"strut {{}} travels more than counted; zero at {_middle_mm(machine):g} mm"
+        return of_each_strut("strut_{}_um_m", "µm/m", 40.0, zero)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each strut answers to its own lead."""
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        travel = strut_lengths(machine.hexapod, frames) - _middle_mm(machine)
+        return Effect(strut_mm=MM_PER_UM_M * travel[:, :, None] * np.eye(STRUTS))
+
+
+def _middle_mm(machine: Machine) -> float:
+    """Length at which the error is zero [mm]."""
+    return sum(machine.travel.strut_mm) / 2.0

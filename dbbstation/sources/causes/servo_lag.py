@@ -1,0 +1,146 @@
+"""Error source: struts that follow their command late, each by a time of its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.compiled import compiled
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Texts, of_each_strut
+from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
+
+S_PER_MS = 1e-3
+
+
+class ServoLag(ErrorSource):
+    """A strut follows its command as a position loop of the gain 1/tau does: tau_i dy_i/dt = x_i - y_i.
+
+    With x the commanded and y the driven length, the error is y - x = -tau dx/dt + tau² d²x/dt² - ..., a lag by tau
+    and, from its square, a path that is cut short. The run is taken to begin in a movement that was already under way.
+
+    A negative tau is a strut ahead of its command, as feed-forward makes it: the same equation, which then leads back
+    from what is still to come. The error and its derivative go through zero without a kink, so that a fit may too.
+
+    A lag that all struts have in common is a delay of the whole machine, to first order the same as `time-skew`, and
+    a circle about a ball in its centre does not show it but by its shrinkage, (v tau)² / 2R: 0.2 µm at 1000 mm/min,
+    150 mm and 15 ms. Where the turn is found in the recording by feed-in and feed-out, these come late as well, and
+    the delay leaves no trace at all. Differences between struts are what circles see: a fit holds the mean of the six
+    times at zero and says so, and each of them is found less that mean.
+    """
+
+    name = "servo-lag"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
+    varies_with = "strut-speed"
+    form_uncertainty = 0.1  # a drive lags by a filter, not by one time
+    texts = Texts(
+        what="The drives follow their commands late, and not all by the same time: position loops with different "
+        "gains, or feed-forward that fits some struts only.",
+        shows="An ellipse that lies the other way round in the other direction: half the difference of clockwise and "
+        "counter-clockwise runs shows it, half their sum does not. It grows with the feed. A lag that all struts share "
+        "only makes the circle smaller, by (v tau)² / 2R, and is otherwise the same as readings taken at a wrong time.",
+        confirm="Run one circle at half and at twice the feed: the difference between the directions halves and "
+        "doubles. Compare following errors of the six drives on the control's diagnosis page at constant speed: error "
+        "divided by speed is the lag.",
+        cure="Set the position-loop gains of all struts to the same value and adjust velocity feed-forward; until then "
+        "measure and finish at a low feed.",
+        equation="actual minus driven length = y - x, tau dy/dt = x - y; nearly -tau dx/dt",
+        origin="first-order position loop; radius loss (v tau)² / 2R and the ellipse of unequal gains as in "
+        "Kakino, Ihara and Shinohara, Accuracy Inspection of NC Machine Tools by Double Ball Bar Method, 1993",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Six times."""
+        return of_each_strut("strut_{}_ms", "ms", 1.0, "time by which strut {} is late; negative: it is ahead")
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Lag of each strut.
+
+        Raises:
+            ModelError: the motion is no path or has no time.
+        """
+        lag, _ = self._lag(motion, machine, values)
+        return Effect(strut_mm=lag)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Each strut answers to its own time.
+
+        Raises:
+            ModelError: the motion is no path or has no time.
+        """
+        _, by_constant = self._lag(motion, machine, values)
+        return Effect(strut_mm=S_PER_MS * by_constant[:, :, None] * np.eye(STRUTS))
+
+    def _lag(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Error of each strut [mm] and its derivative by its time constant [mm/s], shapes (n, 6)."""
+        self.require(motion)
+        time_s, length, place = driven_in_time(motion, machine)
+        speed, step, constant = speed_mm_s(time_s, length), np.diff(time_s), S_PER_MS * values
+        lag, by_constant = followed(speed, step, np.abs(constant))
+        if (constant < 0.0).any():
+            ahead, by_ahead = followed(-speed[::-1], step[::-1], np.abs(constant))
+            lag = np.where(constant < 0.0, ahead[::-1], lag)
+            by_constant = np.where(constant < 0.0, -by_ahead[::-1], by_constant)
+        return lag[place], by_constant[place]
+
+
+def followed(
+    speed: NDArray[np.float64], step_s: NDArray[np.float64], constant_s: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Errors e of first-order loops, tau de/dt = -e - tau dx/dt, and their derivatives by tau, shapes (m, k).
+
+    Args:
+        speed: dx/dt, linear in between, shape (m, k) [mm/s].
+        step_s: time from row to row, shape (m - 1,) [s].
+        constant_s: tau, not negative, shape (k,) [s].
+    """
+    lag, by_constant = np.zeros_like(speed), np.zeros_like(speed)
+    _follow(np.ascontiguousarray(speed), np.ascontiguousarray(step_s), constant_s, lag, by_constant)
+    return lag, by_constant
+
+
+FORGOTTEN = 50.0
+"""Time constants after which nothing is left of an error."""
+
+
+@compiled
+def _follow(
+    speed: NDArray[np.float64],
+    step: NDArray[np.float64],
+    constant: NDArray[np.float64],
+    lag: NDArray[np.float64],
+    by_constant: NDArray[np.float64],
+) -> None:
+    """Solve each column from row to row, exactly for speeds that are linear between rows.
+
+    Then e = -tau dx/dt + tau² d²x/dt² is a solution, and what the error differs from it by fades with exp(-t / tau).
+    """
+    rows, columns = speed.shape
+    for i in range(columns):
+        tau = constant[i]
+        gain = (speed[1, i] - speed[0, i]) / step[0] if rows > 1 else 0.0
+        # The solution that has forgotten how it began.
+        lag[0, i] = -tau * speed[0, i] + tau * tau * gain
+        by_constant[0, i] = -speed[0, i] + 2.0 * tau * gain
+        for k in range(1, rows):
+            h = step[k - 1]
+            gain = (speed[k, i] - speed[k - 1, i]) / h
+            lag[k, i] = -tau * speed[k, i] + tau * tau * gain
+            by_constant[k, i] = -speed[k, i] + 2.0 * tau * gain
+            if h < FORGOTTEN * tau:
+                kept = np.exp(-h / tau)
+                beside = lag[k - 1, i] + tau * speed[k - 1, i] - tau * tau * gain
+                by_beside = by_constant[k - 1, i] + speed[k - 1, i] - 2.0 * tau * gain
+                lag[k, i] += kept * beside
+                by_constant[k, i] += kept * (by_beside + beside * h / (tau * tau))

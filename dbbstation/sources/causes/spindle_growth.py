@@ -1,0 +1,102 @@
+"""Error source: the spindle grows as it warms up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.laws import by_temperature
+from dbbstation.sources.laws.by_temperature import MACHINE, FollowsTemperature
+from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+BEGUN_PERCENT = (-100.0, 0.0, 40.0)
+"""Worth trying: cooling from warm, from cold, and ten minutes of work before at a time constant of half an hour [%]."""
+
+_OUT_OF_THE_SPINDLE = np.array([0.0, 0.0, -1.0])
+"""Which way the tool tip moves, platform frame: away from the platform, which lies above it [1]."""
+
+
+class SpindleGrowth(ErrorSource):
+    """The tool tip moves out of the spindle along its axis by the growth g(t) of `warm_up`, and by what it had grown before.
+
+    What struts and frame had grown before the first sample is part of their lengths and places; a spindle has no such
+    parameter. It had grown by a share b of what is still to come, or has yet to shrink by all of it (b = -1) where it was
+    warm and cools. A bar level with its ball does not see it while the spindle is upright; tilted circles are shifted by
+    (g + b a) sin(tilt).
+    """
+
+    name = "spindle-growth"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    needs = frozenset({Need.TIME})
+    varies_with = "time"
+    form_uncertainty = 0.2  # a warm-up has its own law, in stages
+    texts = Texts(
+        what="The spindle and its nose warm up and push the tool out of the platform. The growth given is counted from "
+        "the first sample of the session; begun says how much of it was there already, against the cold spindle.",
+        shows="Tilted circles wander sideways in the direction that the tool points to, upright ones stay; both "
+        "directions drift alike.",
+        confirm="Touch the ball or a tool with a dial gauge along the spindle's axis, cold, and again after the same "
+        "time and speed as in the measurement.",
+        cure="Measure with the spindle at rest and cool; else let it warm up at working speed first, or enter its growth "
+        "as a tool length that follows the spindle's temperature.",
+        equation=f"tool tip moves along -z of the platform by g(t) + begun a, g(t) = {EQUATION}; {by_temperature.EQUATION}",
+        origin=f"thermal distortion caused by a rotating spindle, ISO 230-3; {ORIGIN}",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Growth in the end, time constant, what pauses take back, and how much of the growth had been before."""
+        growth = Parameter("growth_um", "µm", 10.0, "way of the tool tip out of the spindle, from the first sample on")
+        before = "growth before the first sample, of that after it; -100 where a warm spindle cools"
+        begun = Parameter("begun_percent", "percent", 40.0, before, BEGUN_PERCENT, newer=True)
+        return (*warm_up_parameters(growth, "pause_loss_um", 1800.0), begun)
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shift of the tool tip.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        self.require(motion)
+        growth, *_, percent = values
+        out_um = grown(motion, values[:-1]) + percent / 100.0 * growth
+        return Effect(tool_tip_mm=MM_PER_UM * out_um[:, None] * _OUT_OF_THE_SPINDLE)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """By the three parameters of the law, and by what had been before.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        self.require(motion)
+        growth, *_, percent = values
+        law = grown_by(motion, values[:-1])
+        law[:, 0] += percent / 100.0
+        by = MM_PER_UM * np.column_stack([law, np.full(len(law), growth / 100.0)])
+        return Effect(tool_tip_mm=_OUT_OF_THE_SPINDLE[:, None] * by[:, None, :])
+
+    def by_temperature(self) -> ErrorSource:
+        """The spindle by the machine's thermometer."""
+        return _ByTemperature()
+
+
+class _ByTemperature(FollowsTemperature, cause=SpindleGrowth):
+    """The tool tip moves out of the spindle by c (T - T_0); no column of a recording is a thermometer of its own."""
+
+    thermometers = (MACHINE,)
+    growth = Parameter(
+        "growth_um_k", "µm/K", 3.0, "way of the tool tip out of the spindle for each kelvin of the machine"
+    )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shift of the tool tip per unit."""
+        return Effect(tool_tip_mm=(MM_PER_UM * self.warmer_k(motion) * _OUT_OF_THE_SPINDLE)[..., None])

@@ -1,0 +1,40 @@
+"""Error source: reference lengths of the struts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Texts, of_each_strut
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.sources.contract import Parameter
+
+
+class StrutReferenceLength(LinearSource):
+    """A strut is longer by a constant than its encoder says: dL_i, i = 1 to 6 [CAL II-C 1]."""
+
+    name = "strut-reference-length"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    texts = Texts(
+        what="The length of a strut at its reference mark is not the one the controller assumes.",
+        shows="Circles shifted and deformed, more so away from the middle; the same in both directions.",
+        confirm="Reference the struts again and repeat a circle: the error stays. Exchange two motors: it moves.",
+        cure="Enter the identified lengths as reference-length errors in the control, or export compensated programs.",
+        equation="L_i = driven length + dL_i",
+        origin="[CAL II-C 1]",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Six length errors."""
+        return of_each_strut("strut_{}_mm", "mm", 0.2, "strut {} actual minus driven length")
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each strut its own parameter."""
+        return Effect(strut_mm=np.eye(STRUTS))

@@ -1,0 +1,100 @@
+"""Error source: struts and motors that have a weight of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import StrutMasses
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.statics import motor_loads, stretch_mm, strut_tensions, transverse_load, transverse_pull
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+USUAL = StrutMasses(strut_kg=25.0, motor_kg=20.0, motor_length_mm=0.0)
+"""What struts of a machine of the PM-600's size weigh, where the machine file does not say; their lengths are unknown."""
+
+
+class StrutWeight(LinearSource):
+    """Struts hang between base and platform, pull at it across their axes and stretch under themselves [GRAV eq 2, 3].
+
+    A strut's weight is carried by both its joints; what the platform carries of it changes the forces in all six
+    struts. The weights of strut, motor and screw are parameters, all six struts alike; the lengths that say where
+    they act stand in the machine file, and a part whose length is not known there is not asked for. The stretch is
+    proportional to the struts' compliance: the one that the source gravity of the same model has, else the machine
+    file's. The motors hold what moves with the strut as well.
+    """
+
+    name = "strut-weight"
+    belongs_to = Owner.MACHINE
+    form_uncertainty = 0.02  # masses are known to a few per cent
+    detail_mm = SMOOTH_MM
+    weighs = True
+    loads_struts = True
+    weighs_struts = True
+    texts = Texts(
+        what="Struts, screws and motors weigh something themselves: they load the platform and stretch under their own "
+        "weight.",
+        shows="Almost exactly as the platform's weight does; circles can hardly tell the two apart, and what gravity "
+        "is fitted to takes it up.",
+        confirm="Weigh a strut with its motor, or take the weights off the drawing. Motor currents at rest show the "
+        "part along the strut.",
+        cure="Enter the weights in the machine file; otherwise nothing: the compliance fitted for gravity then is ten "
+        "or twenty percent too large and compensates nearly as well.",
+        equation="f = (m_s/2 - m_m L_m/(2 L) + m_k (1 - l/(2 L))) g_across; J^T dT = [sum f, sum (R P) x f]; actual "
+        "minus driven length = c(L) dT and the stretch under what hangs below each section",
+        origin="[GRAV eq 2, 3, 7] with the sign of eq 2 turned, the force kept in eq 1, and the weight along the strut",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Mass of the strut; of motor and screw where the machine file has their lengths."""
+        stated = machine.strut_masses or USUAL
+        counted = for_such_struts(machine)
+        meanings = {
+            "strut": "what lies evenly between the joints of a strut",
+            "motor": "what sits behind the base joint of a strut",
+            "screw": "screw of a strut that slides through the base joint",
+        }
+        return tuple(
+            Parameter(
+                f"{part}_kg",
+                "kg",
+                getattr(stated, f"{part}_kg") or USUAL.strut_kg,
+                f"mass of {meanings[part]}; {counted}",
+            )
+            for part in _parts(machine)
+        )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each mass its own forces.
+
+        Raises:
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        struts = inverse(machine.hexapod, frames)
+        lengths = replace(machine.strut_masses or USUAL, strut_kg=0.0, motor_kg=0.0, screw_kg=0.0)
+        stretch, loads = [], []
+        for part in _parts(machine):
+            kilogram = replace(lengths, **{f"{part}_kg": 1.0})
+            load = transverse_load(struts, transverse_pull(struts, kilogram))
+            tension = strut_tensions(struts, load)
+            stretch.append(stretch_mm(struts, strut_compliance(machine), tension, kilogram))
+            loads.append(motor_loads(struts, tension, kilogram))
+        return Effect(strut_mm=np.stack(stretch, axis=-1), load_n=np.stack(loads, axis=-1))
+
+
+def _parts(machine: Machine) -> tuple[str, ...]:
+    """Parts of a strut of which it is known where they act."""
+    stated = machine.strut_masses or USUAL
+    motor = ("motor",) if stated.motor_length_mm else ()
+    screw = ("screw",) if stated.screw_length_mm else ()
+    return ("strut", *motor, *screw)

@@ -1,0 +1,93 @@
+"""Error source: the base plate grows as it warms up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.laws import by_temperature
+from dbbstation.sources.laws.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
+from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM_M = 1e-6
+"""One µm/m in mm/mm."""
+
+
+class ThermalFrame(ErrorSource):
+    """The base joints move away from the centre of the base plate: dQ_i = Q_i g(t).
+
+    g is the growth of `warm_up`. The plate is taken as evenly warm and held at its centre, the origin of the machine frame; one that is held elsewhere
+    shifts as a whole as well, which is a matter of where the jig stands. Counted from the session's first sample,
+    where the growth is zero by definition, as thermal-struts is.
+    """
+
+    name = "thermal-frame"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    needs = frozenset({Need.TIME})
+    varies_with = "time"
+    form_uncertainty = 0.2  # a warm-up has its own law, in stages
+    texts = Texts(
+        what="The base plate that carries the struts warms up while the machine works, or with the shop, and grows. The "
+        "growth given is counted from the first sample of the session.",
+        shows="The same circle, repeated, comes out higher or lower and of another size than an hour before; both "
+        "directions drift alike. Growing struts look almost the same.",
+        confirm="Log the temperature of the base plate: about 1 K for each 11 µm/m of steel. Measure one circle every "
+        "half hour over a morning.",
+        cure="Let machine and shop come to rest before measuring; keep the sun and warm air off the frame; repeat early "
+        "tests at the end, so that the drift does not mix with the height of the ball.",
+        equation=f"dQ_i = Q_i g(t), g = {EQUATION}; {by_temperature.EQUATION}",
+        origin=ORIGIN,
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Growth in the end, time constant, what pauses take back."""
+        meaning = "growth of the base from the first sample to the end of warm-up"
+        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 15.0, meaning), "pause_loss_um_m", 7200.0)
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Shift of each base joint.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        self.require(motion)
+        return Effect(base_joint_mm=grown(motion, values)[:, None, None] * _per_growth_mm(machine))
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """By the three parameters of the law.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        self.require(motion)
+        law = grown_by(motion, values)
+        return Effect(base_joint_mm=_per_growth_mm(machine)[:, :, None] * law[:, None, None, :])
+
+    def by_temperature(self) -> ErrorSource:
+        """The base plate by the thermometer on it."""
+        return _ByTemperature()
+
+
+class _ByTemperature(FollowsTemperature, cause=ThermalFrame):
+    """dQ_i = Q_i c (T - T_0)."""
+
+    thermometers = (MACHINE,)
+    growth = Parameter(
+        "growth_um_m_k", "µm/(m K)", STEEL_UM_M_K, "growth of the base for each kelvin that it is warmer"
+    )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shift of each base joint per unit."""
+        return Effect(base_joint_mm=(self.warmer_k(motion)[:, :, None] * _per_growth_mm(machine))[..., None])
+
+
+def _per_growth_mm(machine: Machine) -> NDArray[np.float64]:
+    """Shift of each base joint per µm/m, shape (6, 3) [mm]."""
+    return MM_PER_UM_M * machine.hexapod.base_joints_mm

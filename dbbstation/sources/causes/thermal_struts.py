@@ -1,0 +1,99 @@
+"""Error source: struts that grow as they warm up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.laws import by_temperature
+from dbbstation.sources.laws.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
+from dbbstation.sources.laws.warm_up import EQUATION, ORIGIN, grown, grown_by, warm_up_parameters
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM_M = 1e-6
+"""One µm/m in mm/mm."""
+
+
+class ThermalStruts(ErrorSource):
+    """All struts grow alike, each in proportion to its length: dL_i = L_i g(t), g the growth of `warm_up`.
+
+    Counted from the session's first sample, where the growth is zero by definition: it is what the struts still had
+    to grow then, not their growth since the machine was switched on, and what they had grown before is part of their
+    reference lengths. A cold and a warm start are therefore two different values, and a session predicted with this
+    source starts as those did that it was fitted to.
+    """
+
+    name = "thermal-struts"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    needs = frozenset({Need.POSE, Need.TIME})
+    varies_with = "time"
+    form_uncertainty = 0.2  # a warm-up has its own law, in stages
+    texts = Texts(
+        what="The struts' screws warm up while the machine works and grow, quickly at first and then ever more slowly. "
+        "The growth given is counted from the first sample of the session.",
+        shows="The same circle, repeated, comes out higher or lower, shifted and of another size than an hour before; "
+        "both directions drift alike.",
+        confirm="Repeat an early test at the end of the session, or measure one circle every ten minutes from a cold "
+        "start. A thermometer on a strut shows about 1 K for each 11 µm/m of steel.",
+        cure="Let the machine warm up with a movement like that of the measurement before it starts; repeat early "
+        "tests at the end, so that the drift does not mix with the height of the ball.",
+        equation=f"actual minus driven length = L_i g(t), g = {EQUATION}; {by_temperature.EQUATION}",
+        origin=ORIGIN,
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Growth in the end, time constant, what pauses take back."""
+        meaning = "growth of all struts from the first sample to the end of warm-up"
+        return warm_up_parameters(Parameter("growth_um_m", "µm/m", 30.0, meaning), "pause_loss_um_m", 3600.0)
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Growth of each strut.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        per_growth = self._per_growth_mm(motion, machine)
+        return Effect(strut_mm=grown(motion, values)[:, None] * per_growth)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """By the three parameters of the law.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        per_growth = self._per_growth_mm(motion, machine)
+        return Effect(strut_mm=per_growth[:, :, None] * grown_by(motion, values)[:, None, :])
+
+    def by_temperature(self) -> ErrorSource:
+        """Struts that follow the thermometers on them."""
+        return _ByTemperature()
+
+    def _per_growth_mm(self, motion: Motion, machine: Machine) -> NDArray[np.float64]:
+        self.require(motion)
+        return _per_growth_mm(motion, machine)
+
+
+class _ByTemperature(FollowsTemperature, cause=ThermalStruts):
+    """dL_i = L_i c (T_i - T_i0): each strut by its own thermometer, or all by the machine's."""
+
+    thermometers = (tuple(f"strut{k + 1}" for k in range(STRUTS)), MACHINE)
+    growth = Parameter("growth_um_m_k", "µm/(m K)", STEEL_UM_M_K, "growth of a strut for each kelvin that it is warmer")
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Growth of each strut per unit."""
+        return Effect(strut_mm=(self.warmer_k(motion) * _per_growth_mm(motion, machine))[:, :, None])
+
+
+def _per_growth_mm(motion: Motion, machine: Machine) -> NDArray[np.float64]:
+    """Growth of every strut per µm/m, shape (n, 6) [mm]."""
+    frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+    return MM_PER_UM_M * inverse(machine.hexapod, frames).length_mm

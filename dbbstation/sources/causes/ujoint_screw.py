@@ -1,0 +1,116 @@
+"""Error source: universal joints that turn the screws."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import ModelError
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.travel import middle
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
+from dbbstation.sources.laws.screws import screw_lead_mm
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import JointAxes, Machine
+
+ALONG = 0.05
+"""Sine of the angle between a joint's axis and its strut below which the joint is locked, 3 degrees [1]."""
+
+
+class UjointScrew(LinearSource):
+    """The lower part of a strut turns against the upper one as its joints swing, and the screw makes travel of it.
+
+    Each part of a strut hangs in a universal joint: it can swing, but not turn about the strut. The second axis of a
+    joint lies across the strut and across the joint's first axis a, along a x u. The angle psi about u from the base
+    joint's second axis to the platform joint's is the angle by which nut and screw have turned against each other
+    without the motor: dL = p psi / (2 pi), p the lead, psi counted from the machine's middle pose without tilt, where
+    what is left belongs to the reference length. Ball joints let the strut turn freely and say nothing of psi.
+    """
+
+    name = "ujoint-screw"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    varies_with = "joint-angle"
+    form_uncertainty = 0.05  # joint axes are square to a few hundredths
+    texts = Texts(
+        what="The struts hang in universal joints. As the platform moves, the joints turn nut and screw against each other, "
+        "and the strut travels without its motor turning.",
+        shows="Circles shifted and deformed, the same in both directions, more as the platform is tilted and turned. It is "
+        "large, tenths of a millimetre, where the control does not reckon with it; most controls do.",
+        confirm="Block a motor, swing the strut by hand at its lower end and compare its length before and after; or look "
+        "in the control's manual whether it corrects the turning of the screws.",
+        cure="Enter the axes of the joints in the control, or switch its correction on; otherwise export compensated "
+        "programs.",
+        equation="actual minus driven length = p (psi - psi of the middle pose) / (2 pi), psi about u from a_b x u to "
+        "(R a_p) x u",
+        origin="geometry of a universal (Hooke's) joint: its second axis lies across the first and across the strut",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """One lead; its usual size is that of the screws.
+
+        Raises:
+            ModelError: the machine file has no joint axes, or no screw lead.
+        """
+        _axes(machine)
+        meaning = "travel per turn of the platform end about the strut, seen along it clockwise; 0 where corrected"
+        return (Parameter("lead_mm", "mm", screw_lead_mm(self.name, machine), meaning),)
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Turns of the screws, which are the travel per lead.
+
+        Raises:
+            ModelError: the machine file has no joint axes, or one that lies along its strut.
+        """
+        axes = _axes(machine)
+        here = _second_axes(machine, axes, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+        rest = _second_axes(machine, axes, middle(machine))
+        # Products of unit complex numbers: differences of angles that never jump by a turn.
+        turned = np.angle(here * rest.conj())
+        return Effect(strut_mm=(turned / (2.0 * np.pi))[:, :, None])
+
+
+def _second_axes(machine: Machine, axes: JointAxes, frames: Frames) -> NDArray[np.complex128]:
+    """Angle psi of each strut as a complex number of length one, shape (n, 6)."""
+    unit = inverse(machine.hexapod, frames).unit
+    platform = np.einsum("nij,kj->nki", frames.rotation, axes.platform / _length(axes.platform))
+    base = np.broadcast_to(axes.base / _length(axes.base), unit.shape)
+    of_base, of_platform = np.cross(base, unit), np.cross(platform, unit)
+    across = np.stack([_length(of_base)[..., 0], _length(of_platform)[..., 0]])
+    if across.min() < ALONG:
+        end, pose, strut = np.unravel_index(int(across.argmin()), across.shape)
+        raise ModelError(
+            f"the axis of the {('base', 'platform')[end]} joint of strut {strut + 1} lies along the strut at pose "
+            f"{pose + 1}, where the joint cannot swing",
+            remedy="check `joint_axes` in the machine file",
+        )
+    sine = np.einsum("nki,nki->nk", unit, np.cross(of_base, of_platform))
+    cosine = np.einsum("nki,nki->nk", of_base, of_platform)
+    found: NDArray[np.complex128] = (cosine + 1j * sine) / np.hypot(cosine, sine)
+    return found
+
+
+def _length(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lengths of vectors, the last axis kept."""
+    return np.asarray(np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def _axes(machine: Machine) -> JointAxes:
+    """Axes of the machine's universal joints.
+
+    Raises:
+        ModelError: the machine file has none; names the key.
+    """
+    if machine.joint_axes is None:
+        raise ModelError(
+            f"the error source {UjointScrew.name} needs the directions of the universal joints' axes, and the machine "
+            f"{machine.name!r} has no `joint_axes`",
+            remedy="add `joint_axes: {base: ..., platform: ...}` to the machine file, six unit vectors each, or leave "
+            "this source out",
+        )
+    return machine.joint_axes

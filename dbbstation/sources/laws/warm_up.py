@@ -1,0 +1,125 @@
+"""How a part warms up over a session: the law that all sources which grow with time share.
+
+A body of one time constant tau follows the heat that it gets. In a session that is the heat of work, which is the same on
+average from run to run, except in pauses:
+
+    g(t) = a (1 - exp(-t / tau)) - b p(t),    tau dp/dt = [1 in a pause, else 0] - p,    p(0) = 0
+
+a is what the part still had to grow when the session began, and negative where it only cools. b is what a pause without
+end would take back: nothing where the drives stay warm, and not a, where the part was warm to begin with. Newton's law
+of cooling, solved for heat that is switched on and off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from itertools import accumulate
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Parameter
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from dbbstation.sources.contract import Motion
+
+TIME_CONSTANTS_S = tuple(float(f"{tau:.3g}") for tau in np.geomspace(300.0, 14400.0, 13))
+"""Time constants worth trying: five minutes to four hours, each 1.4 times the one before [s]."""
+
+PAUSE_S = 600.0
+"""Time without a run from which on it is a pause. A ball is put up, a bar changed in less: that belongs to the work."""
+
+EQUATION = "a (1 - exp(-t / tau)) - b p(t), t since the session's first sample; p: what pauses of 10 min and more cool"
+ORIGIN = "linear expansion of a body of one time constant (Newton's law of cooling), heated while the machine works"
+
+
+def warm_up_parameters(growth: Parameter, pause_loss: str, usual_s: float) -> tuple[Parameter, ...]:
+    """Parameters of the law: the growth given, its time constant, and what a pause takes back.
+
+    Args:
+        growth: what is still to grow at the first sample.
+        pause_loss: name of what a pause takes back; its unit is that of the growth.
+        usual_s: usual time constant [s].
+    """
+    meaning = "what a pause without end would take back; pauses count from ten minutes on"
+    return (
+        growth,
+        Parameter(
+            "time_constant_s", "s", usual_s, "time in which it comes to 63 % of what it will be", TIME_CONSTANTS_S
+        ),
+        replace(growth, name=pause_loss, meaning=meaning, newer=True),
+    )
+
+
+def grown(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Growth at every sample, shape (n,), in the unit of its parameters.
+
+    Args:
+        motion: with times.
+        values: of `warm_up_parameters`, shape (3,).
+    """
+    growth, constant_s, loss = values
+    law: NDArray[np.float64] = growth * warmed(_time_s(motion), constant_s) - loss * _paused(motion, constant_s, warmed)
+    return law
+
+
+def grown_by(motion: Motion, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Derivatives of `grown` by its three parameters, shape (n, 3)."""
+    growth, constant_s, loss = values
+    time_s = _time_s(motion)
+    by_constant = growth * warmed_by_constant(time_s, constant_s)
+    by_constant = by_constant - loss * _paused(motion, constant_s, warmed_by_constant)
+    return np.column_stack([warmed(time_s, constant_s), by_constant, -_paused(motion, constant_s, warmed)])
+
+
+def warmed(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64]:
+    """Share of a warm-up that has happened, 1 - exp(-t / tau), shape (n,) [1].
+
+    Before t = 0 nothing has happened; a constant of zero (or less, which a fit may try) is its limit, a step at t = 0.
+
+    Args:
+        time_s: since the heat came, shape (n,) [s].
+        constant_s: tau [s].
+    """
+    since = np.maximum(time_s, 0.0)
+    if constant_s <= 0.0:
+        return np.where(since > 0.0, 1.0, 0.0)
+    return -np.expm1(-since / constant_s)
+
+
+def warmed_by_constant(time_s: NDArray[np.float64], constant_s: float) -> NDArray[np.float64]:
+    """Derivative of `warmed` by the time constant, -t / tau² exp(-t / tau), shape (n,) [1/s]."""
+    if constant_s <= 0.0:
+        return np.zeros(len(time_s))
+    ratio = np.maximum(time_s, 0.0) / constant_s
+    return -ratio * np.exp(-ratio) / constant_s
+
+
+def pauses_s(motion: Motion) -> list[tuple[float, float]]:
+    """Beginning and end of every pause of the motion's session [s]."""
+    return [] if motion.setup is None else _pauses_between(motion.setup.moving_s)
+
+
+@lru_cache(maxsize=64)
+def _pauses_between(moving_s: tuple[tuple[float, float], ...]) -> list[tuple[float, float]]:
+    ends = accumulate((end for _, end in moving_s), max)
+    pairs = zip(ends, [begin for begin, _ in moving_s[1:]], strict=False)
+    return [(begin, end) for begin, end in pairs if end - begin >= PAUSE_S]
+
+
+def _paused(
+    motion: Motion, constant_s: float, law: Callable[[NDArray[np.float64], float], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """What pauses do to a body, shape (n,): each is a step down at its beginning and one up at its end."""
+    time_s = _time_s(motion)
+    steps = [law(time_s - begin, constant_s) - law(time_s - end, constant_s) for begin, end in pauses_s(motion)]
+    return sum(steps, np.zeros(len(time_s)))
+
+
+def _time_s(motion: Motion) -> NDArray[np.float64]:
+    return np.asarray(motion.time_s)

@@ -1,0 +1,62 @@
+"""Error source without a cause: a strut error that follows the force in the strut."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.kinematics import inverse
+from dbbstation.machine.rotation import Frames
+from dbbstation.machine.statics import GRAVITY_M_S2, platform_weight, strut_tensions
+from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter
+from dbbstation.sources.laws.weights import platform_masses
+from dbbstation.sources.unmodelled.points import piecewise_linear, texts, values_at
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+POINTS = 25
+"""From minus to plus the platform's weight."""
+
+
+class UnexplainedByForce(LinearSource):
+    """A strut is off by a piecewise linear function of the force that the platform's weight puts on it.
+
+    Forces are those of the platform's equilibrium at the commanded pose; beyond its weight either way the error stays
+    the same. A diagnosis finds the curve and calls it unexplained; it never names this source.
+    """
+
+    name = "unexplained-by-force"
+    belongs_to = Owner.MACHINE
+    detail_mm = SMOOTH_MM
+    varies_with = "strut-force"
+    candidate = False
+    texts = texts("axial force", "actual minus driven length = sum over points k of v_ik hat_k(T_i)")
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Values at the points, strut by strut.
+
+        Raises:
+            ModelError: the machine file has no masses.
+        """
+        return values_at(_points_n(self.name, machine), "N")
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each strut answers to its own values on both sides of its force.
+
+        Raises:
+            ModelError: the machine file has no masses.
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        points = _points_n(self.name, machine)
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        weight = platform_weight(frames, platform_masses(self.name, machine))
+        return piecewise_linear(points, strut_tensions(inverse(machine.hexapod, frames), weight))
+
+
+def _points_n(name: str, machine: Machine) -> NDArray[np.float64]:
+    weight_n = GRAVITY_M_S2 * platform_masses(name, machine).platform_kg
+    return np.linspace(-weight_n, weight_n, POINTS)

@@ -1,0 +1,51 @@
+"""Error source without a cause: a strut error that follows the strut's length."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.kinematics import strut_lengths
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter
+from dbbstation.sources.unmodelled.points import piecewise_linear, texts, values_at
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+POINTS = 25
+"""Over the whole travel of a strut: 45 mm from one to the next on the reference machine."""
+
+
+class UnexplainedByLength(LinearSource):
+    """A strut is off by a piecewise linear function of its length, with points from end to end of its travel.
+
+    Constant and slope of it cannot be told from reference lengths and joints; the tolerance of the values shares them
+    out. A diagnosis finds the curve and calls it unexplained; it never names this source.
+    """
+
+    name = "unexplained-by-length"
+    belongs_to = Owner.MACHINE
+    varies_with = "strut-length"
+    candidate = False
+    texts = texts("length", "actual minus driven length = sum over points k of v_ik hat_k(L_i)")
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Values at the points, strut by strut."""
+        return values_at(_points_mm(machine), "mm")
+
+    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+        """A point up and its neighbours down."""
+        return float(2.0 * np.diff(_points_mm(machine))[0])
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Each strut answers to its own values on both sides of its length."""
+        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+        return piecewise_linear(_points_mm(machine), strut_lengths(machine.hexapod, frames))
+
+
+def _points_mm(machine: Machine) -> NDArray[np.float64]:
+    return np.linspace(*machine.travel.strut_mm, POINTS)

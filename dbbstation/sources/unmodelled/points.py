@@ -1,0 +1,65 @@
+"""What errors without a name have in common: piecewise linear curves of six struts with fixed points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.contract import Effect, Parameter, Texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+MM_PER_UM = 1e-3
+
+TOLERANCE_UM = 10.0
+"""Standard deviation of a value before anything is measured: the prior of every fit, which keeps points that no reading
+comes near at zero [µm]."""
+
+PLAUSIBLE_UM = 2.0 * TOLERANCE_UM
+"""An error that would matter, so much above the tolerance that no fit takes for lost what the tolerance bounds [µm]."""
+
+
+def values_at(points: NDArray[np.float64], unit: str) -> tuple[Parameter, ...]:
+    """One value for each strut at each point, strut by strut."""
+    return tuple(
+        Parameter(
+            f"strut_{i + 1}_at_{number}_um",
+            "µm",
+            PLAUSIBLE_UM,
+            f"strut {i + 1} actual minus driven length at {place:g} {unit}, cause unknown",
+            tolerance=TOLERANCE_UM,
+            strut=i + 1,
+        )
+        for i in range(STRUTS)
+        for number, place in enumerate(points, start=1)
+    )
+
+
+def piecewise_linear(points: NDArray[np.float64], values: NDArray[np.float64]) -> Effect:
+    """Derivative by the value at each point, at values of shape (n, 6); constant beyond the ends.
+
+    Args:
+        points: evenly spaced, shape (p,).
+        values: of the variable, in the points' unit, shape (n, 6).
+    """
+    count = len(points)
+    place = np.clip((values - points[0]) / (points[1] - points[0]), 0.0, count - 1.0)
+    near = np.maximum(0.0, 1.0 - np.abs(place[:, :, None] - np.arange(count)))
+    own = near[:, :, None, :] * np.eye(STRUTS)[:, :, None]
+    return Effect(strut_mm=MM_PER_UM * own.reshape(len(values), STRUTS, STRUTS * count))
+
+
+def texts(variable: str, equation: str) -> Texts:
+    """What can be said of an error that only its variable is known of."""
+    return Texts(
+        what=f"An error of the struts that follows their {variable}; its cause is unknown.",
+        shows=f"What a diagnosis leaves without a name repeats at the same {variable}, in every test and direction.",
+        confirm=f"Record the tests again: the curve over {variable} comes back. Look at the strut that it names.",
+        cure="Find the cause. Until then a model that keeps the curve compensates it where it was measured, and nowhere "
+        "else.",
+        equation=equation,
+        origin="no physics: a curve through what was measured",
+    )

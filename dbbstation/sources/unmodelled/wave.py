@@ -1,0 +1,80 @@
+"""Error source without a cause: a strut error that repeats along the strut's length."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import strut_lengths
+from dbbstation.machine.rotation import Frames
+from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Owner, Parameter
+from dbbstation.sources.unmodelled.points import MM_PER_UM, PLAUSIBLE_UM, TOLERANCE_UM, texts
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+PERIODS_MM = (5.0, 10.0, 20.0, 50.0, 100.0)
+
+
+class UnexplainedWave(ErrorSource):
+    """A strut is off by a wave of its length: dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i).
+
+    L_0 is the middle of the travel. The period p is no lead that the machine file knows; where it is the screw's, the
+    source `screw-cyclic` has the cause. A diagnosis finds the wave and calls it unexplained; it never names this source.
+    """
+
+    name = "unexplained-wave"
+    belongs_to = Owner.MACHINE
+    varies_with = "strut-length"
+    candidate = False
+    texts = texts("length", "dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i)")
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:
+        """Sine, cosine and period of each strut."""
+        middle = f"counted from {sum(machine.travel.strut_mm) / 2.0:g} mm, cause unknown"
+        found: list[Parameter] = []
+        for i in range(STRUTS):
+            for wave in ("sine", "cosine"):
+                meaning = f"{wave} of strut {i + 1}, {middle}"
+                name = f"strut_{i + 1}_{wave}_um"
+                found += [Parameter(name, "µm", PLAUSIBLE_UM, meaning, tolerance=TOLERANCE_UM, strut=i + 1)]
+            period = f"strut_{i + 1}_period_mm"
+            found += [Parameter(period, "mm", 20.0, f"period of the wave of strut {i + 1}", PERIODS_MM, strut=i + 1)]
+        return tuple(found)
+
+    def shortest_period_mm(self, machine: Machine, values: NDArray[np.float64]) -> float:  # noqa: ARG002
+        """That of the shortest wave."""
+        by_strut = values.reshape(STRUTS, 3)
+        there = (by_strut[:, :2] != 0.0).any(axis=1) & (by_strut[:, 2] != 0.0)
+        return float(np.abs(by_strut[there, 2]).min(initial=SMOOTH_MM))
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Wave of each strut."""
+        by_strut = values.reshape(STRUTS, 3)
+        waves, _ = _waves(motion, machine, by_strut[:, 2])
+        return Effect(strut_mm=MM_PER_UM * np.sum(waves * by_strut[:, :2], axis=-1))
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """Each strut answers to its own wave."""
+        by_strut = values.reshape(STRUTS, 3)
+        waves, turned_rad = _waves(motion, machine, by_strut[:, 2])
+        sine, cosine = waves[:, :, 0], waves[:, :, 1]
+        by_angle = by_strut[:, 0] * cosine - by_strut[:, 1] * sine
+        period = np.where(by_strut[:, 2] == 0.0, np.inf, by_strut[:, 2])
+        each = np.concatenate([waves, (-by_angle * turned_rad / period)[:, :, None]], axis=-1)
+        own = each[:, :, None, :] * np.eye(STRUTS)[:, :, None]
+        return Effect(strut_mm=MM_PER_UM * own.reshape(len(motion), STRUTS, 3 * STRUTS))
+
+
+def _waves(
+    motion: Motion, machine: Machine, period_mm: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sine and cosine of each strut, shape (n, 6, 2), and the angle in them, shape (n, 6) [rad]; 0 for no period."""
+    frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
+    travel = strut_lengths(machine.hexapod, frames) - sum(machine.travel.strut_mm) / 2.0
+    turned_rad = 2.0 * np.pi * travel / np.where(period_mm == 0.0, np.inf, period_mm)
+    return np.stack([np.sin(turned_rad), np.cos(turned_rad)], axis=-1), turned_rad

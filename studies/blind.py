@@ -1,0 +1,116 @@
+"""A blind study: sessions in which somebody else has hidden effects are diagnosed, and only then compared with the answers.
+
+The sessions of a folder are judged one by one, each verdict is kept beside them at once, and nothing but the sessions
+is read for that. `blind_score` opens the answers.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from concurrent.futures import as_completed
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.diagnosed import diagnose_sessions
+from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.files.atomic import write_text
+from studies.fleet import deaf, processes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+ANSWERS = "answers.json"
+FORMAT = "blind-answers/1"
+
+
+def verdict_folder(folder: Path, candidates: Sequence[str]) -> Path:
+    """Where the verdicts of a study with these candidates are kept."""
+    names = ",".join(sorted(candidates))
+    return folder / "verdicts" / hashlib.sha256(names.encode()).hexdigest()[:12]
+
+
+def judge_sessions(
+    folder: Path,
+    candidates: Sequence[str],
+    jobs: int,
+    progress: Callable[[int, int], None],
+    *,
+    again: bool = False,
+) -> dict[str, dict[str, Any]]:
+    """Diagnose every session of a folder; those that have a verdict already are not judged twice.
+
+    Args:
+        folder: with one session folder each for what was recorded.
+        candidates: names of the error sources to look for.
+        jobs: processes.
+        progress: told how many of how many sessions are judged.
+        again: judge all of them anew, for a diagnosis that has changed since.
+
+    Returns:
+        By session, `seconds` it took and `summary` of the diagnosis, or `error` where there was none.
+
+    Raises:
+        InputError: a folder without sessions.
+    """
+    sessions = sorted(path.parent for path in folder.glob("*/session.yaml"))
+    if not sessions:
+        what = "no session folders in here"
+        raise InputError([Problem(str(folder), 0, 0, what, "make some: python -m tests.plant.blind FOLDER")])
+    kept = verdict_folder(folder, candidates)
+    kept.mkdir(parents=True, exist_ok=True)
+    waiting = [path for path in sessions if again or not (kept / f"{path.name}.json").exists()]
+    done = len(sessions) - len(waiting)
+    progress(done, len(sessions))
+    work = partial(_judge, candidates=tuple(candidates), kept=kept)
+    if jobs == 1 or len(waiting) <= 1:
+        for path in waiting:
+            work(path)
+            done += 1
+            progress(done, len(sessions))
+    else:
+        with processes(jobs) as pool:
+            with deaf():
+                handed = [pool.submit(work, path) for path in waiting]
+            for one in as_completed(handed):
+                one.result()
+                done += 1
+                progress(done, len(sessions))
+    return {path.name: json.loads((kept / f"{path.name}.json").read_text(encoding="utf-8")) for path in sessions}
+
+
+def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
+    """Answers by session.
+
+    Raises:
+        InputError: no file of answers, or not one of this format.
+    """
+    path = folder / ANSWERS
+    try:
+        answers = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        what = f"the answers cannot be read: {error}"
+        raise InputError([Problem(str(path), 0, 0, what, "put the file of answers beside the sessions")]) from error
+    if answers.get("format") != FORMAT:
+        what = f"format is {answers.get('format')!r}, not {FORMAT}"
+        raise InputError([Problem(str(path), 0, 0, what, "make the study anew")])
+    return {answer["session"]: answer for answer in answers["sessions"]}
+
+
+def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path) -> None:
+    begun = time.perf_counter()
+    verdict: dict[str, Any] = {"session": path.name}
+    try:
+        verdict["summary"] = diagnose_sessions([path], candidates, (), _quiet).summary()
+    except StationError as error:
+        verdict["error"] = str(error)
+    except Exception as error:  # noqa: BLE001 - a diagnosis that breaks is a result of the study, and the worst one
+        verdict["error"] = f"{type(error).__name__}: {error}"
+    verdict["seconds"] = time.perf_counter() - begun
+    write_text(kept / f"{path.name}.json", json.dumps(verdict, indent=1) + "\n", force=True)
+
+
+def _quiet(_: str) -> None:
+    """Say nothing."""

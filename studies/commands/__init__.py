@@ -1,0 +1,11 @@
+"""The commands `dbbstation study NAME`: one module per experiment."""
+
+STUDIES = {
+    "blind": "Effects hidden by an independent simulation: found, named, or rightly not.",
+    "concealed-gravity": "Gravity hidden in a kinematic calibration: found, named, modelled.",
+    "coverage": "Do the stated 95 % intervals hold the truth?",
+    "gravity": "Gravity identified after the kinematics, as in the paper, and with them.",
+    "platform-joints": "The hard case: joint errors hidden to 99 %, from cannot tell to a name.",
+    "table-iii": "The paper's three ways to calibrate, on many random machines.",
+}
+"""Name and one line of help of every study; each is a module of this folder with a command of its name."""

@@ -1,0 +1,60 @@
+"""`dbbstation study coverage`: do stated intervals contain the truth?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+PLANS = {"elevated": "table2-elevated", "level": "table2"}
+
+
+@click.command()
+@click.option(
+    "--machines", default=500, show_default=True, type=click.IntRange(min=10), help="Random machines per plan."
+)
+@click.option("--plan", type=click.Choice(sorted(PLANS)), help="One of the two plans only.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
+@click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
+def coverage(*, machines: int, plan: str | None, seed: int, as_json: bool) -> None:
+    r"""Calibrate many random machines and count how often the 95 % intervals contain the truth.
+
+    On the plan with five raised bars all 24 parameters; on the level plan those combinations that level bars see, on
+    machines without a common height of their base joints. Mountings, CMM, bar and noise scatter as plan and session
+    state. Predicted positions are looked at 150 mm and 10 degrees about the middle of the travel.
+
+    \b
+    Examples:
+      dbbstation study coverage
+      dbbstation study coverage --machines 100 --plan elevated --json
+    """
+    from dbbstation.cli.output import print_json
+    from dbbstation.cli.progress import progress_bar
+    from dbbstation.files.formats.machine import read_machine
+    from dbbstation.files.formats.plan import read_plan
+    from dbbstation.files.shipped import shipped_folder
+    from studies.coverage import coverage as experiment
+
+    machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
+    found: dict[str, Any] = {"seed": seed}
+    for name in sorted(PLANS) if plan is None else [plan]:
+        what = read_plan(shipped_folder("protocols") / "plans" / f"{PLANS[name]}.yaml")
+        with progress_bar(f"{name} plan", machines) as advance:
+            covered = experiment(machine, what, range(seed, seed + machines), advance, level=name == "level")
+        found[name] = covered.numbers()
+        if not as_json:
+            _print(name, found[name])
+    if as_json:
+        print_json(found)
+
+
+def _print(name: str, numbers: dict[str, Any]) -> None:
+    low, high = (100 * share for share in numbers["chance_of_one_parameter"])
+    click.echo(f"{name} plan, {numbers['machines']} machines: truth inside the 95 % interval")
+    click.echo(f"  parameters, pooled   {100 * numbers['parameters_pooled']:5.1f} %")
+    click.echo(
+        f"  ... one by one       {100 * numbers['parameters_least']:5.1f} to {100 * numbers['parameters_most']:.1f} %"
+        f"   (of so many machines 95 in 100 parameters lie between {low:.1f} and {high:.1f})"
+    )
+    by_axis = ", ".join(f"{axis} {100 * share:.1f}" for axis, share in numbers["positions_by_axis"].items())
+    click.echo(f"  predicted positions  {100 * numbers['positions_pooled']:5.1f} %   ({by_axis})")

@@ -1,0 +1,179 @@
+"""The hard case: platform joints, which a kinematic calibration hides to 99 %, from "cannot tell" to a name.
+
+A machine whose platform joints are off by some µm are measured on the jig. The diagnosis says what
+it cannot tell and which tests would. Those are recorded on the same machine, and it is asked again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.diagnosed import default_candidates
+from dbbstation.diagnosis.diagnose import diagnose, usable_sources
+from dbbstation.diagnosis.findings import Verdict
+from dbbstation.diagnosis.workspace import workspace
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.plan.plan import Plan, PlannedTest
+from dbbstation.sources.contract import Fitted, Motion
+from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.virtual.truth import random_kinematics
+from studies.virtual_session import draw_session
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from dbbstation.diagnosis.findings import Diagnosis, NextTest
+    from dbbstation.machine.geometry import Machine
+
+NAME = "platform-joints"
+NOISE_MM = 0.0005
+SAMPLES = 360
+MOST_ROUNDS = 5
+"""Times that proposed tests are added."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """What one look at the machine said.
+
+    Attributes:
+        tests: measured so far.
+        added: texts of the tests that were added for this look.
+        verdict: on platform joints.
+        ambiguous_with: what they could not be told from.
+        gain: log evidence for them.
+        concealed: share of their signature that the kinematic parameters swallow.
+        kinematic_um: true position error over the workspace of the kinematic calibration, rms less its mean [µm].
+        joint_um: the same of the joint model [µm].
+        stated_um: what the joint model states of itself [µm].
+        held_out: of left-out tests in units of the predicted covariance, before and after.
+    """
+
+    tests: int
+    added: tuple[str, ...]
+    verdict: str
+    ambiguous_with: tuple[str, ...]
+    gain: float
+    concealed: float
+    kinematic_um: float
+    joint_um: float
+    stated_um: float
+    held_out: tuple[float, float]
+
+
+def platform_joints(
+    machine: Machine,
+    jig: Plan,
+    seed: int,
+    joint_error_mm: float,
+    progress: Callable[[str], None],
+    most_rounds: int = MOST_ROUNDS,
+) -> list[Round]:
+    """Measure, ask, measure what was asked for, until platform joints are named.
+
+    Args:
+        machine: reference machine.
+        jig: the fifteen circles of [CAL Table II].
+        seed: of machine and measurements.
+        joint_error_mm: standard deviation of a platform joint's coordinate [mm].
+        progress: told what is being done.
+        most_rounds: times that tests are added.
+    """
+    rng = np.random.default_rng([seed, 9])
+    source = known_sources()[NAME]
+    errors = Fitted(source, rng.normal(0.0, joint_error_mm, len(source.parameters(machine))))
+    truth = MachineModel(machine, (*random_kinematics(machine, seed), errors))
+    plan, added, rounds = jig, list[str](), list[Round]()
+    for k in range(most_rounds + 1):
+        # The same random numbers again: what was measured before stays as it was, new tests come behind.
+        runs = draw_session(truth, plan, np.random.default_rng([seed, 10]), NOISE_MM, SAMPLES)
+        usable, _ = usable_sources(machine, runs, sources_named(default_candidates(known_sources())))
+        head = f"round {k + 1} of at most {most_rounds + 1}, {len(plan.tests)} tests"
+        found = diagnose(machine, runs, usable, _within(head, progress))
+        rounds.append(_round(found, truth, len(plan.tests), added))
+        useful = rounds[-1].stated_um < rounds[-1].kinematic_um
+        if (rounds[-1].verdict == Verdict.IDENTIFIED and useful) or not found.next_tests:
+            break
+        plan = replace(plan, tests={**plan.tests, **_planned(plan, found.next_tests, k)})
+        added = [test.text for test in found.next_tests]
+    return rounds
+
+
+def _within(head: str, progress: Callable[[str], None]) -> Callable[[str], None]:
+    """Tell stages with what they are stages of."""
+    return lambda text: progress(f"{head}: {text}")
+
+
+def numbers(rounds: Sequence[Round], seed: int, joint_error_mm: float) -> dict[str, Any]:
+    """All rounds as plain numbers."""
+    return {
+        "seed": seed,
+        "joint_error_um": 1e3 * joint_error_mm,
+        "rounds": [
+            {
+                "tests": one.tests,
+                "added": list(one.added),
+                "verdict": one.verdict,
+                "ambiguous_with": list(one.ambiguous_with),
+                "gain": one.gain,
+                "concealed": one.concealed,
+                "workspace_error_um": {
+                    "kinematic": one.kinematic_um,
+                    "joint": one.joint_um,
+                    "stated": one.stated_um,
+                },
+                "held_out_normalised": dict(zip(("before", "after"), one.held_out, strict=True)),
+            }
+            for one in rounds
+        ],
+    }
+
+
+def _round(found: Diagnosis, truth: MachineModel, tests: int, added: Sequence[str]) -> Round:
+    finding = next(f for f in found.sources if f.name == NAME)
+    before, after = found.held_out
+    return Round(
+        tests=tests,
+        added=tuple(added),
+        verdict=str(finding.verdict),
+        ambiguous_with=finding.ambiguous_with,
+        gain=finding.gain,
+        concealed=finding.concealed,
+        kinematic_um=_apart_um(found.before.model.of_the_machine(), truth),
+        joint_um=_apart_um(found.after.model.of_the_machine(), truth),
+        stated_um=0.0 if found.workspace is None else found.workspace.uncertainty_um,
+        held_out=(before.normalised, after.normalised),
+    )
+
+
+def _apart_um(model: MachineModel, truth: MachineModel) -> float:
+    """True position error of a model over the workspace, rms less its mean: a program's zero is set on the part [µm]."""
+    motion = Motion(workspace(truth.machine))
+    apart = model.actual_poses(motion)[:, :3] - truth.actual_poses(motion)[:, :3]
+    apart -= apart.mean(axis=0)
+    return 1e3 * float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+
+
+def _planned(plan: Plan, proposed: Sequence[NextTest], round_number: int) -> dict[str, PlannedTest]:
+    """Proposed circles as tests about the balls of the plan."""
+    tests = {}
+    for k, test in enumerate(proposed):
+        place = tuple(test.circle[f"{axis}_mm"] for axis in "xyz")
+        like = min(
+            plan.tests.values(), key=lambda known: float(np.linalg.norm(np.subtract(known.ball.centre_mm, place)))
+        )
+        x, y, z = like.ball.centre_mm
+        elevation = test.circle["elevation_deg"]
+        height = z + like.circle.bar_mm * float(np.sin(np.radians(elevation)))
+        circle = replace(
+            like.circle,
+            tilt_deg=(test.circle["a_deg"], test.circle["b_deg"], 0.0),
+            elevation_deg=elevation,
+            centre_mm=(x, y, height),
+        )
+        name = f"next-{round_number + 1}-{k + 1}"
+        tests[name] = PlannedTest(name, like.ball, circle, like.directions)
+    return tests

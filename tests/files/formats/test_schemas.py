@@ -1,0 +1,91 @@
+"""Each format has a schema that says unit and sign, and an example that uses all of it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from dbbstation.files.formats.every_format import SCHEMAS, json_schema
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.yaml.schema import FORMATS, keys_at
+from dbbstation.files.yaml.text import load_yaml
+
+FIXTURES = shipped_folder("fixtures")
+SESSIONS = FIXTURES / "sessions"
+EXAMPLES = {
+    "dbb-machine/2": [FIXTURES / "machines" / "every-key.yaml"],
+    "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
+    "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
+    "dbb-settings/1": [FIXTURES / "settings" / "every-key.yaml"],
+    "dbb-model/3": [FIXTURES / "models" / "provenance.yaml"],
+    "dbb-session/2": [SESSIONS / "small" / "session.yaml", SESSIONS / "under-spindle" / "session.yaml"],
+}
+UNITS = ("_mm", "_deg", "_um", "_kg", "_temp_c", "_mm_min", "_um_m_k", "_mm_per_n")
+
+
+def parts_of(schema: type[BaseModel]) -> set[type[BaseModel]]:
+    found: set[type[BaseModel]] = set()
+
+    def visit(annotation: Any) -> None:
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel) and annotation not in found:
+            found.add(annotation)
+            for field in annotation.model_fields.values():
+                visit(field.annotation)
+        for inner in getattr(annotation, "__args__", ()):
+            visit(inner)
+
+    visit(schema)
+    return found
+
+
+def test_every_format_has_schema_and_example() -> None:
+    assert set(SCHEMAS) == set(EXAMPLES)
+    assert {name.partition("/")[0] for name in SCHEMAS} == set(FORMATS)
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_every_field_says_what_it_is_and_in_which_unit(name: str) -> None:
+    for part in parts_of(SCHEMAS[name]):
+        for key, field in part.model_fields.items():
+            assert field.description, f"{part.__name__}.{key}"
+            if key.endswith(UNITS):
+                assert "[" in field.description, f"{part.__name__}.{key} names no unit"
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_the_json_schema_is_plain_json_and_closed(name: str) -> None:
+    schema = json.loads(json.dumps(json_schema(name)))
+    assert schema["title"] == name
+    assert schema["additionalProperties"] is False
+    for part in schema["$defs"].values():
+        assert part.get("additionalProperties") is False
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_the_examples_use_every_key(name: str) -> None:
+    faults = []
+    documents = [load_yaml(path, faults) for path in EXAMPLES[name]]
+    assert not faults
+    used: dict[tuple[str, ...], set[str]] = {}
+    known: dict[tuple[str, ...], set[str]] = {}
+
+    def visit(location: tuple, general: tuple[str, ...], data: object) -> None:
+        if isinstance(data, dict):
+            known.setdefault(general, set()).update(keys_at(SCHEMAS[name], location))
+            used.setdefault(general, set()).update(map(str, data))
+            free = not known[general]
+            for key, value in data.items():
+                visit((*location, key), (*general, "*" if free else key), value)
+        elif isinstance(data, tuple):
+            for index, value in enumerate(data):
+                visit((*location, index), (*general, "*"), value)
+
+    for document in documents:
+        visit((), (), document.data)
+    for general, keys in known.items():
+        # The machine of a model has an example of its own.
+        if not name.startswith("dbb-model/") or general[:1] != ("machine",):
+            assert keys <= used[general], ".".join(general)

@@ -33,7 +33,7 @@ COMMANDS = {
     "evaluate": "Circle by circle: what a model leaves of recordings.",
     "instruments": "List the known instruments.",
     "measure": "Measure a plan, test by test, into a session folder.",
-    "mismatch": "Any simulation against any recording: where they differ, in what form.",
+    "mismatch": "Where any simulation and any recording differ, and how.",
     "monitor": "Live reading of an instrument.",
     "ports": "List the serial ports of this computer.",
     "predict": "Actual poses for commanded ones, under a model.",

@@ -265,10 +265,17 @@ def _product(one: Variable, other: Variable) -> Pattern:
     )
     samples = (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)
     both = samples.shape[1]
-    weight = float(np.log(0.5))
     every = np.hstack([samples, a, b])
-    choices = ((tuple(range(both)), weight, ""), (tuple(range(every.shape[1])), weight, "with both of them"))
+    choices = (
+        (tuple(range(both)), float(np.log(1.0 - WITH_BOTH)), ""),
+        (tuple(range(every.shape[1])), float(np.log(WITH_BOTH)), "with both of them"),
+    )
     return Pattern(Family.PRODUCT, (one, other), every, choices=choices)
+
+
+WITH_BOTH = 0.1
+"""Probability that a product comes with both of its variables: with little of the product it is their own forms over again, which
+must not be counted twice."""
 
 
 def _of_blocks(blocks: Sequence[slice], rows: int) -> Pattern:

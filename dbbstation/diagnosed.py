@@ -52,6 +52,7 @@ def diagnose_sessions(
     say: Callable[[str], None],
     known: Mapping[str, ErrorSource] | None = None,
     progress: Callable[[str], None] = lambda _: None,
+    reading: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Diagnosed:
     """Read sessions of one machine and find what a kinematic calibration of them leaves out.
 
@@ -62,6 +63,7 @@ def diagnose_sessions(
         say: told what was noticed in the files.
         known: every error source by name; those of the package if None.
         progress: told each stage of the work as it begins.
+        reading: told how many runs of a session, of how many, are read.
 
     Raises:
         InputError: faults of files and traces.
@@ -74,7 +76,7 @@ def diagnose_sessions(
         if not source.candidate:
             what = f"{source.name} is no cause: it only keeps in a model what a diagnosis left without a name"
             raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
-    recorded = load_sessions(paths, exclude)
+    recorded = load_sessions(paths, exclude, reading)
     for warning in recorded.warnings:
         say(f"note: {warning}")
     usable, lacking = usable_sources(recorded.machine, recorded.observations, named)

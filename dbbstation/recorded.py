@@ -16,7 +16,7 @@ from dbbstation.trace.cut import cut
 from dbbstation.trace.thermometers import logged_curve
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.machine.geometry import Machine
@@ -41,12 +41,17 @@ class Recorded:
     warnings: tuple[str, ...]
 
 
-def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorded:
+def load_sessions(
+    paths: Sequence[Path],
+    exclude: Sequence[str] = (),
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> Recorded:
     """Read sessions, cut their accepted runs to circles and attach what was commanded.
 
     Args:
         paths: session folders or session files.
         exclude: names of tests to leave out.
+        progress: told how many runs of a session, of how many, are read.
 
     Raises:
         InputError: every fault of every file and trace; a session that is given twice; sessions of different
@@ -64,7 +69,7 @@ def load_sessions(paths: Sequence[Path], exclude: Sequence[str] = ()) -> Recorde
         unjudged = session.in_state(RunState.COMPLETE, RunState.RECORDING)
         warnings += [f"{session.name}: run {run.label} is {run.state}, not accepted: left out" for run in unjudged]
         logged: list[tuple[float, Recording]] = []
-        for run, read in zip(wanted, session.load_all(wanted), strict=True):
+        for run, read in zip(wanted, session.load_all(wanted, progress), strict=True):
             warnings += [str(warning) for warning in (*read.warnings, *session.loss(run, read.recording))]
             began = session.started_s(run)
             if began is not None and read.recording.temperature_degc:
@@ -93,7 +98,7 @@ def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Obser
     if run.program is None:
         return observation
     path, faults = run.program.path, list[Problem]()
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, is_input=False)  # its hash stands in the session
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)

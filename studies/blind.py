@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.diagnosed import diagnose_sessions
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
+from studies.fleet import deaf, processes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -71,16 +71,13 @@ def judge_sessions(
             done += 1
             progress(done, len(sessions))
     else:
-        # Started anew rather than forked: a fork would copy the locks of the threads that kernels run on.
-        with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-            try:
-                for one in as_completed([pool.submit(work, path) for path in waiting]):
-                    one.result()
-                    done += 1
-                    progress(done, len(sessions))
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+        with processes(jobs) as pool:
+            with deaf():
+                handed = [pool.submit(work, path) for path in waiting]
+            for one in as_completed(handed):
+                one.result()
+                done += 1
+                progress(done, len(sessions))
     return {path.name: json.loads((kept / f"{path.name}.json").read_text(encoding="utf-8")) for path in sessions}
 
 

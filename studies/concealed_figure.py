@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
-from dbbstation.report.figure_format import FigureFormat, in_format
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 COLOURS = (MEASURED, BEFORE, AFTER)
 
 
-def concealed_figure(study: ConcealedGravity, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
+def concealed_figure(study: ConcealedGravity, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw residuals on the jig, the tilted circle and the pull on the joints, as SVG."""
     with in_style():
         figure = Figure(figsize=(11.0, 5.4), layout="constrained")

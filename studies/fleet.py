@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import threading
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
@@ -27,11 +30,35 @@ def over_machines(experiment: Callable[[int], Result], seeds: Sequence[int]) -> 
     if cores == 1 or len(seeds) <= TOGETHER:
         yield from map(experiment, seeds)
         return
+    with processes(cores) as pool:
+        with deaf():
+            results = pool.map(experiment, seeds, chunksize=TOGETHER)
+        yield from results
+
+
+@contextmanager
+def processes(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield processes to work in, which end at once where this one is interrupted; hand them work while `deaf`."""
     # Started anew rather than forked: a fork would copy the locks of the threads that kernels run on.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(cores, mp_context=context) as pool:
+    with ProcessPoolExecutor(count, mp_context=context) as pool:
         try:
-            yield from pool.map(experiment, seeds, chunksize=TOGETHER)
+            yield pool
         except BaseException:
+            for child in multiprocessing.active_children():
+                child.terminate()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+@contextmanager
+def deaf() -> Iterator[None]:
+    """Ignore Ctrl-C: processes that are started now ignore it as long as they live, and this one alone answers it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

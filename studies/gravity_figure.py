@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
-from dbbstation.report.figure_format import FigureFormat, in_format
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 from studies.gravity import JOINT, PUBLISHED_UM, SEQUENTIAL, WITHOUT
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 TICKS_UM = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
 
 
-def gravity_figure(study: GravityStudy, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
+def gravity_figure(study: GravityStudy, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw the circularity of the conditions about one centre against their tilt, for both identifications, as SVG."""
     with in_style():
         figure = Figure(figsize=(9.6, 4.2), layout="constrained")

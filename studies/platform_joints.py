@@ -88,11 +88,11 @@ def platform_joints(
     truth = MachineModel(machine, (*random_kinematics(machine, seed), errors))
     plan, added, rounds = jig, list[str](), list[Round]()
     for k in range(most_rounds + 1):
-        progress(f"{len(plan.tests)} tests")
         # The same random numbers again: what was measured before stays as it was, new tests come behind.
         runs = draw_session(truth, plan, np.random.default_rng([seed, 10]), NOISE_MM, SAMPLES)
         usable, _ = usable_sources(machine, runs, sources_named(default_candidates(known_sources())))
-        found = diagnose(machine, runs, usable, progress)
+        head = f"round {k + 1} of at most {most_rounds + 1}, {len(plan.tests)} tests"
+        found = diagnose(machine, runs, usable, _within(head, progress))
         rounds.append(_round(found, truth, len(plan.tests), added))
         useful = rounds[-1].stated_um < rounds[-1].kinematic_um
         if (rounds[-1].verdict == Verdict.IDENTIFIED and useful) or not found.next_tests:
@@ -100,6 +100,11 @@ def platform_joints(
         plan = replace(plan, tests={**plan.tests, **_planned(plan, found.next_tests, k)})
         added = [test.text for test in found.next_tests]
     return rounds
+
+
+def _within(head: str, progress: Callable[[str], None]) -> Callable[[str], None]:
+    """Tell stages with what they are stages of."""
+    return lambda text: progress(f"{head}: {text}")
 
 
 def numbers(rounds: Sequence[Round], seed: int, joint_error_mm: float) -> dict[str, Any]:

@@ -7,6 +7,9 @@ from pathlib import Path
 
 # As the command line does, before NumPy looks: several workers with threads each wait for one another most of the time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Nobody's settings hold in tests, and sessions that are only read get no log beside them.
+os.environ["XDG_CONFIG_HOME"] = str(Path(__file__).parent / "no-such-folder")
+os.environ["DBBSTATION_LOG"] = "off"
 
 import numpy as np
 import pytest

@@ -11,6 +11,7 @@ import click
 from dbbstation import __version__
 from dbbstation.cli.lazy import LazyGroup
 from dbbstation.errors import StationError
+from dbbstation.files.inputs import input_book
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 DONE, FAILED, USAGE = 0, 1, 2
 """Exit codes."""
 
-_DEBUG = "--debug"
+_DEBUG, _VERBOSE, _SETTINGS = "--debug", "--verbose", "--settings"
 
 COMMANDS = {
     "calibrate": "Fit the machine's errors to recorded sessions.",
@@ -37,6 +38,7 @@ COMMANDS = {
     "predict": "Actual poses for commanded ones, under a model.",
     "program": "NC programs of a plan's circles, nominal or compensated.",
     "replay": "Send a byte log through an instrument's driver.",
+    "settings": "What the shop has set, and where each value comes from.",
     "session": "Runs of a session afterwards: list, accept, reject, seal.",
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",
     "sources": "The causes of error that are known, and how to confirm them.",
@@ -53,8 +55,18 @@ COMMANDS = {
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 @click.version_option(__version__, prog_name="dbbstation")
+@click.option(
+    _SETTINGS,
+    metavar="FILE",
+    help="Read the shop's settings from this file alone; may stand anywhere on the line.",
+)
+@click.option(
+    _VERBOSE,
+    is_flag=True,
+    help="Show on standard error what goes into the log; may stand anywhere on the line.",
+)
 @click.option(_DEBUG, is_flag=True, help="Show the traceback of an error; may stand anywhere on the line.")
-def cli(*, debug: bool) -> None:
+def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:
     """Measure a hexapod machine tool with a double ball bar, calibrate it, find what its model lacks.
 
     \b
@@ -71,16 +83,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = _DEBUG in given
-    # The option is the program's, but people put it where they notice that they need it: at the end.
-    given = [argument for argument in given if argument != _DEBUG]
     try:
-        code = cli.main(given, prog_name="dbbstation", standalone_mode=False)
+        # Not `cli.main`, which answers Ctrl-C with an empty line of its own.
+        with input_book(), cli.make_context("dbbstation", _own_first(given), obj=tuple(given)) as context:
+            code = cli.invoke(context)
         sys.stdout.flush()
+    except click.exceptions.Exit as left:
+        code = left.exit_code
     except click.ClickException as problem:
         problem.show()
         sys.exit(problem.exit_code)
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; what was written before stays", err=True)
+        # A terminal shows ^C where the cursor stands.
+        click.echo(("\n" if sys.stderr.isatty() else "") + "interrupted; what was written before stays", err=True)
         sys.exit(FAILED)
     except BrokenPipeError:
         # Whoever read the output has seen enough, as `| head` does; the interpreter must not flush into it again.
@@ -98,3 +113,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
         click.echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _own_first(given: list[str]) -> list[str]:
+    """Return the arguments with the program's own options before the command.
+
+    People put them where they notice that they need them: at the end.
+    """
+    own, others = [], list[str]()
+    arguments = iter(given)
+    for argument in arguments:
+        if argument in {_DEBUG, _VERBOSE} or argument.startswith(f"{_SETTINGS}="):
+            own.append(argument)
+        elif argument == _SETTINGS:
+            own += [argument, *[file for file in [next(arguments, None)] if file is not None]]
+        else:
+            others.append(argument)
+    return [*own, *others]

@@ -12,8 +12,10 @@ from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
@@ -83,21 +85,19 @@ def calibrate(
     drives, and with cog-shift the centre of gravity.
     """
     from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
-    from dbbstation.calibration.fit.calibrate import calibrate as fit
     from dbbstation.calibration.fit.methods import Method, as_known
-    from dbbstation.calibration.outliers.robust import calibrate_robust
-    from dbbstation.calibration.reporting.evaluation import evaluate
-    from dbbstation.calibration.reporting.summary import calibration_summary, identified_model
+    from dbbstation.calibration.reporting.summary import identified_model
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import count_bar
+    from dbbstation.cli.provenance import provenance
     from dbbstation.errors import ModelError
-    from dbbstation.files.atomic import refuse_existing, write_bytes
+    from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source, sources_of
     from dbbstation.recorded import load_sessions
     from dbbstation.sources.registry import sources_named
 
-    for path in filter(None, (out, figure)):
-        refuse_existing(path, force=force)
+    refuse_outputs((out, figure), force=force)
     chosen = KINEMATIC_SOURCES if sources is None else tuple(filter(None, map(str.strip, sources.split(","))))
     every = every_source(source_files)
     for name in set(sources_of(source_files, every)) - set(chosen):
@@ -108,17 +108,17 @@ def calibrate(
             "none of the error sources named belongs to the machine and shows in circles: there is nothing to calibrate",
             remedy=f"name one such as {KINEMATIC_SOURCES[0]}, or leave --sources out",
         )
-    recorded = load_sessions(sessions, exclude)
+    with count_bar("reading runs") as reading:
+        recorded = load_sessions(sessions, exclude, reading)
     for warning in recorded.warnings:
         say(f"note: {warning}")
     fitted = fitted if law_over_time else _following_thermometers(fitted, recorded.observations)
     known = as_known(Method(method), recorded.machine, recorded.observations)
-    held = _prescribed(prescribe, method)
-    calibration, outliers = calibrate_robust(lambda runs: fit(recorded.machine, runs, fitted, prescribe=held), known)
-    summary = {"method": method, **calibration_summary(calibration, evaluate(calibration.model, known), outliers)}
+    calibration, figures = _calibrated(recorded.machine, known, fitted, _prescribed(prescribe, method))
+    summary = {"method": method, **figures}
     if out is not None:
         kept = {key: value for key, value in summary.items() if key not in ELSEWHERE_IN_MODEL}
-        write_model(out, identified_model(calibration, kept, recorded.sessions), force=force)
+        write_model(out, identified_model(calibration, kept, recorded.sessions), provenance=provenance(), force=force)
     if figure is not None:
         from dbbstation.report.calibration_figure import calibration_figure
 
@@ -132,6 +132,36 @@ def calibrate(
         _print(summary)
         if out is not None:
             say(f"model written to {out}")
+
+
+STAGES = {"fit": 0, "figures": 36, "observability": 53}
+"""Stages of a calibration, and the share of its time that has passed by then [%]; fits are one or several."""
+
+
+def _calibrated(
+    machine: Machine,
+    runs: Sequence[Observation],
+    fitted: Sequence[ErrorSource],
+    held: Sequence[tuple[str, str]] | None,
+) -> tuple[Calibration, dict[str, Any]]:
+    """Fit, and say how far it has come; return the fit and its summary."""
+    from dbbstation.calibration.fit.calibrate import calibrate as fit
+    from dbbstation.calibration.outliers.robust import calibrate_robust
+    from dbbstation.calibration.reporting.evaluation import evaluate
+    from dbbstation.calibration.reporting.summary import calibration_summary
+    from dbbstation.cli.progress import stage_bar
+
+    with stage_bar("calibration", STAGES) as progress:
+
+        def fit_told(some: Sequence[Observation]) -> Calibration:
+            progress(f"fit of {len(some)} runs")
+            return fit(machine, some, fitted, prescribe=held)
+
+        calibration, outliers = calibrate_robust(fit_told, runs)
+        progress("figures of circles")
+        evaluated = evaluate(calibration.model, runs)
+        progress("observability")
+        return calibration, calibration_summary(calibration, evaluated, outliers)
 
 
 LEAST_PRINTED = 1e-99

@@ -65,7 +65,7 @@ def check(files: tuple[Path, ...], *, source_files: tuple[Path, ...], as_json: b
 
 
 def _print_schema(name: str) -> None:
-    from dbbstation.cli.output import print_json
+    from dbbstation.cli.output import print_plain_json
     from dbbstation.files.formats.every_format import SCHEMAS, json_schema
 
     try:
@@ -74,4 +74,4 @@ def _print_schema(name: str) -> None:
         raise click.BadParameter(
             f"{name!r} is no format; there are {', '.join(SCHEMAS)}", param_hint="--schema"
         ) from None
-    print_json(schema)
+    print_plain_json(schema)

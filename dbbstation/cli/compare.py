@@ -37,6 +37,7 @@ def compare(a: Path, b: Path, *, exclude: tuple[str, ...], figure: Path | None, 
       dbbstation compare predicted 2026-11-20-hexapod-7 --json
     """
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.diagnosis.compare import compare as put_side_by_side
     from dbbstation.diagnosis.compare_notes import notes_of
     from dbbstation.diagnosis.compare_summary import comparison_summary
@@ -49,7 +50,9 @@ def compare(a: Path, b: Path, *, exclude: tuple[str, ...], figure: Path | None, 
     for name, recorded in (("A", one), ("B", other)):
         for warning in recorded.warnings:
             say(f"note: {name}: {warning}")
-    found = put_side_by_side(one.machine, one.observations, other.observations)
+    with stage_bar("comparison", {"runs": 0}) as progress:
+        progress(f"runs of {a.name} and {b.name}")
+        found = put_side_by_side(one.machine, one.observations, other.observations)
     notes = notes_of(one.machine, other.machine, found.matching.pairs)
     summary = {"a": str(a), "b": str(b), **comparison_summary(found, notes)}
     if figure is not None:
@@ -67,10 +70,14 @@ def _both(a: Path, b: Path, exclude: tuple[str, ...]) -> tuple[Recorded, Recorde
     Raises:
         InputError: a fault of either; one session given twice.
     """
+    from dbbstation.cli.progress import count_bar
     from dbbstation.errors import InputError, Problem
     from dbbstation.recorded import load_sessions
 
-    one, other = load_sessions([a], exclude), load_sessions([b], exclude)
+    with count_bar(f"reading {a.name}") as reading:
+        one = load_sessions([a], exclude, reading)
+    with count_bar(f"reading {b.name}") as reading:
+        other = load_sessions([b], exclude, reading)
     if set(one.sessions.values()) == set(other.sessions.values()):
         what = f"this is the same session as {a}, byte for byte"
         raise InputError([Problem(str(b), 0, 0, what, "give two sessions")])

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.correction import largest_correction_option
+from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
@@ -16,14 +17,20 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.argument("program_file", type=_FILE, metavar="PROGRAM")
 @click.option("--model", "model_file", type=_FILE, required=True, help="Calibrated model.")
 @source_file_option
-@click.option(
-    "--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language to write: a name, or FILE.py."
+@shop_option(
+    "--dialect",
+    setting="program.dialect",
+    metavar="D",
+    default="linuxcnc",
+    show_default=True,
+    help="Language to write: a name, or FILE.py.",
 )
 @click.option("--from", "source", metavar="D", help="Language of PROGRAM, likewise [default: by its extension].")
 @click.option("--out", type=_FILE, required=True, help="File to write.")
 @click.option("--start", metavar="X,Y,Z,A,B,C", help="Pose before the program, in mm and degrees.")
-@click.option(
+@shop_option(
     "--chord-um",
+    setting="program.chord_um",
     type=click.FloatRange(0.001, 1000.0),
     default=0.1,
     show_default=True,
@@ -65,7 +72,7 @@ def compensate(
       dbbstation compensate part.ngc --model model.yaml --out part-compensated.ngc
       dbbstation compensate part.nc --from linuxcnc --model model.yaml --out true.ngc --start 0,0,-1000,0,0,0
     """
-    from dbbstation.cli.programs import hashed, loaded_inverse, parsed_pose, print_programs, read_source
+    from dbbstation.cli.programs import loaded_inverse, origin_of, parsed_pose, print_programs, read_source
     from dbbstation.files.atomic import refuse_existing, write_text
     from dbbstation.files.own_dialects import dialect_given
     from dbbstation.nc.export import compensated_program
@@ -77,12 +84,13 @@ def compensate(
     text = read_source(program_file)
     reader = dialect_of_file(str(program_file), text) if source is None else dialect_given(source)
     path = reader.read(text, str(program_file), start=pose)
+    inverse = loaded_inverse(model_file, time_s, source_files, largest_mm)
     done = compensated_program(
         path,
         written_in,
-        loaded_inverse(model_file, time_s, source_files, largest_mm),
+        inverse,
         chord_mm=chord_um / 1e3,
-        origin={"program file": hashed(program_file)},
+        origin=origin_of({"program file": program_file}, inverse),
     )
     write_text(out, done.text, force=force)
     print_programs([(out, done)], written_in.name, model_file, as_json=as_json)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from dbbstation.cli.shop import shop_option
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM, LARGEST_CORRECTION_MM
 
 if TYPE_CHECKING:
@@ -16,9 +17,10 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 def largest_correction_option(function: _Function) -> _Function:
     """Give a command the option; it takes `largest_mm`, a length [mm]."""
-    return click.option(
+    return shop_option(
         "--largest-correction-mm",
         "largest_mm",
+        setting="limits.largest_correction_mm",
         type=click.FloatRange(0.0, LARGEST_ALLOWED_MM, min_open=True),
         default=LARGEST_CORRECTION_MM,
         show_default=True,

@@ -73,21 +73,21 @@ def diagnose(
     from dbbstation.calibration.reporting.summary import calibration_summary, identified_model
     from dbbstation.cli.calibrate import ELSEWHERE_IN_MODEL
     from dbbstation.cli.output import print_json, say
-    from dbbstation.cli.progress import stage_bar
+    from dbbstation.cli.progress import count_bar, stage_bar
+    from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.diagnosed import diagnose_sessions
-    from dbbstation.files.atomic import refuse_existing, write_bytes
+    from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source
 
     if keep_unexplained and out is None:
         raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
-    for path in filter(None, (out, figure)):
-        refuse_existing(path, force=force)
+    refuse_outputs((out, figure), force=force)
     candidates = [name.strip() for name in sources.split(",")] if sources else None
     known = every_source(source_files)
-    with stage_bar("diagnosis", STAGES, plain=as_json) as progress:
-        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress)
+    with count_bar("reading runs") as reading, stage_bar("diagnosis", STAGES) as progress:
+        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress, reading)
     found, summary = diagnosed.diagnosis, diagnosed.summary()
     if out is not None:
         unnamed = _kept(found) if keep_unexplained else None
@@ -96,7 +96,7 @@ def diagnose(
         kept = {key: value for key, value in calibrated.items() if key not in ELSEWHERE_IN_MODEL}
         of_sessions = diagnosed.recorded.sessions
         model = identified_model(fit, kept, of_sessions) if unnamed is None else unnamed.identified(kept, of_sessions)
-        write_model(out, model, force=force)
+        write_model(out, model, provenance=provenance(), force=force)
         say_unknown_causes(model.model)
     if figure is not None:
         from dbbstation.report.diagnosis_figure import diagnosis_figure

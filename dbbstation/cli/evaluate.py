@@ -29,7 +29,7 @@ def evaluate(
     After is what the model leaves of the recordings, not a new measurement. The second table shows the circular
     deviation G that was measured and the one that the model predicts. In both tables G is that of readings low-passed at
     30 undulations per revolution. Flatness over X, Y = ±190 mm and parallelism of a move along X are what the model
-    predicts of programs that are not compensated.
+    predicts of programs that are not compensated. Tolerances of the shop's settings are held against every circle.
 
     \b
     Examples:
@@ -42,18 +42,25 @@ def evaluate(
     from dbbstation.calibration.reporting.summary import evaluation_summary
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import count_bar
+    from dbbstation.cli.shop import shop_settings
+    from dbbstation.cli.tolerances import held_against, print_tolerances
     from dbbstation.files.formats.model import read_model
     from dbbstation.files.own_sources import every_source
     from dbbstation.machine.difference import check_model_is_of
     from dbbstation.recorded import load_sessions
 
+    settings = shop_settings()
     identified = read_model(model, every_source(source_files))
-    recorded = load_sessions(sessions, exclude)
+    with count_bar("reading runs") as reading:
+        recorded = load_sessions(sessions, exclude, reading)
     check_model_is_of(recorded.machine, identified.model.machine)
     for warning in recorded.warnings:
         say(f"note: {warning}")
     summary = evaluation_summary(compare(identified.model, recorded.observations))
-    for run, circle in zip(summary["runs"], predicted_circles(identified.model, recorded.observations), strict=True):
+    with count_bar("predicting runs") as predicting:
+        circles = predicted_circles(identified.model, recorded.observations, predicting)
+    for run, circle in zip(summary["runs"], circles, strict=True):
         run["circularity_30_upr_um"] = {
             "measured": circle.measured_um,
             "predicted": circle.predicted_um,
@@ -65,6 +72,7 @@ def evaluate(
     summary |= {"flatness_um": plane.flatness_um, "parallelism_um": plane.parallelism_um, "plane_z_mm": height_mm}
     own, placed = identified.model.of_the_machine().sources, identified.model.anywhere().sources
     summary["plane_without"] = [f.source.name for f in own if f not in placed and not f.source.of_currents]
+    summary["tolerances"] = held_against(settings, summary)
     if as_json:
         print_json(summary)
         return
@@ -79,6 +87,7 @@ def evaluate(
         click.echo(f"(without {', '.join(summary['plane_without'])}: no pose alone says what they do)")
     click.echo(f"flatness               {summary['flatness_um']:8.1f} µm")
     click.echo(f"parallelism along X    {summary['parallelism_um']:8.1f} µm")
+    print_tolerances(summary["tolerances"], settings.tolerances_from)
 
 
 def _print_predicted(summary: Mapping[str, Any]) -> None:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from dbbstation.report.figure_format import FigureFormat
+from dbbstation.cli.provenance import provenance
+from dbbstation.report.figure_format import FigureFormat, Stamped
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,9 +26,9 @@ def figure_option(what: str = "Write a figure here") -> Callable[[_Function], _F
     )
 
 
-def format_of(path: Path) -> FigureFormat:
-    """Return the format of a path that the option took."""
-    return FigureFormat(path.suffix.lower())
+def format_of(path: Path) -> Stamped:
+    """Return the format of a path that the option took, with where the figure comes from."""
+    return Stamped(FigureFormat(path.suffix.lower()), provenance())
 
 
 def _known_format(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:

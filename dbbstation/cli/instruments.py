@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import click
@@ -23,18 +22,19 @@ def instruments(name: str | None, *, as_json: bool) -> None:
       dbbstation instruments heidenhain-nd281b
       dbbstation instruments ./my-gauge.yaml
     """  # noqa: D301 (click reads the escape)
+    from dbbstation.cli.output import print_json
     from dbbstation.instrument.library import known_instruments, load_instrument
 
     if name is not None:
         protocol = load_instrument(name)
         if as_json:
-            click.echo(json.dumps({**_summary(protocol), "protocol": protocol.model_dump(mode="json")}, indent=2))
+            print_json({**_summary(protocol), "protocol": protocol.model_dump(mode="json")})
         else:
             click.echo("\n".join(_details(protocol)))
         return
     known = [load_instrument(one) for one in known_instruments()]
     if as_json:
-        click.echo(json.dumps({"instruments": [_summary(one) for one in known]}, indent=2))
+        print_json({"instruments": [_summary(one) for one in known]})
         return
     for one in known:
         click.echo(

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.log import attended
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -39,7 +41,7 @@ class LazyGroup(click.Group):
         command: click.Command = getattr(module, name)
         # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.
         command.help = (command.help or "").replace(r"\b", "\b")
-        return command
+        return attended(command)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

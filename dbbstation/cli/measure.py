@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.instrument_options import instrument_options
+from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.session_options import session_details, session_options
 
@@ -29,14 +31,7 @@ _AUTO_PATIENCE_S = 60.0
 @click.command()
 @click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="Test plan.")
 @click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
-@click.option(
-    "--instrument",
-    required=True,
-    metavar="NAME",
-    help="Name of an instrument (`dbbstation instruments`), or a protocol file.",
-)
-@click.option("--port", required=True, help="Port name, or a URL such as socket://127.0.0.1:4001.")
-@click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
+@instrument_options(required=True)
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder.")
 @click.option("--auto", metavar="URL", help="Start each circle at this control address of `emulate`, accept every run.")
 @click.option(
@@ -52,6 +47,7 @@ _AUTO_PATIENCE_S = 60.0
     help="Sampling rate [1/s], where it is not the instrument's usual one.",
 )
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")
+@loss_option
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
 def measure(
@@ -66,6 +62,7 @@ def measure(
     time_scale: float,
     programs: Path | None,
     rate_hz: float | None,
+    largest_loss_percent: float | None,
     as_json: bool,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> None:
@@ -92,7 +89,7 @@ def measure(
     from dbbstation.virtual.wire_clock import ScaledClock
 
     clock = ScaledClock(time_scale)
-    machine, plan = read_machine(machine_file), read_inline_plan(plan_file)
+    machine, plan = read_machine(machine_file), with_loss_limit(read_inline_plan(plan_file), largest_loss_percent)
     protocol = at_rate(load_instrument(instrument), rate_hz)
     job = Job(
         machine=machine,
@@ -116,12 +113,13 @@ def measure(
 
 def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> bool:
     """Run the sequence, say what happens, print the summary; return whether Ctrl-C ended it."""
-    from dbbstation.cli.measure_talk import Keyboard, Summary, Talk
+    from dbbstation.cli.measure_talk import Keyboard, Log, Summary, Talk
     from dbbstation.cli.output import print_json
     from dbbstation.station.autopilot import Autopilot
 
     station, summary = workplace.station, Summary()
     station.subscribe(summary)
+    station.subscribe(Log())
     station.subscribe(Talk(asking=hands is None, terminal=sys.stderr.isatty()))
     if hands is not None:
         station.subscribe(Autopilot(station.send, hands))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import threading
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
+from dbbstation.cli.output import log_said
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Quit, Reject, Repeat, Skip, Start
 from dbbstation.station.states import State
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session import RunEntry
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.commands import Command
+
+_LOG = logging.getLogger(__name__)
 
 _BAR_WIDTH = 40
 _QUARTERS = 4
@@ -86,6 +90,17 @@ class Talk:
             click.echo(err=True)
             self._drawn = False
         click.echo(line, err=True)
+
+
+class Log:
+    """Logs what happens; an observer of the station."""
+
+    def __call__(self, event: events.Event) -> None:
+        """Log what the event means, line by line."""
+        for line in _lines(event, _OF_MACHINE):
+            log_said(line.strip())
+        if isinstance(event, events.Fault):
+            _LOG.error("%s", event.error)
 
 
 class Summary:

@@ -9,20 +9,16 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.instrument_options import instrument_options
+from dbbstation.cli.provenance import provenance
+
 if TYPE_CHECKING:
     from dbbstation.instrument.driver import Tally
     from dbbstation.instrument.reading import Reading
 
 
 @click.command()
-@click.option(
-    "--instrument",
-    required=True,
-    metavar="NAME",
-    help="Name of an instrument (`dbbstation instruments`), or a protocol file.",
-)
-@click.option("--port", required=True, help="Port name, or a URL such as socket://127.0.0.1:4001.")
-@click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
+@instrument_options(required=True)
 @click.option("--count", type=click.IntRange(min=1), help="Number of readings after which to stop.")
 @click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="Log every byte here, for `replay`.")
 @click.option("--force", is_flag=True, help="Overwrite the log file.")
@@ -74,7 +70,7 @@ def _show(reading: Reading, t_s: float, *, as_json: bool) -> None:
 def _conclude(tally: Tally, *, as_json: bool) -> None:
     if as_json:
         totals = {"readings": tally.readings, "lost": tally.lost, "garbage_bytes": tally.garbage_bytes}
-        click.echo(json.dumps({"totals": totals}))
+        click.echo(json.dumps({"totals": totals, "provenance": provenance().data()}))
         return
     text = f"{tally.readings} readings, {tally.lost} lost, {tally.garbage_bytes} bytes not understood"
     click.echo(text + (f", for example {tally.garbage[:24].hex(' ')}" if tally.garbage else ""), err=True)

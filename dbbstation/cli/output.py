@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,9 +11,18 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+_LOG = logging.getLogger(__name__)
+
 
 def print_json(data: dict[str, Any]) -> None:
-    """Print one JSON object; numbers that are not finite are refused rather than printed as invalid JSON."""
+    """Print one JSON object with where it comes from; numbers that are not finite are refused: they are no JSON."""
+    from dbbstation.cli.provenance import provenance
+
+    print_plain_json({**data, "provenance": provenance().data()})
+
+
+def print_plain_json(data: dict[str, Any]) -> None:
+    """Print one JSON object as it is: a document of its own, such as a schema."""
     click.echo(json.dumps(data, indent=1, allow_nan=False))
 
 
@@ -27,8 +37,14 @@ def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None
 
 
 def say(text: str) -> None:
-    """Tell the person at the terminal something that is not the result."""
+    """Tell the person at the terminal, and the log, something that is not the result."""
+    log_said(text)
     click.echo(text, err=True)
+
+
+def log_said(text: str) -> None:
+    """Log what the person at the terminal sees anyhow: `--verbose` does not show it again."""
+    _LOG.info("%s", text, extra={"said": True})
 
 
 def _text(cell: object) -> str:

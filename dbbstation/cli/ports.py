@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import click
 
 
@@ -16,12 +14,13 @@ def ports(*, as_json: bool) -> None:
     Example:
       dbbstation ports
     """  # noqa: D301 (click reads the escape)
+    from dbbstation.cli.output import print_json
     from dbbstation.instrument.link import connected_ports
 
     found = connected_ports()
     if as_json:
         keys = ("port", "description", "hardware")
-        click.echo(json.dumps({"ports": [dict(zip(keys, port, strict=True)) for port in found]}, indent=2))
+        print_json({"ports": [dict(zip(keys, port, strict=True)) for port in found]})
         return
     if not found:
         click.echo("No serial port is connected: plug in the adapter of the instrument.", err=True)

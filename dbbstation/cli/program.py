@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.correction import largest_correction_option
+from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
@@ -15,18 +16,29 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.command()
 @click.option("--plan", "plan_file", type=_FILE, required=True, help="Test plan.")
 @click.option("--machine", "machine_file", type=_FILE, required=True, help="Machine file.")
-@click.option(
-    "--dialect", metavar="D", default="linuxcnc", show_default=True, help="Language of the control: a name, or FILE.py."
+@shop_option(
+    "--dialect",
+    setting="program.dialect",
+    metavar="D",
+    default="linuxcnc",
+    show_default=True,
+    help="Language of the control: a name, or FILE.py.",
 )
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
 @click.option("--model", "model_file", type=_FILE, help="Compensate with this calibrated model.")
 @source_file_option
 @click.option("--test", "tests", multiple=True, metavar="NAME", help="This test only; may be given more than once.")
-@click.option(
-    "--step-deg", type=click.FloatRange(0.01, 5.0), default=0.1, show_default=True, help="Angle between points [deg]."
+@shop_option(
+    "--step-deg",
+    setting="program.step_deg",
+    type=click.FloatRange(0.01, 5.0),
+    default=0.1,
+    show_default=True,
+    help="Angle between points [deg].",
 )
-@click.option(
+@shop_option(
     "--clearance-mm",
+    setting="program.clearance_mm",
     type=click.FloatRange(0.0),
     default=20.0,
     show_default=True,
@@ -72,7 +84,8 @@ def program(
       dbbstation program --plan table2.yaml --machine machine.yaml --test a --test f --out two --json
     """
     from dbbstation.cli.output import say
-    from dbbstation.cli.programs import hashed, loaded_inverse, print_programs
+    from dbbstation.cli.programs import loaded_inverse, origin_of, print_programs
+    from dbbstation.cli.progress import count_bar
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
@@ -83,16 +96,18 @@ def program(
     written_in = dialect_given(dialect)
     plan, machine = read_plan(plan_file), read_machine(machine_file)
     inverse = None if model_file is None else loaded_inverse(model_file, time_s, source_files, largest_mm)
-    programs = circle_programs(
-        plan,
-        machine,
-        written_in,
-        inverse=inverse,
-        origin={"plan file": hashed(plan_file), "machine file": hashed(machine_file)},
-        tests=tests,
-        step_deg=step_deg,
-        approach=None if bar_stays_on else Approach(clearance_mm),
-    )
+    with count_bar("programs") as writing:
+        programs = circle_programs(
+            plan,
+            machine,
+            written_in,
+            inverse=inverse,
+            origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse),
+            tests=tests,
+            step_deg=step_deg,
+            approach=None if bar_stays_on else Approach(clearance_mm),
+            progress=writing,
+        )
     write_folder(out, {each.name: each.text for each in programs}, force=force)
     print_programs([(out / each.name, each) for each in programs], written_in.name, model_file, as_json=as_json)
     if not as_json:

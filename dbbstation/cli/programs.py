@@ -9,6 +9,7 @@ import click
 import numpy as np
 
 from dbbstation.cli.output import print_json, print_table, say
+from dbbstation.cli.provenance import provenance
 from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.model import read_model
@@ -17,7 +18,7 @@ from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.nc.export import Inverse
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -37,6 +38,20 @@ def loaded_inverse(model_file: Path, time_s: float | None, source_files: Sequenc
     origin |= {f"cause unknown {k}": name for k, name in enumerate(unknown_causes(identified.model), start=1)}
     origin |= {f"session {name}": f"sha256 {digest}" for name, digest in identified.sessions.items()}
     return Inverse(identified.model, origin, time_s, identified, largest_mm)
+
+
+def origin_of(named: Mapping[str, Path], inverse: Inverse | None) -> dict[str, str]:
+    """Return what the header of a program says of its origin: files by their part in it, program, command, other inputs.
+
+    Args:
+        named: the files that were given, by what they are.
+        inverse: the model to compensate with, which says in the header where it comes from by itself.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    files = {what: hashed(path) for what, path in named.items()}
+    return {**files, **provenance().comments({**files, **({} if inverse is None else inverse.origin)})}
 
 
 def hashed(path: Path) -> str:

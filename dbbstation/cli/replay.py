@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
@@ -22,6 +21,7 @@ def replay(file: Path, *, instrument: str | None, as_json: bool) -> None:
       dbbstation replay bytes.txt
       dbbstation replay bytes.txt --instrument streaming-encoder --json
     """  # noqa: D301 (click reads the escape)
+    from dbbstation.cli.output import print_json
     from dbbstation.instrument.bytelog import logged_instrument, read_byte_log
     from dbbstation.instrument.library import load_instrument
     from dbbstation.instrument.replay import replayed
@@ -40,7 +40,7 @@ def replay(file: Path, *, instrument: str | None, as_json: bool) -> None:
             if row.reading is not None
         ]
         unread = [{"t_s": row.t_s, "bytes": row.raw.hex(" "), "why": row.why} for row in garbage]
-        click.echo(json.dumps({"readings": said, "lost": lost, "not_understood": unread}, indent=2))
+        print_json({"readings": said, "lost": lost, "not_understood": unread})
         return
     for row in rows:
         if row.reading is None:

@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.instrument_options import instrument_options
+from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.session_options import session_details, session_options
+from dbbstation.cli.shop import from_settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,11 +36,7 @@ _DEMO_SEED = 3
 @click.command()
 @click.option("--plan", "plan_file", type=click.Path(path_type=Path), help="Test plan.")
 @click.option("--machine", "machine_file", type=click.Path(path_type=Path), help="Nominal machine.")
-@click.option(
-    "--instrument", metavar="NAME", help="Name of an instrument (`dbbstation instruments`), or a protocol file."
-)
-@click.option("--port", help="Port name, or a URL such as socket://127.0.0.1:4001.")
-@click.option("--baud", type=click.IntRange(min=1), help="Baud rate, where the instrument is not set to the usual one.")
+@instrument_options(required=False)
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), help="Session folder. An existing session is continued."
 )
@@ -49,6 +48,7 @@ _DEMO_SEED = 3
     show_default=True,
     help="Factor by which the virtual machine runs faster than real time, with --virtual.",
 )
+@loss_option
 @session_options
 def station(
     *,
@@ -60,6 +60,7 @@ def station(
     out: Path | None,
     virtual: bool,
     time_scale: float,
+    largest_loss_percent: float | None,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
@@ -73,6 +74,9 @@ def station(
       dbbstation station --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar-length-mm 150.0003 --bar-uncertainty-um 0.5
     """
+    # The shop's instrument stands elsewhere: a virtual one brings its own line.
+    port = None if virtual and from_settings("port") else port
+    baud = None if virtual and from_settings("baud") else baud
     _check_options(
         virtual=virtual, time_scale=time_scale, baud=baud, needed=(plan_file, machine_file, instrument, port, out)
     )
@@ -88,7 +92,8 @@ def station(
         return shipped_folder(folder) / rest
 
     plan_file = plan_file or demo("plan")
-    machine, plan = read_machine(machine_file or demo("machine")), read_inline_plan(plan_file)
+    machine = read_machine(machine_file or demo("machine"))
+    plan = with_loss_limit(read_inline_plan(plan_file), largest_loss_percent)
     protocol = load_instrument(instrument or _DEMO_INSTRUMENT)
     details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
@@ -156,6 +161,7 @@ def opener(
         helper: told of everything after storage, before the screen.
         time_scale: of the job's clock.
     """
+    from dbbstation.cli.measure_talk import Log
     from dbbstation.instrument.driver import Instrument
     from dbbstation.station.assembly import assemble
     from dbbstation.tui.runner import OpenStation
@@ -164,6 +170,7 @@ def opener(
     def opened() -> Iterator[OpenStation]:
         with Instrument(protocol, port, baud=baud, clock=job.clock, **driver_patience(time_scale)) as source:
             workplace = assemble(job, source)
+            workplace.station.subscribe(Log())
             if helper is not None:
                 workplace.station.subscribe(helper)
             try:

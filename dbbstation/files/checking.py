@@ -11,9 +11,17 @@ from dbbstation.files.formats.jig import parse_jig
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
+from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.run_csv import PART, read_run
-from dbbstation.files.recordings.session import SESSION_FILE, RunState, SessionFolder, no_session, parse_session
+from dbbstation.files.recordings.session import (
+    SESSION_FILE,
+    RunState,
+    SessionFolder,
+    no_session,
+    parse_session,
+    unlisted_sealed,
+)
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.trace.loss import lost_samples
 
@@ -77,6 +85,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         "dbb-plan": lambda: _plan(checked),
         "dbb-jig": lambda: _jig(checked),
         "dbb-model": lambda: _model(checked, known_sources),
+        "dbb-settings": lambda: _settings(checked),
     }
     name = str(given).partition("/")[0]
     if name in by_name:
@@ -111,6 +120,16 @@ def _model(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
     if model is not None:
         names = sorted({one.source.name for one in model.model.of_the_machine().sources})
         checked.summary = f"model of {model.model.machine.name}: {', '.join(names) or 'no sources'}"
+
+
+def _settings(checked: Checked) -> None:
+    try:
+        settings = read_settings([checked.path])
+    except InputError as error:
+        checked.problems += error.problems
+        return
+    count = len(settings.values) + len(settings.tolerances)
+    checked.summary = f"settings: {_count(count, 'value')}"
 
 
 def _run(checked: Checked) -> None:
@@ -151,6 +170,10 @@ def _session(checked: Checked) -> None:
             # A run that died before its first sample is no fault of the session.
             found = checked.warnings if run.state is RunState.RECORDING else checked.problems
             found += error.problems
+    for path in unlisted_sealed(session):
+        what = "this sealed run is in no list: the session does not use it"
+        remedy = "`dbbstation session take-in` lists it, to be accepted or rejected"
+        checked.warnings.append(Problem(str(path), 0, 0, what, remedy))
     try:
         session.plan.check(session.machine)
     except TravelError as error:

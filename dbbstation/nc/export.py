@@ -20,7 +20,7 @@ from dbbstation.nc.reach import check_feeds, check_reach
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
@@ -84,6 +84,7 @@ def circle_programs(
     tests: Sequence[str] = (),
     step_deg: float = STEP_DEG,
     approach: Approach | None = USUAL_APPROACH,
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> list[Program]:
     """Return the programs of all runs of a plan, named TEST-DIRECTION with the dialect's extension.
 
@@ -96,6 +97,7 @@ def circle_programs(
         tests: names of the tests wanted; empty for all.
         step_deg: greatest angle between programmed points [deg].
         approach: see `circle_toolpath`.
+        progress: told how many of how many are done.
 
     Raises:
         TravelError: a program leaves the travel; none is returned then.
@@ -108,15 +110,16 @@ def circle_programs(
     if unknown:
         known = ", ".join(plan.tests)
         raise StationError(f"the plan has no test {', '.join(unknown)}", where=plan.name, remedy=f"it has {known}")
-    programs = []
-    for name in tests or plan.tests:
-        test = plan.tests[name]
-        for direction in test.directions:
-            circle = test.run(direction)
-            path = circle_toolpath(circle, f"test {name} {direction}", step_deg=step_deg, approach=approach)
-            header = _circle_header(path.name, circle, step_deg, {"plan": plan.name, "machine": machine.name})
-            header += _said(origin or {})
-            programs.append(_program(path, machine, dialect, f"{name}-{direction}", inverse, None, header))
+    runs = [(name, direction) for name in tests or plan.tests for direction in plan.tests[name].directions]
+    programs: list[Program] = []
+    for name, direction in runs:
+        progress(len(programs), len(runs))
+        circle = plan.tests[name].run(direction)
+        path = circle_toolpath(circle, f"test {name} {direction}", step_deg=step_deg, approach=approach)
+        header = _circle_header(path.name, circle, step_deg, {"plan": plan.name, "machine": machine.name})
+        header += _said(origin or {})
+        programs.append(_program(path, machine, dialect, f"{name}-{direction}", inverse, None, header))
+    progress(len(programs), len(runs))
     return programs
 
 

@@ -14,7 +14,7 @@ from dbbstation.calibration.reporting.on_the_plate import ball_shifts, circle_te
 from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, draw_maps, in_style
-from dbbstation.report.figure_format import FigureFormat, in_format
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -38,7 +38,7 @@ LONGEST_MM = 60.0
 LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
-def calibration_figure(calibration: Calibration, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
+def calibration_figure(calibration: Calibration, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw circles before and after, residuals, centres and balls on the plate, and leverages, as SVG."""
     with in_style():
         return in_format(draw_calibration(calibration), wanted)

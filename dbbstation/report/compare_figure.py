@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from dbbstation.diagnosis.compare_summary import by_angle_um
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, in_style
-from dbbstation.report.figure_format import FigureFormat, in_format
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +22,7 @@ OVERLAYS = 3
 COLOUR_A, COLOUR_B = AFTER, BEFORE
 
 
-def compare_figure(found: Comparison, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
+def compare_figure(found: Comparison, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw maps of the difference over test and angle, and the worst runs of three tests, as SVG."""
     tests = list(dict.fromkeys((run.pair.test, run.pair.number) for run in found.runs))
     with in_style():

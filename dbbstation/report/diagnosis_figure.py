@@ -14,7 +14,7 @@ from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.source_curves import found_sources, source_curves
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, draw_maps, in_style
-from dbbstation.report.figure_format import FigureFormat, in_format
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 from dbbstation.report.unexplained_panel import draw_unexplained
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ MARKER_OF = {"": "o", "lengthening": "^", "shortening": "v"}
 LINE_OF_DIRECTION = {Direction.CCW: "-", Direction.CW: "--"}
 
 
-def diagnosis_figure(diagnosis: Diagnosis, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
+def diagnosis_figure(diagnosis: Diagnosis, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw maps of the misfit, errors over what organises them and what has no name, traces and gains, as SVG."""
     with in_style():
         return in_format(draw_diagnosis(diagnosis), wanted)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
-from dbbstation.report.figure_format import FigureFormat, in_format
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,7 @@ MOST_POINTS = 3000
 """Points of a line that are drawn: more make a large file and the same picture."""
 
 
-def drive_figure(diagnosis: DriveDiagnosis, wanted: FigureFormat = FigureFormat.SVG) -> bytes:
+def drive_figure(diagnosis: DriveDiagnosis, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
     """Draw a diagnosis of a drive, as SVG."""
     with in_style():
         figure = Figure(figsize=(11.0, 6.2), layout="constrained")

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import io
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dbbstation.report.svg import as_svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from dbbstation.files.provenance import Provenance
 
 PNG_DOTS_PER_INCH = 200
 """Sharp on paper at the figures' own size; a figure 10 inches wide has 2000 pixels."""
@@ -23,13 +26,43 @@ class FigureFormat(StrEnum):
     PDF = ".pdf"
 
 
-def in_format(figure: Figure, wanted: FigureFormat) -> bytes:
-    """Return the figure's bytes: the same for the same figure, without a date."""
-    if wanted is FigureFormat.SVG:
-        return as_svg(figure)
+@dataclass(frozen=True)
+class Stamped:
+    """A format together with where the figure comes from.
+
+    Attributes:
+        format: of the file.
+        provenance: kept in the metadata of the file.
+    """
+
+    format: FigureFormat
+    provenance: Provenance
+
+
+def in_format(figure: Figure, wanted: FigureFormat | Stamped) -> bytes:
+    """Return the figure's bytes: the same for the same figure and provenance, without a date.
+
+    Args:
+        figure: what was drawn.
+        wanted: format, with where the figure comes from; that goes into the metadata that the format has for it.
+    """
+    kind = wanted.format if isinstance(wanted, Stamped) else wanted
+    metadata = _metadata(wanted.provenance, kind) if isinstance(wanted, Stamped) else {}
+    if kind is FigureFormat.SVG:
+        return as_svg(figure, metadata)
     out = io.BytesIO()
-    if wanted is FigureFormat.PNG:
-        figure.savefig(out, format="png", dpi=PNG_DOTS_PER_INCH)
+    if kind is FigureFormat.PNG:
+        figure.savefig(out, format="png", dpi=PNG_DOTS_PER_INCH, metadata=metadata)
     else:
-        figure.savefig(out, format="pdf", metadata={"CreationDate": None})
+        figure.savefig(out, format="pdf", metadata={"CreationDate": None, **metadata})
     return out.getvalue()
+
+
+def _metadata(provenance: Provenance, kind: FigureFormat) -> dict[str, Any]:
+    """Program, command and inputs under the names that each format has for them."""
+    names = {
+        FigureFormat.SVG: ("Creator", "Description"),  # Dublin Core, in RDF
+        FigureFormat.PNG: ("Software", "Description"),  # text chunks of the PNG specification
+        FigureFormat.PDF: ("Creator", "Subject"),  # the document information dictionary
+    }[kind]
+    return dict(zip(names, (provenance.program, provenance.text()), strict=True))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import io
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from matplotlib.figure import Figure
 
@@ -22,14 +22,18 @@ _PLACE = re.compile(rb' (?:[xy]="[^"]*"|transform="(?:rotate|translate)\([^"]*")
 _NUMBER = re.compile(rb"-?\d+\.\d+")
 
 
-def as_svg(figure: Figure) -> bytes:
+def as_svg(figure: Figure, metadata: Mapping[str, Any] | None = None) -> bytes:
     """Return the figure's bytes, the same for the same figure.
 
     Straight paths and places are given to a tenth of a point, round ones to a hundredth. The layout's solver rounds as
     memory happens to lie; clipping frames, whose names are hashes of all digits, are therefore counted in their order.
+
+    Args:
+        figure: what was drawn.
+        metadata: as Matplotlib takes it for SVG: names of Dublin Core.
     """
     out = io.BytesIO()
-    figure.savefig(out, format="svg", metadata={"Date": None})
+    figure.savefig(out, format="svg", metadata={"Date": None, **(metadata or {})})
     drawn = _PATH.sub(lambda path: b' d="' + _shorter(path[1]) + b'"', out.getvalue())
     drawn = _INDENT.sub(b"\n", _NOT_TURNED.sub(b"", drawn))
     drawn = _PLACED.sub(lambda tag: _PLACE.sub(lambda at: _NUMBER.sub(_rounded, at.group()), tag.group()), drawn)

@@ -25,7 +25,9 @@ def concealed_gravity(*, seed: int, figure: Path | None, force: bool, as_json: b
       dbbstation study concealed-gravity
       dbbstation study concealed-gravity --seed 5 --figure concealed.svg --json
     """
+    from dbbstation.cli.diagnose import STAGES
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
@@ -38,7 +40,8 @@ def concealed_gravity(*, seed: int, figure: Path | None, force: bool, as_json: b
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     plans = shipped_folder("protocols") / "plans"
     jig, conditions = read_plan(plans / "table2.yaml"), read_plan(plans / "gravity-conditions.yaml")
-    found = experiment(machine, jig, conditions, seed, lambda text: say(f"... {text}"))
+    with stage_bar("study", STAGES) as progress:
+        found = experiment(machine, jig, conditions, seed, progress)
     if figure is not None:
         write_bytes(figure, concealed_figure(found, format_of(figure)), force=force)
         say(f"figure written to {figure}")

@@ -33,17 +33,20 @@ def platform_joints(*, seed: int, size_um: float, as_json: bool) -> None:
       dbbstation study platform-joints
       dbbstation study platform-joints --size-um 20 --seed 4 --json
     """
-    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.output import print_json
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.shipped import shipped_folder
-    from studies.platform_joints import numbers
+    from studies.platform_joints import MOST_ROUNDS, numbers
     from studies.platform_joints import platform_joints as experiment
 
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     jig = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
     size_mm = size_um / 1e3
-    found = numbers(experiment(machine, jig, seed, size_mm, lambda text: say(f"... {text}")), seed, size_mm)
+    rounds = {f"round {k + 1}": 100 * k // (MOST_ROUNDS + 1) for k in range(MOST_ROUNDS + 1)}
+    with stage_bar("study", rounds) as progress:
+        found = numbers(experiment(machine, jig, seed, size_mm, progress), seed, size_mm)
     if as_json:
         print_json(found)
     else:

@@ -23,15 +23,18 @@ STORED = {
     "dbb-plan/1": shipped_folder("protocols") / "plans" / "table2.yaml",
     "dbb-plan/2": FIXTURES / "plans" / "every-key.yaml",
     "dbb-model/1": FIXTURES / "models" / "small.yaml",
+    "dbb-model/2": FIXTURES / "models" / "greatest-feed.yaml",
+    "dbb-model/3": FIXTURES / "models" / "provenance.yaml",
+    "dbb-settings/1": FIXTURES / "settings" / "every-key.yaml",
     "dbb-session/1": FIXTURES / "sessions" / "under-spindle",
     "dbb-session/2": FIXTURES / "sessions" / "small",
 }
-"""One stored file of each version; a model of version 2 is one whose machine has a key of that version."""
+"""One stored file of each version."""
 
 
 def test_a_file_of_every_version_is_stored():
     every = {version for schema in SCHEMAS.values() for version in versions_of(schema)}
-    assert set(STORED) == every - {"dbb-model/2"}
+    assert set(STORED) == every
 
 
 @pytest.mark.parametrize("version", STORED)
@@ -44,7 +47,7 @@ def test_it_is_read(run, version):
     assert outcome.data["files"][0]["format"] == version
 
 
-@pytest.mark.parametrize("version", [v for v in STORED if v.endswith("/2")])
+@pytest.mark.parametrize("version", [v for v in STORED if not v.endswith("/1")])
 def test_a_newer_key_in_an_older_version_is_refused_with_what_to_write(run, tmp_path, version):
     path = STORED[version]
     file = path / "session.yaml" if path.is_dir() else path
@@ -53,10 +56,11 @@ def test_a_newer_key_in_an_older_version_is_refused_with_what_to_write(run, tmp_
     older.write_text(file.read_text(encoding="utf-8").replace(version, f"{name}/1"), encoding="utf-8")
     outcome = run("calibrate" if name == "dbb-session" else "check", older)
     assert outcome.code == 1
-    keys = [key for key in SINCE if f"{key}:" in older.read_text(encoding="utf-8")]
-    assert keys
-    for key in keys:
-        fault = rf"{older.name}:\d+:\d+: the key `{key}` came with {name}/2, and this file is {name}/1; write `format: {name}/2`"
+    keys = {key: since for key, since in SINCE[name].items() if f"{key}:" in older.read_text(encoding="utf-8")}
+    assert int(version.partition("/")[2]) in keys.values()
+    for key, since in keys.items():
+        newer = f"{name}/{since}"
+        fault = rf"{older.name}:\d+:\d+: the key `{key}` came with {newer}, and this file is {name}/1; write `format: {newer}`"
         assert re.search(fault, outcome.err), outcome.err
 
 

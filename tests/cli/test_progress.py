@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,14 +14,25 @@ from contextlib import redirect_stderr, suppress
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 
-from dbbstation.cli import DONE, FAILED
+from dbbstation.cli import DONE, FAILED, progress
 from dbbstation.cli.diagnose import STAGES
-from dbbstation.cli.progress import stage_bar
+from dbbstation.cli.progress import count_bar, stage_bar, time_left
+from dbbstation.errors import KinematicsError
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model import uncertainty
+from dbbstation.model.identified import IdentifiedModel
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.contract import Fitted, Motion
+from dbbstation.sources.registry import known_sources
 
 pty = pytest.importorskip("pty", reason="needs a pseudo-terminal")
 
+MODEL = shipped_folder("fixtures") / "models" / "small.yaml"
+PLAN = shipped_folder("protocols") / "plans" / "table2.yaml"
+MACHINE = shipped_folder("fixtures") / "machines" / "reference.yaml"
 SESSION = Path(__file__).parents[2] / "fixtures" / "sessions" / "small"
 PROGRAM = [sys.executable, "-m", "dbbstation", "diagnose", str(SESSION), "--sources", "gravity,backlash"]
 PATIENCE_S = 120.0
@@ -81,21 +93,160 @@ def test_nothing_told_is_no_bar():
     assert on_terminal(work) == ["note", ""]
 
 
-def test_plain_is_lines_on_a_terminal_too():
-    def work() -> None:
-        with stage_bar("diagnosis", STAGES, plain=True) as tell:
-            tell("candidates")
-
-    assert on_terminal(work) == ["... candidates", ""]
-
-
-def test_in_a_pipe_are_lines(run):
+def test_in_a_pipe_is_nothing(run):
     outcome = run(*PROGRAM[3:])
     assert outcome.code == DONE
-    assert [line for line in outcome.err.splitlines() if line.startswith("...")] == [
-        f"... {stage}" for stage in STAGES if stage != "joint fit"
+    assert outcome.err.splitlines() == ["note: small: run l cw 2 is recording, not accepted: left out"]
+
+
+def test_verbose_shows_the_stages_as_lines(run):
+    outcome = run(*PROGRAM[3:], "--verbose")
+    assert outcome.code == DONE
+    assert [line for line in outcome.err.splitlines() if line.startswith("log: ...")] == [
+        f"log: ... {stage}" for stage in STAGES if stage != "joint fit"
     ]
     assert "\r" not in outcome.err
+
+
+class Clock:
+    """Time that passes when it is told to."""
+
+    def __init__(self, monkeypatch):
+        self.now_s = 100.0
+        monkeypatch.setattr(progress.time, "monotonic", lambda: self.now_s)
+
+
+def test_a_count_shows_how_many_of_how_many_and_ends_its_line(monkeypatch):
+    clock = Clock(monkeypatch)
+
+    def work() -> None:
+        with count_bar("reading runs") as tell:
+            for done in range(31):
+                tell(done, 30)
+                clock.now_s += 0.4
+            click.echo("note", err=True)
+
+    lines = on_terminal(work)
+    assert any("reading runs" in line and "12/30" in line for line in lines)
+    assert any("30/30" in line for line in lines)
+    # What is said after the last run stands on a line of its own.
+    assert "".join(lines).rpartition(SHOW_CURSOR)[2] == "note"
+
+
+def test_what_is_over_at_once_shows_no_bar():
+    def work() -> None:
+        with count_bar("reading runs") as tell:
+            for done in range(31):
+                tell(done, 30)
+
+    assert on_terminal(work) == [""]
+
+
+def test_counts_move_within_their_stage_and_say_what_is_left(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    clock = Clock(monkeypatch)
+
+    def work() -> None:
+        with stage_bar("prediction", {"reading": 0, "predicting": 50, "writing": 90}) as tell:
+            tell("reading poses")
+            clock.now_s += 10.0
+            for done in range(5):
+                tell("predicting pose", done, 4)
+                clock.now_s += 5.0
+            tell("writing")
+
+    lines = [re.sub(r"\x1b\[[?0-9]*[a-zA-Z]", "", line) for line in on_terminal(work)]
+    # Ten seconds for half of the work: ten are left. Half of the next 40 % after ten more: 20 s for 70 %.
+    assert any("50%" in line and "10 s left, predicting pose 0 of 4" in line for line in lines)
+    assert any("70%" in line and "9 s left, predicting pose 2 of 4" in line for line in lines)
+    assert percents(lines) == sorted(percents(lines))
+
+
+@pytest.mark.parametrize(
+    ("share", "passed_s", "text"),
+    [
+        (0.5, 10.0, "10 s left, "),
+        (0.1, 60.0, "9 min left, "),
+        (0.5, 2.0, ""),
+        (0.01, 100.0, ""),
+        (1.0, 50.0, "0 s left, "),
+    ],
+)
+def test_what_is_left(share, passed_s, text):
+    assert time_left(share, passed_s) == text
+
+
+def test_poses_are_predicted_alike_in_pieces_and_at_once(monkeypatch, reference):
+    """Every pose by itself: how many are taken together changes nothing; and a pose that fails has its own number."""
+    rng = np.random.default_rng(4)
+    poses = np.column_stack(
+        [rng.uniform(-80, 80, (23, 2)), rng.uniform(-1050, -950, 23), rng.uniform(-5, 5, (23, 2)), np.zeros(23)]
+    )
+    known = known_sources()
+    model = MachineModel(reference, (Fitted(known["strut-reference-length"], rng.normal(0, 0.05, 6)),))
+    rows = tuple(("strut-reference-length", "", p.name) for p in known["strut-reference-length"].parameters(reference))
+    identified = IdentifiedModel(model, rows, 1e-8 * np.eye(6))
+    monkeypatch.setattr(uncertainty, "POSES_AT_ONCE", 5)
+    told = []
+    actual, u_mm = uncertainty.predicted_poses(identified, poses, lambda done, of: told.append((done, of)))
+    assert told == [(0, 23), (5, 23), (10, 23), (15, 23), (20, 23), (23, 23)]
+    np.testing.assert_array_equal(actual, model.actual_poses(Motion(poses)))
+    np.testing.assert_allclose(u_mm, uncertainty.position_uncertainty_mm(identified, Motion(poses)), rtol=1e-12)
+    poses[17, 2] = 5_000.0  # above the machine: the struts do not reach, and the actual pose is nowhere
+    monkeypatch.setattr(
+        MachineModel,
+        "actual_poses",
+        lambda _, motion: _fail_above(motion.poses),
+    )
+    with pytest.raises(KinematicsError, match="pose 18"):
+        uncertainty.predicted_poses(identified, poses)
+
+
+def _fail_above(poses):
+    if (poses[:, 2] > 0).any():
+        raise KinematicsError("no pose", where=f"pose {int(np.argmax(poses[:, 2] > 0)) + 1}")
+    return poses
+
+
+INTERRUPTED = {
+    "calibrate": ["calibrate", "SESSION", "--out", "model.yaml", "--force"],
+    "evaluate": ["evaluate", "SESSION", "--model", MODEL],
+    "predict": ["predict", "--model", MODEL, "--poses", "poses.csv", "--out", "out.csv"],
+    "study": ["study", "coverage", "--machines", "50"],
+    "program": ["program", "--plan", PLAN, "--machine", MACHINE, "--model", MODEL, "--out", "nc"],
+}
+
+
+@pytest.mark.parametrize("name", INTERRUPTED)
+@pytest.mark.parametrize("after_s", [1.5, 4.0])
+def test_ctrl_c_ends_with_one_line_and_leaves_whole_files(tmp_path, name, after_s):
+    """As a terminal does it: the signal goes to the whole group of processes."""
+    shutil.copytree(SESSION, tmp_path / "session")
+    rows = "0,0,-1008,0,0,0\n" * 200_000
+    (tmp_path / "poses.csv").write_text(f"x_mm,y_mm,z_mm,a_deg,b_deg,c_deg\n{rows}")
+    (tmp_path / "model.yaml").write_text("what was there before")
+    words = [{"SESSION": "session"}.get(word, str(word)) for word in INTERRUPTED[name]]
+    before = set(tmp_path.rglob("*"))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dbbstation", *words],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+    )
+    time.sleep(after_s)
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGINT)
+    printed, said = process.communicate(timeout=PATIENCE_S)
+    if process.returncode == DONE or (process.returncode == -signal.SIGINT and printed):
+        pytest.skip("it was over before")
+    assert process.returncode == FAILED, said
+    told = [line for line in said.splitlines() if not line.startswith("note: ")]  # notes of the files come before
+    assert told == ["interrupted; what was written before stays"]
+    assert set(tmp_path.rglob("*")) == before
+    assert (tmp_path / "model.yaml").read_text() == "what was there before"
 
 
 def in_terminal(*, interrupt: bool) -> tuple[int, str]:

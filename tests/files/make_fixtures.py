@@ -1,4 +1,4 @@
-"""Makes the sessions of `fixtures` and `fixtures/models/small.yaml` anew: `python -m tests.files.make_fixtures`.
+"""Makes the sessions of `fixtures` and `fixtures/models` anew: `python -m tests.files.make_fixtures`.
 
 The recordings of `small` come from the independent virtual machine of tests/plant, those of `under-spindle` from that of
 `emulate`; the numbers of the model are made up.
@@ -17,6 +17,7 @@ import numpy as np
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.session import Bar, read_session
 from dbbstation.files.recordings.session_set_up import SetUpReadings
 from dbbstation.files.recordings.session_writer import FinishedRun, SessionDetails, SessionWriter, write_session
@@ -103,7 +104,7 @@ def make_conventional_session(folder: Path) -> None:
     write_session(folder, machine, inline, runs, SessionDetails(set_up_errors=tuple(readings)))
 
 
-def make_model(path: Path) -> None:
+def make_models(folder: Path) -> None:
     session = read_session(FIXTURES / "sessions" / "small")
     known, machine = known_sources(), session.machine
     run = session.runs[0]
@@ -125,7 +126,12 @@ def make_model(path: Path) -> None:
         {"residual_rms_um": 0.52, "parameters_identified": 6, "made_up": True},
         {session.name: session.sha256},
     )
-    write_model(path, model, force=True)
+    write_model(folder / "small.yaml", model, force=True)
+    faster = replace(machine, greatest_feed_mm_min=20_000.0)
+    model = replace(model, model=MachineModel(faster, fitted))
+    write_model(folder / "greatest-feed.yaml", model, force=True)
+    origin = Provenance("dbbstation 0.1.0", "dbbstation calibrate small", {"small/session.yaml": session.sha256})
+    write_model(folder / "provenance.yaml", model, provenance=origin, force=True)
 
 
 if __name__ == "__main__":
@@ -133,4 +139,4 @@ if __name__ == "__main__":
     make_session(FIXTURES / "sessions" / "small")
     shutil.rmtree(FIXTURES / "sessions" / "under-spindle", ignore_errors=True)
     make_conventional_session(FIXTURES / "sessions" / "under-spindle")
-    make_model(FIXTURES / "models" / "small.yaml")
+    make_models(FIXTURES / "models")

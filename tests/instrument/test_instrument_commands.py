@@ -56,9 +56,8 @@ def test_help_loads_no_serial_library() -> None:
 def test_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link, "connected_ports", lambda: [("/dev/ttyUSB0", "FT232R", "USB VID")])
     assert run(ports)[0] == "/dev/ttyUSB0     FT232R  (USB VID)\n"
-    assert json.loads(run(ports, "--json")[0]) == {
-        "ports": [{"port": "/dev/ttyUSB0", "description": "FT232R", "hardware": "USB VID"}]
-    }
+    expected = [{"port": "/dev/ttyUSB0", "description": "FT232R", "hardware": "USB VID"}]
+    assert json.loads(run(ports, "--json")[0])["ports"] == expected
     monkeypatch.setattr(link, "connected_ports", list)
     assert run(ports) == ("", "No serial port is connected: plug in the adapter of the instrument.\n")
 

@@ -13,7 +13,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -43,8 +43,17 @@ class PredictedCircle:
     after_um: float
 
 
-def predicted_circles(model: MachineModel, observations: Sequence[Observation]) -> tuple[PredictedCircle, ...]:
+def predicted_circles(
+    model: MachineModel,
+    observations: Sequence[Observation],
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> tuple[PredictedCircle, ...]:
     """Compare the circularity of recordings with what a model says of them.
+
+    Args:
+        model: with the machine's own sources.
+        observations: the recordings.
+        progress: told how many of how many runs are done.
 
     Raises:
         TraceError: a run that is no circle.
@@ -52,15 +61,18 @@ def predicted_circles(model: MachineModel, observations: Sequence[Observation]) 
     """
     nominal = residuals(MachineModel(model.machine), observations)
     left = residuals(model.of_the_machine(), observations)
-    return tuple(
-        PredictedCircle(
+    circles: list[PredictedCircle] = []
+    for o, before, after in zip(observations, nominal, left, strict=True):
+        progress(len(circles), len(observations))
+        circle = PredictedCircle(
             measured_um=smooth_circularity_um(o.raw, o.raw.length_mm),
             predicted_um=smooth_circularity_um(o.raw, o.raw.length_mm - after),
             before_um=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + before),
             after_um=smooth_circularity_um(o.raw, o.raw.circle.bar_mm + after),
         )
-        for o, before, after in zip(observations, nominal, left, strict=True)
-    )
+        circles.append(circle)
+    progress(len(circles), len(observations))
+    return tuple(circles)
 
 
 def smooth_circularity_um(raw: RawCircle, length_mm: NDArray[np.float64]) -> float:

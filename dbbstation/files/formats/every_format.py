@@ -9,12 +9,13 @@ from dbbstation.files.formats.machine import MachineFile
 from dbbstation.files.formats.model_schema import ModelFile
 from dbbstation.files.formats.plan import PlanFile
 from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.formats.settings_schema import SettingsFile
 from dbbstation.files.yaml.schema import format_of, versions_of
 
 if TYPE_CHECKING:
     from dbbstation.files.yaml.schema import Schema
 
-_NEWEST = (JigFile, MachineFile, ModelFile, PlanFile, SessionFile)
+_NEWEST = (JigFile, MachineFile, ModelFile, PlanFile, SessionFile, SettingsFile)
 
 SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _NEWEST}
 """Schema of each format by its name with its newest version, which has all keys of those before."""

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.files.provenance import Provenance
     from dbbstation.files.yaml.text import Location, YamlDocument
     from dbbstation.machine.geometry import Machine
     from dbbstation.sources.contract import Parameter
@@ -198,15 +199,20 @@ def covariance_fault(covariance: NDArray[np.float64]) -> str | None:
     return None
 
 
-def write_model(path: Path, model: IdentifiedModel, *, force: bool = False) -> None:
-    """Write a model, every number exact to the last digit.
+def write_model(
+    path: Path, model: IdentifiedModel, *, provenance: Provenance | None = None, force: bool = False
+) -> None:
+    """Write a model, every number exact to the last digit, with where it comes from.
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.
         ValueError: the model could not be read back: its covariance is none, or does not fit its rows.
     """
     refuse_existing(path, force=force)
-    write_text(path, yaml_text(model_data(model)), force=force)
+    data = model_data(model)
+    if provenance is not None:
+        data["provenance"] = provenance.data()
+    write_text(path, yaml_text({**data, "format": format_for(ModelFile, data)}), force=force)
 
 
 def model_data(model: IdentifiedModel) -> dict[str, Any]:

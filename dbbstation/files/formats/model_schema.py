@@ -1,4 +1,4 @@
-"""`dbb-model/2`, which has all of `dbb-model/1`: an identified machine model with the uncertainty and provenance of its numbers."""
+"""`dbb-model/3`, which has all of `dbb-model/1` and `/2`: an identified machine model with the uncertainty and provenance of its numbers."""
 
 from typing import Annotated, Any, Literal
 
@@ -43,13 +43,24 @@ class CovarianceSchema(Schema):
     """Symmetric, in the products of the parameters' units; a direction held at nominal has no variance."""
 
 
+class ProvenanceSchema(Schema):
+    """Where a file comes from; no date, so that the same inputs and command give the same file."""
+
+    program: str
+    """Name and version of the program that wrote it."""
+    command: str
+    """What was asked for, files without their folders."""
+    inputs: dict[str, Sha256Hex]
+    """SHA-256 of every file that was read, by name; recordings have theirs in the session file."""
+
+
 class ModelFile(Schema):
     """The nominal machine, what is different on the real one, and how well that is known.
 
-    Every key is required, empty where there is nothing to say, so that a file that was cut short is noticed.
+    Every key but `provenance` is required, empty where there is nothing to say, so that a file that was cut short is noticed.
     """
 
-    format: Literal["dbb-model/1", "dbb-model/2"]
+    format: Literal["dbb-model/1", "dbb-model/2", "dbb-model/3"]
     """Name and version of this format."""
     machine: MachineParts
     """The nominal machine, as in a `dbb-machine/1` file."""
@@ -65,3 +76,5 @@ class ModelFile(Schema):
     """What the fit reported, by name."""
     sessions: dict[str, Sha256Hex]
     """SHA-256 of each session file that the model comes from, by folder name."""
+    provenance: ProvenanceSchema | None = None
+    """Where the model comes from; absent in files of older programs and in models that were written by hand."""

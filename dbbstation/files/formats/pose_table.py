@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.atomic import write_text
+from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
+from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.source_text import decode, read_bytes
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 UNCERTAINTY_COLUMNS = ("u_x_mm", "u_y_mm", "u_z_mm")
 MOST_FAULTS = 20
+ELSE = "other tables need --decimal and --separator, or `numbers` in the settings"
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +38,12 @@ class PoseTable:
     others: dict[str, list[str]]
 
 
-def read_poses(path: Path) -> PoseTable:
+def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
     """Read a table of poses.
+
+    Args:
+        path: of the table.
+        language: how its numbers are written.
 
     Raises:
         InputError: every missing column and every cell that is no finite number, with its line.
@@ -47,13 +53,13 @@ def read_poses(path: Path) -> PoseTable:
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)
-    reader = csv.reader(io.StringIO(text, newline=""), skipinitialspace=True)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=language.separator, skipinitialspace=True)
     names = next(reader, [])
     missing = [name for name in POSE_COLUMNS if name not in names]
     if missing:
         remedy = f"the first line must name {', '.join(POSE_COLUMNS)}"
-        if any(";" in name or "\t" in name for name in names):
-            remedy += "; commas stand between columns, the decimal sign is a dot"
+        if any(sign in name for name in names for sign in SEPARATORS if sign != language.separator):
+            remedy += f"; {language.text}: {ELSE}"
         raise InputError([Problem(str(path), 1, 1, f"no column {', '.join(missing)}", remedy)])
     rows: list[list[float]] = []
     others: dict[str, list[str]] = {name: [] for name in names if name not in POSE_COLUMNS}
@@ -62,11 +68,11 @@ def read_poses(path: Path) -> PoseTable:
             continue
         if len(cells) != len(names):
             what = f"{len(cells)} values in {len(names)} columns"
-            remedy = "compare the line with the header; the decimal sign is a dot, a comma ends a value"
+            remedy = f"compare the line with the header; {language.text}"
             faults.append(Problem(str(path), reader.line_num, 0, what, remedy))
             continue
         row = dict(zip(names, cells, strict=True))
-        rows.append([_number(row[name], name, path, reader.line_num, faults) for name in POSE_COLUMNS])
+        rows.append([_number(row[name], name, path, reader.line_num, language, faults) for name in POSE_COLUMNS])
         for name, kept in others.items():
             kept.append(row[name])
     if faults:
@@ -76,13 +82,10 @@ def read_poses(path: Path) -> PoseTable:
     return PoseTable(np.array(rows), others)
 
 
-def _number(cell: str, name: str, path: Path, line: int, faults: list[Problem]) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = np.nan
+def _number(cell: str, name: str, path: Path, line: int, language: NumberLanguage, faults: list[Problem]) -> float:
+    value = language.number(cell)
     if not np.isfinite(value):
-        remedy = "the decimal sign is a dot" if "," in cell else "correct or remove the line"
+        remedy = f"{language.text}: {ELSE}" if set(cell) & set(DECIMALS) else "correct or remove the line"
         faults.append(Problem(str(path), line, 0, f"{name} is {cell!r}, not a number", remedy))
     return value
 
@@ -92,10 +95,13 @@ def write_poses(
     poses: NDArray[np.float64],
     uncertainty_mm: NDArray[np.float64],
     others: dict[str, list[str]],
+    provenance: Provenance,
     *,
     force: bool = False,
 ) -> None:
     """Write poses, shape (n, 6) [mm, deg], their standard uncertainties, shape (n, 3) [mm], and further columns.
+
+    Beside the table is written where it comes from.
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.
@@ -107,4 +113,4 @@ def write_poses(
     for k, (pose, uncertainty) in enumerate(zip(poses, uncertainty_mm, strict=True)):
         numbers = [f"{value:.9f}" for value in pose] + [f"{value:.7f}" for value in uncertainty]
         writer.writerow([*numbers, *(cells[k] for cells in kept.values())])
-    write_text(path, out.getvalue(), force=force)
+    write_table(path, out.getvalue(), provenance, force=force)

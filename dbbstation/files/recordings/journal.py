@@ -144,11 +144,13 @@ class RunWriter:
             self.sync()
 
     def sync(self) -> None:
-        """Bring everything to disk.
+        """Bring everything to disk; nothing is left to do once the file is closed.
 
         Raises:
             OutputError: the disk refuses.
         """
+        if self._file.closed:
+            return
         with self._told():
             os.fsync(self._file.fileno())
         self._synced_at = self._clock()

@@ -62,7 +62,7 @@ def read_run(path: Path, *, sha256: str = "") -> RunFile:
         InputError: every fault of the file with its line.
     """
     faults: list[Problem] = []
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, is_input=not sha256)
     if data is None:
         raise InputError(faults)
     digest = hashlib.sha256(data).hexdigest()

@@ -66,6 +66,6 @@ def _check_file(
         what = f"there is no file `{file}` in the session folder"
         faults.append(document.problem((*location, "file"), what, "restore it, or take the entry out"))
     elif isinstance(expected, str):
-        data = read_bytes(path, faults)
+        data = read_bytes(path, faults, is_input=False)
         if data is not None and hashlib.sha256(data).hexdigest() != expected:
             faults.append(changed(str(path)))

@@ -17,15 +17,19 @@ FORMATS = {
     "dbb-plan": "a test plan",
     "dbb-jig": "a jig",
     "dbb-model": "a model",
+    "dbb-settings": "a shop's settings",
 }
 """Every format by the name before its version, with what it is called in messages."""
 
 
-SINCE = {
-    "largest_loss_percent": 2,
-    "stroke_mm": 2,
-    "greatest_feed_mm_min": 2,
-    "greatest_turn_deg_min": 2,
+_OF_MACHINES = {"greatest_feed_mm_min": 2, "greatest_turn_deg_min": 2}
+
+SINCE: dict[str, dict[str, int]] = {
+    "dbb-plan": {"largest_loss_percent": 2},
+    "dbb-session": {"stroke_mm": 2},
+    "dbb-instrument": {"stroke_mm": 2},
+    "dbb-machine": _OF_MACHINES,
+    "dbb-model": {**_OF_MACHINES, "provenance": 3},
 }
 """Keys that came after the first version of a format, with the version. A file of an older version must not have them: a
 program of that time would refuse it without saying that a newer one reads it."""
@@ -83,8 +87,9 @@ def versions_of(schema: type[Schema]) -> tuple[str, ...]:
 
 def format_for(schema: type[Schema], data: Mapping[str, Any]) -> str:
     """Return the format's name with the oldest version that has all keys of some data, so that older programs read it."""
-    needed = max((SINCE[key] for key in _keys(data) if key in SINCE), default=1)
-    return versions_of(schema)[needed - 1]
+    versions = versions_of(schema)
+    since = SINCE.get(versions[0].partition("/")[0], {})
+    return versions[max((since[key] for key in _keys(data) if key in since), default=1) - 1]
 
 
 def _keys(data: object) -> Iterator[str]:
@@ -106,7 +111,7 @@ def _newer_keys(document: YamlDocument, schema: type[Schema]) -> list[Problem]:
     name, _, version = str(given).partition("/")
     found = []
     for location in document.key_places:
-        since = SINCE.get(str(location[-1]), 1)
+        since = SINCE.get(name, {}).get(str(location[-1]), 1)
         if since > int(version):
             what = f"the key `{location[-1]}` came with {name}/{since}, and this file is {given}"
             remedy = f"write `format: {name}/{since}`"

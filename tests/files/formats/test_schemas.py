@@ -19,7 +19,8 @@ EXAMPLES = {
     "dbb-machine/2": [FIXTURES / "machines" / "every-key.yaml"],
     "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
     "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
-    "dbb-model/2": [FIXTURES / "models" / "small.yaml"],
+    "dbb-settings/1": [FIXTURES / "settings" / "every-key.yaml"],
+    "dbb-model/3": [FIXTURES / "models" / "provenance.yaml"],
     "dbb-session/2": [SESSIONS / "small" / "session.yaml", SESSIONS / "under-spindle" / "session.yaml"],
 }
 UNITS = ("_mm", "_deg", "_um", "_kg", "_temp_c", "_mm_min", "_um_m_k", "_mm_per_n")
@@ -86,5 +87,5 @@ def test_the_examples_use_every_key(name: str) -> None:
         visit((), (), document.data)
     for general, keys in known.items():
         # The machine of a model has an example of its own.
-        if name != "dbb-model/2" or general[:1] != ("machine",):
+        if not name.startswith("dbb-model/") or general[:1] != ("machine",):
             assert keys <= used[general], ".".join(general)

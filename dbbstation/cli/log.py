@@ -1,0 +1,147 @@
+"""The log: what a command was asked, with which versions and inputs, what it said, how it ended; for a service engineer.
+
+One file beside the session, which every command about sessions of that folder continues. It is turned over at a size, so
+that it never fills a disk.
+"""
+
+from __future__ import annotations
+
+import functools
+import logging
+import os
+import platform
+import shlex
+import sys
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dbbstation.cli.provenance import PROGRAM, command_of
+from dbbstation.cli.shop import folder_of_sessions
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+LOG = logging.getLogger("dbbstation")
+
+FILE = "dbbstation.log"
+"""Name of the log beside sessions and in the user's folder."""
+
+VARIABLE = "DBBSTATION_LOG"
+"""Environment variable that names another file; `off` for none."""
+
+LARGEST_BYTES, KEPT = 1_000_000, 3
+"""A log is turned over at this size, and so many older ones are kept: some thousand commands, 4 MB in all."""
+
+_VERSIONS = ("numpy", "scipy", "numba", "matplotlib", "pydantic", "pyserial", "textual")
+"""Packages whose version decides what a fault means."""
+
+_FORM = logging.Formatter("%(asctime)s %(process)d %(levelname)s %(message)s", "%Y-%m-%dT%H:%M:%S%z")
+
+
+def attended(command: click.Command) -> click.Command:
+    """Let a command, or every command of a group, keep the log; one that does so already is left as it is."""
+    for inner in command.commands.values() if isinstance(command, click.Group) else ():
+        attended(inner)
+    callback = command.callback
+    if callback is not None and not isinstance(command, click.Group) and not hasattr(callback, "attended"):
+        command.callback = _attended(callback)
+    return command
+
+
+def _attended(callback: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(callback)
+    def call(*args: Any, **named: Any) -> Any:  # noqa: ANN401 - what the command takes and returns
+        with _kept(click.get_current_context()):
+            return callback(*args, **named)
+
+    call.attended = True  # type: ignore[attr-defined]  # a mark for the function above
+    return call
+
+
+@contextmanager
+def _kept(context: click.Context) -> Iterator[None]:
+    """Log the beginning of a command, everything that is logged while it runs, and its end."""
+    verbose = bool(context.find_root().params.get("verbose"))
+    handlers = [_to_file(context), _to_screen() if verbose else None]
+    used = [handler for handler in handlers if handler is not None] or [logging.NullHandler()]
+    before = LOG.level
+    for handler in used:
+        LOG.addHandler(handler)
+    LOG.setLevel(logging.INFO)
+    started_s = time.monotonic()
+    try:
+        _log_beginning(context)
+        yield
+    except (click.Abort, KeyboardInterrupt):
+        LOG.warning("interrupted after %.1f s", time.monotonic() - started_s)
+        raise
+    except (click.exceptions.Exit, BrokenPipeError):
+        LOG.info("ended after %.1f s", time.monotonic() - started_s)
+        raise
+    except Exception:
+        LOG.exception("failed after %.1f s", time.monotonic() - started_s)
+        raise
+    else:
+        LOG.info("done in %.1f s", time.monotonic() - started_s)
+    finally:
+        LOG.setLevel(before)
+        for handler in used:
+            LOG.removeHandler(handler)
+            handler.close()
+
+
+def _log_beginning(context: click.Context) -> None:
+    from importlib.metadata import PackageNotFoundError, version
+
+    from dbbstation.files.inputs import inputs_so_far
+
+    given = context.obj if isinstance(context.obj, tuple) else shlex.split(command_of(context))[1:]
+    LOG.info("$ %s", shlex.join(["dbbstation", *given]))
+    LOG.info("%s, Python %s, %s, in %s", PROGRAM, platform.python_version(), platform.platform(), Path.cwd())
+    versions = []
+    for package in _VERSIONS:
+        with suppress(PackageNotFoundError):
+            versions.append(f"{package} {version(package)}")
+    LOG.info(", ".join(versions))
+    for name, digest in inputs_so_far().items():
+        LOG.info("settings %s, sha256 %s", name, digest)
+    if command_of(context) != shlex.join(["dbbstation", *given]):
+        LOG.info("with settings, files without folders: %s", command_of(context))
+
+
+def _to_screen() -> logging.Handler:
+    screen = logging.StreamHandler(sys.stderr)
+    screen.setFormatter(logging.Formatter("log: %(message)s"))
+    screen.addFilter(lambda record: not record.exc_info and not getattr(record, "said", False))
+    return screen
+
+
+def _to_file(context: click.Context) -> logging.Handler | None:
+    """Return the handler of the first log that can be written; None where there is to be none."""
+    from logging.handlers import RotatingFileHandler
+
+    named = os.environ.get(VARIABLE)
+    if named == "off":
+        return None
+    for path in [Path(named)] if named else _usual_places(context):
+        # A log is no reason to fail: recordings may lie where nobody may write.
+        with suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = RotatingFileHandler(path, maxBytes=LARGEST_BYTES, backupCount=KEPT, encoding="utf-8")
+            file.setFormatter(_FORM)
+            return file
+    return None
+
+
+def _usual_places(context: click.Context) -> Iterator[Path]:
+    """Beside the session where the command has one; else, or where that cannot be written, the user's folder for logs."""
+    import platformdirs
+
+    beside = folder_of_sessions(context.info_name, context.params)
+    if beside is not None and beside.is_dir():
+        yield beside / FILE
+    yield platformdirs.user_log_path("dbbstation", appauthor=False) / FILE

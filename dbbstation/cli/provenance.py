@@ -1,0 +1,55 @@
+"""The one place that says where the outputs of the command that runs come from."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from click.core import ParameterSource
+
+from dbbstation import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dbbstation.files.provenance import Provenance
+
+PROGRAM = f"dbbstation {__version__}"
+
+_NO_CONTENT = frozenset({"out", "figure", "log", "force", "as_json", "jobs"})
+"""Parameters that say where and in which form results go, or how fast: their content is the same without them. Left out, so
+that the same inputs give the same bytes under every name."""
+
+_GIVEN = frozenset({ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP, ParameterSource.ENVIRONMENT})
+"""Where a value came from that the program does not have by itself; the shop's settings are click's default map."""
+
+
+def provenance() -> Provenance:
+    """Return where the outputs of the command that runs come from, with the inputs that were read so far."""
+    from dbbstation.files.inputs import inputs_so_far
+    from dbbstation.files.provenance import Provenance
+
+    return Provenance(PROGRAM, command_of(click.get_current_context()), inputs_so_far())
+
+
+def command_of(context: click.Context) -> str:
+    """Return what a command was asked, as it can be typed: options of the shop's settings too, files without folders."""
+    path = context.command_path.split()
+    words = ["dbbstation", *(path[1:] if path[:1] == ["dbbstation"] else path)]
+    for parameter in context.command.params:
+        given = context.get_parameter_source(parameter.name or "") in _GIVEN
+        if given and parameter.name not in _NO_CONTENT:
+            words += _words(parameter, context.params.get(parameter.name or ""))
+    return shlex.join(words)
+
+
+def _words(parameter: click.Parameter, value: object) -> Iterator[str]:
+    values = value if isinstance(value, list | tuple) else [value]
+    for each in values:
+        if isinstance(parameter, click.Option):
+            yield parameter.opts[0]
+            if parameter.is_flag:
+                continue
+        yield each.resolve().name if isinstance(each, Path) else str(each)

@@ -1,0 +1,128 @@
+"""`dbbstation settings`: what the shop has set, and where each value comes from."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from dbbstation.files.formats.settings import Settings
+
+
+@click.command()
+@click.argument("folder", required=False, type=click.Path(path_type=Path), metavar="[SESSION]")
+@click.option("--template", is_flag=True, help="Print a settings file with every key as a comment, and stop.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def settings(folder: Path | None, *, template: bool, as_json: bool) -> None:
+    r"""Show the shop's settings: every key, its value, and the file and line that it comes from.
+
+    Settings are looked for in `dbbstation-settings.yaml` beside SESSION, in the folder that holds it, or in the working
+    folder where a command takes no session. Then in `settings.yaml` in the user's configuration folder. The first file
+    that has a key decides. `dbbstation --settings FILE` reads that file alone. An option on the command line holds over
+    all of them, and each command says which options it took from settings.
+
+    \b
+    Examples:
+      dbbstation settings
+      dbbstation settings 2026-11-20-hexapod-7
+      dbbstation settings --template > dbbstation-settings.yaml
+      dbbstation settings 2026-11-20-hexapod-7 --json
+    """
+    from dbbstation.cli.output import print_json
+    from dbbstation.cli.shop import shop_settings
+
+    if template:
+        if folder is not None or as_json:
+            raise click.UsageError("--template prints a settings file and takes nothing else")
+        click.echo(_template(), nl=False)
+        return
+    found = shop_settings()
+    if as_json:
+        print_json(_data(found))
+    else:
+        _print(found)
+
+
+NOT_SET = "not set"
+PROGRAM = "dbbstation"
+
+
+def built_in() -> dict[str, Any]:
+    """Values of the program itself by key, None where it has none; every key of the settings but the tolerances."""
+    from dbbstation.files.formats.number_language import PLAIN
+    from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH
+    from dbbstation.nc.compensate import CHORD_MM
+    from dbbstation.nc.limits import LARGEST_CORRECTION_MM
+    from dbbstation.plan.plan import LARGEST_LOSS_PERCENT
+
+    return {
+        **dict.fromkeys(("instrument", "port", "baud", "serial_number")),
+        **{
+            f"bar.{key}": None
+            for key in ("serial_number", "calibrated_length_mm", "calibrator_uncertainty_mm", "temp_c")
+        },
+        "program.dialect": "linuxcnc",
+        "program.step_deg": STEP_DEG,
+        "program.chord_um": 1e3 * CHORD_MM,
+        "program.clearance_mm": USUAL_APPROACH.clear_mm,
+        "limits.largest_correction_mm": LARGEST_CORRECTION_MM,
+        "limits.largest_loss_percent": LARGEST_LOSS_PERCENT,
+        "numbers.decimal": PLAIN.decimal,
+        "numbers.separator": PLAIN.separator,
+    }
+
+
+def _data(found: Settings) -> dict[str, Any]:
+    values = {}
+    for key, own in built_in().items():
+        setting = found.values.get(key)
+        if setting is None:
+            values[key] = {"value": own, "from": None if own is None else PROGRAM}
+        else:
+            values[key] = {"value": setting.value, "from": setting.origin}
+    tolerances = [
+        {
+            "quantity": one.figure.value,
+            "largest_um": one.largest_um,
+            "tests": list(one.tests),
+            "directions": [direction.value for direction in one.directions],
+        }
+        for one in found.tolerances
+    ]
+    return {
+        "files": [str(path) for path in found.files],
+        "values": values,
+        "tolerances": tolerances,
+        "tolerances_from": found.tolerances_from or None,
+    }
+
+
+def _print(found: Settings) -> None:
+    from dbbstation.cli.output import print_table
+    from dbbstation.cli.tolerances import which_circles
+
+    data = _data(found)
+    rows = []
+    for key, one in data["values"].items():
+        value = NOT_SET if one["value"] is None else str(one["value"]).replace("\t", "tab")
+        rows.append([key, value, one["from"] or ""])
+    print_table(["setting", "value", "from"], rows)
+    for one in data["tolerances"]:
+        click.echo(f"tolerance: {one['quantity']} at most {one['largest_um']:g} µm, {which_circles(one)}")
+    if found.tolerances_from:
+        click.echo(f"tolerances from {found.tolerances_from}")
+    if not found.files:
+        click.echo("no settings file was found; `dbbstation settings --template` prints one", err=True)
+
+
+def _template() -> str:
+    """Return the example of the format with every value commented out: a `#` with nothing after it but the key."""
+    from dbbstation.files.shipped import shipped_folder
+
+    text = (shipped_folder("fixtures") / "settings" / "every-key.yaml").read_text(encoding="utf-8")
+    head, format_line, rest = text.partition("format: dbb-settings/1\n")
+    hint = "# Take away the # in front of what you set; where a line is indented, in front of the line above it too.\n"
+    return head + hint + format_line + re.sub(r"^(?=[^#\n])", "#", rest, flags=re.MULTILINE)

@@ -1,0 +1,52 @@
+"""How numbers are written in tables from elsewhere: decimal sign, and what stands between columns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from dbbstation.errors import InputError, Problem
+
+DECIMALS = (".", ",")
+SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
+
+
+@dataclass(frozen=True)
+class NumberLanguage:
+    """Decimal sign and separator of columns. There is no sign between thousands: `1.000` would have two meanings.
+
+    Attributes:
+        decimal: one of `DECIMALS`.
+        separator: one of `SEPARATORS`.
+
+    Raises:
+        InputError: both are commas: no reader could tell them apart.
+    """
+
+    decimal: str = "."
+    separator: str = ","
+
+    def __post_init__(self) -> None:
+        if self.decimal == self.separator:
+            what = "the decimal sign and the separator of columns are both a comma"
+            raise InputError(
+                [Problem("numbers", 0, 0, what, "give `;` or a tab as the separator, or a dot in numbers")]
+            )
+
+    def number(self, cell: str) -> float:
+        """Return the number that a cell holds; not a number where it is none, or is written with the other sign."""
+        other = next(sign for sign in DECIMALS if sign != self.decimal)
+        try:
+            return math.nan if other in cell else float(cell.replace(self.decimal, "."))
+        except ValueError:
+            return math.nan
+
+    @property
+    def text(self) -> str:
+        """What is expected, in words."""
+        sign = "a comma" if self.decimal == "," else "a dot"
+        return f"the decimal sign is {sign}, columns are separated by a {SEPARATORS[self.separator]}"
+
+
+PLAIN = NumberLanguage()
+"""That of all files that this program writes."""

@@ -1,0 +1,129 @@
+"""The shop's settings: where their files are, what they say, and which line each value comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.errors import InputError, Problem
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+
+    from dbbstation.files.formats.settings_schema import SettingsFile
+    from dbbstation.files.yaml.text import YamlDocument
+    from dbbstation.plan.tolerance import Tolerance
+
+BESIDE = "dbbstation-settings.yaml"
+"""Name of the file beside sessions."""
+
+OF_USER = "settings.yaml"
+"""Name of the file in the user's configuration folder."""
+
+_OPEN = frozenset({"program", "limits"})
+"""Blocks whose keys stand for themselves: two files may each give some. The other blocks are one thing, such as one bar,
+and come from one file whole."""
+
+_PROTOCOL_ENDINGS = (".yaml", ".yml")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One value.
+
+    Attributes:
+        value: text or number.
+        file: that says so.
+        line: in that file, from 1.
+    """
+
+    value: Any
+    file: Path
+    line: int
+
+    @property
+    def origin(self) -> str:
+        """File and line that it comes from, with a colon between."""
+        return f"{self.file}:{self.line}"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What holds, from several files.
+
+    Attributes:
+        values: by key with dots, such as `limits.largest_correction_mm`; a key that no file has is absent.
+        tolerances: what circles may have.
+        tolerances_from: where these come from, `file:line`; empty where no file has any.
+        files: that were read, the strongest first.
+    """
+
+    values: Mapping[str, Setting] = field(default_factory=dict)
+    tolerances: tuple[Tolerance, ...] = ()
+    tolerances_from: str = ""
+    files: tuple[Path, ...] = ()
+
+
+def settings_files(beside: Path) -> list[Path]:
+    """Return the settings files that exist, the strongest first: the one in the folder `beside`, the user's."""
+    import platformdirs  # noqa: PLC0415 - only commands that take settings look for them
+
+    user = platformdirs.user_config_path("dbbstation", appauthor=False, roaming=True) / OF_USER
+    return [path for path in (beside / BESIDE, user) if path.is_file()]
+
+
+def read_settings(files: Iterable[Path]) -> Settings:
+    """Read settings files; a value of an earlier file holds over that of a later one.
+
+    Raises:
+        InputError: every fault of every file with its place.
+    """
+    paths, faults = tuple(files), list[Problem]()
+    if not paths:
+        return Settings()
+    read = [_read(path, faults) for path in paths]
+    if faults:
+        raise InputError(faults)
+    values: dict[str, Setting] = {}
+    tolerances: tuple[Tolerance, ...] = ()
+    told = ""
+    for path, found in zip(paths, read, strict=True):
+        if found is None:
+            continue
+        file, document = found
+        blocks = {key.partition(".")[0] for key in values} - _OPEN
+        own = {key: Setting(value, path, _line(document, key)) for key, value in _flat(file, path)}
+        values |= {k: one for k, one in own.items() if k not in values and k.partition(".")[0] not in blocks}
+        if file.tolerances is not None and not told:
+            tolerances = tuple(one.to_domain() for one in file.tolerances)
+            told = f"{path}:{_line(document, 'tolerances')}"
+    return Settings(values, tolerances, told, paths)
+
+
+def _read(path: Path, faults: list[Problem]) -> tuple[SettingsFile, YamlDocument] | None:
+    from dbbstation.files.formats.settings_schema import SettingsFile  # noqa: PLC0415 - the same
+    from dbbstation.files.yaml.schema import read_document, validate  # noqa: PLC0415 - without a file, nothing to validate
+
+    document = read_document(path, SettingsFile, faults)
+    file = None if document is None else validate(document, SettingsFile, faults)
+    return None if document is None or file is None else (file, document)
+
+
+def _flat(file: SettingsFile, path: Path) -> Iterable[tuple[str, Any]]:
+    """Values by key with dots; the path of a protocol file from the folder of the settings."""
+    data = file.model_dump(exclude_unset=True, exclude_none=True, exclude={"format", "tolerances"})
+    for key, value in data.items():
+        if isinstance(value, dict):
+            yield from ((f"{key}.{inner}", each) for inner, each in value.items())
+        elif key == "instrument" and value.endswith(_PROTOCOL_ENDINGS):
+            yield key, str(path.parent / value)
+        else:
+            yield key, value
+
+
+def _line(document: YamlDocument, key: str) -> int:
+    """Line of a key; of its block where it is a default of that."""
+    place = tuple(key.split("."))
+    places = document.key_places
+    return places.get(place, places.get(place[:1], (1, 1)))[0]

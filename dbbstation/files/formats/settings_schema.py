@@ -1,0 +1,116 @@
+"""`dbb-settings/1`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from dbbstation.files.formats.quantities import Quantity, TemperatureDegc
+from dbbstation.files.yaml.schema import Schema
+from dbbstation.nc.limits import LARGEST_ALLOWED_MM
+from dbbstation.plan.circle import Direction
+from dbbstation.plan.tolerance import CircleFigure, Tolerance
+
+_UM_PER = {"µm": 1.0, "mm": 1e3}
+
+_Word = Annotated[str, Field(min_length=1)]
+
+
+class BarSettings(Schema):
+    """The ball bar of the shop, as a session file has it."""
+
+    serial_number: str = ""
+    """Of the bar."""
+    calibrated_length_mm: Annotated[float, Quantity("mm", 20, 2_000)]
+    """Distance between the ball centres [mm]; held against the plan's radii, never added to readings."""
+    calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
+    """Standard uncertainty of that length [mm]."""
+    temp_c: TemperatureDegc | None = None
+    """Temperature of the bar at its calibration [degC]."""
+
+
+class ProgramSettings(Schema):
+    """How NC programs are written."""
+
+    dialect: _Word | None = None
+    """Language of the control."""
+    step_deg: Annotated[float, Quantity("deg", 0.01, 5.0)] | None = None
+    """Angle between points of a circle [deg]."""
+    chord_um: Annotated[float, Quantity("µm", 0.001, 1000.0)] | None = None
+    """Greatest distance between a straight move and the path [µm]."""
+    clearance_mm: Annotated[float, Quantity("mm", 0.1, 500.0, or_zero=True)] | None = None
+    """Height of rapid moves above the first point [mm]."""
+
+
+class LimitSettings(Schema):
+    """What is refused."""
+
+    largest_correction_mm: Annotated[float, Quantity("mm", 1e-3, LARGEST_ALLOWED_MM)] | None = None
+    """A model that shifts any point by more is refused [mm]."""
+    largest_loss_percent: Annotated[float, Quantity("%", 0.001, 100, or_zero=True)] | None = None
+    """A run that lost more of its samples is repeated, where the plan does not say [%]."""
+
+
+class NumberSettings(Schema):
+    """How numbers are written in tables from elsewhere."""
+
+    decimal: Literal[".", ","] | None = None
+    """Decimal sign."""
+    separator: Literal[",", ";", "\t"] | None = None
+    """What stands between columns; absent: a semicolon with a decimal comma, else a comma."""
+
+    @model_validator(mode="after")
+    def _apart(self) -> "NumberSettings":
+        if self.decimal is not None and self.decimal == self.separator:
+            raise PydanticCustomError("alike", "decimal sign and separator are both a comma; give `;` or a tab", {})
+        return self
+
+
+class ToleranceSettings(Schema):
+    """What some circles may have."""
+
+    quantity: Literal[tuple(map(str, CircleFigure))]  # type: ignore[valid-type]  # the figures have one list
+    """Figure of the circle."""
+    largest: Annotated[float, Field(gt=0.0)]
+    """Greatest size within tolerance, in `unit`."""
+    unit: Literal["µm", "mm"]
+    """Unit of `largest`."""
+    tests: tuple[_Word, ...] = ()
+    """Tests that it holds for; absent: all."""
+    directions: tuple[Literal["ccw", "cw"], ...] = ()
+    """Senses of travel that it holds for; absent: both."""
+
+    @model_validator(mode="after")
+    def _plausible(self) -> "ToleranceSettings":
+        Quantity("µm", 0.01, 5_000).check(self.largest * _UM_PER[self.unit])
+        return self
+
+    def to_domain(self) -> Tolerance:
+        """Return the tolerance in micrometres."""
+        directions = tuple(map(Direction, self.directions))
+        return Tolerance(CircleFigure(self.quantity), self.largest * _UM_PER[self.unit], self.tests, directions)
+
+
+class SettingsFile(Schema):
+    """What holds in a shop where the command line says nothing else; every key but the format may be absent."""
+
+    format: Literal["dbb-settings/1"]
+    """Name and version of this format."""
+    instrument: _Word | None = None
+    """Name of an instrument, or path of a protocol file from this file's folder."""
+    port: _Word | None = None
+    """Port that the instrument is connected to, or a URL."""
+    baud: Annotated[int, Field(ge=1)] | None = None
+    """Baud rate, where the instrument is not set to the usual one."""
+    serial_number: _Word | None = None
+    """Of the machine; noted in every session."""
+    bar: BarSettings | None = None
+    """The ball bar."""
+    program: ProgramSettings = ProgramSettings()
+    """How NC programs are written."""
+    limits: LimitSettings = LimitSettings()
+    """What is refused."""
+    numbers: NumberSettings | None = None
+    """How numbers are written in tables from elsewhere."""
+    tolerances: tuple[ToleranceSettings, ...] | None = None
+    """What circles may have."""

@@ -1,0 +1,79 @@
+"""What a circle may have: the shop's limits for the figures of a circle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from dbbstation.plan.circle import Direction
+
+
+class CircleFigure(StrEnum):
+    """Figures of a circle that may have a tolerance."""
+
+    CIRCULAR_DEVIATION = "circular-deviation"
+    """G: greatest less least deviation from the least-squares circle [ISO 230-4 3.2]."""
+    CENTRE_DEVIATION = "centre-deviation"
+    """Distance between the least-squares centre and the commanded one [CAL Table III]."""
+    MEAN_RADIAL_ERROR = "mean-radial-error"
+    """Mean length of the bar less its nominal length about the commanded centre, by its size [CAL Table III]."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A limit for one figure of some circles.
+
+    Attributes:
+        figure: which.
+        largest_um: greatest size that is within tolerance [µm].
+        tests: names of the tests it holds for; empty for all.
+        directions: senses of travel it holds for; empty for both.
+    """
+
+    figure: CircleFigure
+    largest_um: float
+    tests: tuple[str, ...] = ()
+    directions: tuple[Direction, ...] = ()
+
+    def holds_for(self, test: str, direction: str) -> bool:
+        """Whether a circle of this test and direction has this limit."""
+        return (not self.tests or test in self.tests) and (not self.directions or direction in self.directions)
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The circle that comes nearest to a tolerance, or exceeds it most.
+
+    Attributes:
+        tolerance: the limit.
+        run: name of the run, such as a-ccw-1.
+        size_um: size of its figure [µm].
+    """
+
+    tolerance: Tolerance
+    run: str
+    size_um: float
+
+    @property
+    def within(self) -> bool:
+        """Whether it is no larger than the limit."""
+        return self.size_um <= self.tolerance.largest_um
+
+
+def worst(tolerance: Tolerance, runs: Iterable[tuple[str, str, int, Mapping[CircleFigure, float]]]) -> Worst | None:
+    """Return the run with the largest figure that a tolerance holds for; None where it holds for none of them.
+
+    Args:
+        tolerance: the limit.
+        runs: test, direction, repeat and figures [µm] of each.
+    """
+    held = [
+        Worst(tolerance, f"{test}-{direction}-{repeat}", abs(figures[tolerance.figure]))
+        for test, direction, repeat, figures in runs
+        if tolerance.holds_for(test, direction)
+    ]
+    return max(held, key=lambda one: one.size_um, default=None)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.exclude import exclude_option
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.source_files import source_file_option
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     metavar="SOURCE.PARAMETER,...",
     help="Parameters to hold at nominal, as many as the tests cannot identify.",
 )
-@exclude_option
+@chosen_tests_options
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
 @figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
@@ -56,6 +56,7 @@ def calibrate(
     law_over_time: bool,
     method: str,
     prescribe: str | None,
+    tests: tuple[str, ...],
     exclude: tuple[str, ...],
     out: Path | None,
     figure: Path | None,
@@ -110,7 +111,7 @@ def calibrate(
             remedy=f"name one such as {KINEMATIC_SOURCES[0]}, or leave --sources out",
         )
     with count_bar("reading runs") as reading:
-        recorded = load_sessions(sessions, exclude, reading)
+        recorded = load_sessions(sessions, exclude, reading, tests)
     for warning in recorded.warnings:
         say(f"note: {warning}")
     fitted = fitted if law_over_time else _following_thermometers(fitted, recorded.observations)

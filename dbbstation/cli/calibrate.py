@@ -249,7 +249,7 @@ def _print_misfit(summary: Mapping[str, Any]) -> None:
 
 
 def _print_parameters(summary: Mapping[str, Any]) -> None:
-    from dbbstation.cli.output import print_table
+    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
 
     rows = []
     for source in summary["sources"]:
@@ -259,8 +259,9 @@ def _print_parameters(summary: Mapping[str, Any]) -> None:
             value, uncertainty, unit = number["value"], number["uncertainty"], number["unit"]
             if unit == "mm" and source["name"] not in IN_MM:
                 value, uncertainty, unit = 1e3 * value, 1e3 * uncertainty, "µm"
-            rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), value, "±", uncertainty, unit])
-    print_table(["source", "parameter", "value", "", "u", "unit"], rows)
+            known = [value, uncertainty, COVERAGE_FACTOR * uncertainty, unit]
+            rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), *known])
+    print_table(["source", "parameter", "value", "u", EXPANDED, "unit"], rows)
 
 
 SAID_OF_SCATTER = {

@@ -77,6 +77,9 @@ def set_up() -> bool:
             file=sys.stderr,
         )
         return False
+    print("compiling the numerical loops for this computer, about ten seconds ...", file=sys.stderr, flush=True)
+    if subprocess.call([PYTHON, "-m", "dbbstation.prepare"], cwd=HERE) != 0:
+        print("that failed; the first command that needs them will say why", file=sys.stderr)
     STAMP.write_text(wanted, encoding="utf-8")
     return True
 

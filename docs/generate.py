@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.texts import Texts
 
-NOT_PUBLIC = {"cli", "tui", "demo", "__main__"}
-"""Top-level modules that nobody imports: commands, screens, the demonstration."""
+NOT_PUBLIC = {"cli", "tui", "demo", "prepare", "__main__"}
+"""Top-level modules that nobody imports: commands, screens, what is run once."""
 
 _UNWRAPPED = "\b"
 

@@ -92,14 +92,13 @@ def calibrate(
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.errors import ModelError
-    from dbbstation.files.atomic import refuse_existing, write_bytes
+    from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source, sources_of
     from dbbstation.recorded import load_sessions
     from dbbstation.sources.registry import sources_named
 
-    for path in filter(None, (out, figure)):
-        refuse_existing(path, force=force)
+    refuse_outputs((out, figure), force=force)
     chosen = KINEMATIC_SOURCES if sources is None else tuple(filter(None, map(str.strip, sources.split(","))))
     every = every_source(source_files)
     for name in set(sources_of(source_files, every)) - set(chosen):

@@ -44,7 +44,7 @@ def check(
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
     its runs: hashes, checksums, units, and whether the machine can travel the plan's circles.
 
-    A plan and a machine together are also dry-run: every program that `dbbstation program` would write with the same options
+    Plans and one machine together are also dry-run: every program that `dbbstation program` would write with the same options
     is held against the travel of axes, angles and struts and against the feeds, on its whole way. All faults are listed.
 
     \b
@@ -70,14 +70,16 @@ def check(
 
     known = every_source(source_files)
     results = [check_one(file, known) for file in files]
+    machines = _sound(results, "dbb-machine")
+    # Of several machines nobody has said which the plans are for.
     runs = [
         _dry_run(plan, machine, tests, exclude, step_deg, approach_of(clearance_mm, bar_stays_on=bar_stays_on))
         for plan in _sound(results, "dbb-plan")
-        for machine in _sound(results, "dbb-machine")
+        for machine in (machines if len(machines) == 1 else ())
     ]
     if (tests or exclude) and not runs:
         raise click.UsageError(
-            "--test and --exclude choose tests of a dry run: give a plan and a machine without faults"
+            "--test and --exclude choose tests of a dry run: give plans and one machine, without faults"
         )
     problems = [problem for result in results for problem in result.problems]
     problems += [problem for run in runs for problem in run.problems]

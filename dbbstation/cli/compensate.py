@@ -23,9 +23,9 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     metavar="D",
     default="linuxcnc",
     show_default=True,
-    help="Language to write.",
+    help="Language to write: a name, or FILE.py.",
 )
-@click.option("--from", "source", metavar="D", help="Language of PROGRAM [default: by its extension].")
+@click.option("--from", "source", metavar="D", help="Language of PROGRAM, likewise [default: by its extension].")
 @click.option("--out", type=_FILE, required=True, help="File to write.")
 @click.option("--start", metavar="X,Y,Z,A,B,C", help="Pose before the program, in mm and degrees.")
 @shop_option(
@@ -74,14 +74,16 @@ def compensate(
     """
     from dbbstation.cli.programs import loaded_inverse, origin_of, parsed_pose, print_programs, read_source
     from dbbstation.files.atomic import refuse_existing, write_text
+    from dbbstation.files.own_dialects import dialect_given
     from dbbstation.nc.export import compensated_program
-    from dbbstation.nc.registry import dialect_named, dialect_of_file
+    from dbbstation.nc.registry import dialect_of_file
 
     pose = None if start is None else parsed_pose(start)
     refuse_existing(out, force=force)
-    written_in = dialect_named(dialect)
-    reader = dialect_of_file(str(program_file)) if source is None else dialect_named(source)
-    path = reader.read(read_source(program_file), str(program_file), start=pose)
+    written_in = dialect_given(dialect)
+    text = read_source(program_file)
+    reader = dialect_of_file(str(program_file), text) if source is None else dialect_given(source)
+    path = reader.read(text, str(program_file), start=pose)
     inverse = loaded_inverse(model_file, time_s, source_files, largest_mm)
     done = compensated_program(
         path,

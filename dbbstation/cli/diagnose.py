@@ -78,14 +78,13 @@ def diagnose(
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.diagnosed import diagnose_sessions
-    from dbbstation.files.atomic import refuse_existing, write_bytes
+    from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source
 
     if keep_unexplained and out is None:
         raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
-    for path in filter(None, (out, figure)):
-        refuse_existing(path, force=force)
+    refuse_outputs((out, figure), force=force)
     candidates = [name.strip() for name in sources.split(",")] if sources else None
     known = every_source(source_files)
     with count_bar("reading runs") as reading, stage_bar("diagnosis", STAGES) as progress:

@@ -24,7 +24,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     metavar="D",
     default="linuxcnc",
     show_default=True,
-    help="Language of the control.",
+    help="Language of the control: a name, or FILE.py.",
 )
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
 @click.option("--model", "model_file", type=_FILE, help="Compensate with this calibrated model.")
@@ -76,10 +76,10 @@ def program(
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
+    from dbbstation.files.own_dialects import dialect_given
     from dbbstation.nc.export import circle_programs
-    from dbbstation.nc.registry import dialect_named
 
-    written_in = dialect_named(dialect)
+    written_in = dialect_given(dialect)
     plan, machine = read_plan(plan_file), read_machine(machine_file)
     inverse = None if model_file is None else loaded_inverse(model_file, time_s, source_files, largest_mm)
     with count_bar("programs") as writing:

@@ -9,7 +9,6 @@ import click
 
 if TYPE_CHECKING:
     from dbbstation.files.recordings.session import RunEntry, SessionFolder
-    from dbbstation.files.recordings.session_writer import SessionWriter
 
 _FOLDER = click.argument("folder", type=click.Path(path_type=Path), metavar="FOLDER")
 _RUN = click.argument("run", metavar="RUN")
@@ -18,7 +17,7 @@ _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result a
 
 @click.group()
 def session() -> None:
-    """List the runs of a session, accept or reject them afterwards, or seal recordings made elsewhere.
+    """List the runs of a session, accept or reject them afterwards, take in or seal recordings.
 
     \b
     Examples:
@@ -87,8 +86,7 @@ def accept(folder: Path, run: str, *, as_json: bool) -> None:
     Examples:
       dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
     """  # noqa: D301 (click reads the escape)
-    writer, entry = _opened(folder, run)
-    _tell(run, writer.judge(entry, accepted=True), as_json=as_json)
+    _tell(run, _judged(folder, run, accepted=True), as_json=as_json)
 
 
 @session.command()
@@ -105,8 +103,36 @@ def reject(folder: Path, run: str, *, reason: str, as_json: bool) -> None:
     """  # noqa: D301 (click reads the escape)
     if not reason.strip():
         raise click.UsageError("say why with --reason: whoever reads the session later will ask")
-    writer, entry = _opened(folder, run)
-    _tell(run, writer.judge(entry, accepted=False, reason=reason.strip()), as_json=as_json)
+    _tell(run, _judged(folder, run, accepted=False, reason=reason.strip()), as_json=as_json)
+
+
+@session.command("take-in")
+@_FOLDER
+@_JSON
+def take_in(folder: Path, *, as_json: bool) -> None:
+    """List sealed runs that lie in the session's folder and are in no list.
+
+    `dbbstation check` names them. They may come from a second program that wrote into the folder, or from a session file
+    that was restored. They are `complete` then: accept or reject each.
+
+    \b
+    Examples:
+      dbbstation session take-in 2026-11-20-hexapod-7
+      dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
+    """  # noqa: D301 (click reads the escape)
+    from dbbstation.cli.output import print_json
+    from dbbstation.files.recordings.session import unlisted_sealed
+    from dbbstation.files.recordings.session_writer import SessionWriter
+
+    with SessionWriter.open(folder) as writer:
+        taken = [_name(writer.take_in(path)) for path in unlisted_sealed(writer.session)]
+    if as_json:
+        print_json({"session": str(folder), "taken_in": taken})
+        return
+    for name in taken:
+        click.echo(f"{name}: complete, accept or reject it")
+    if not taken:
+        click.echo("every sealed run is listed already")
 
 
 @session.command()
@@ -130,7 +156,7 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
 
     found = sealing(folder)
     if found.files and not dry_run:
-        write_text(found.path, found.text, force=True)
+        write_text(found.path, found.text, force=True, rewrites=True)
     if as_json:
         print_json({"session": str(found.path), "sealed": [] if dry_run else found.files, "without_hash": found.files})
         return
@@ -164,11 +190,12 @@ def _missing(read: SessionFolder) -> list[tuple[str, str]]:
     return [(name, direction.value) for name, direction in planned if (name, direction) not in done]
 
 
-def _opened(folder: Path, run: str) -> tuple[SessionWriter, RunEntry]:
-    """Open the session for writing and find a run by its name.
+def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunEntry:
+    """Find a run by its name and note what became of it.
 
     Raises:
         InputError: faults of the session, or no such run in it.
+        OutputError: another process writes into the session.
     """
     import difflib
 
@@ -176,10 +203,11 @@ def _opened(folder: Path, run: str) -> tuple[SessionWriter, RunEntry]:
     from dbbstation.files.recordings.session import read_session
     from dbbstation.files.recordings.session_writer import SessionWriter
 
-    by_name = {_name(entry): entry for entry in read_session(folder).runs}
-    if run not in by_name:
-        near = difflib.get_close_matches(run, by_name, n=1, cutoff=0.6)
+    names = [_name(entry) for entry in read_session(folder).runs]
+    if run not in names:
+        near = difflib.get_close_matches(run, names, n=1, cutoff=0.6)
         remedy = f"did you mean {near[0]}?" if near else "`dbbstation session list` names them"
         raise InputError([Problem(str(folder), 0, 0, f"the session has no run {run}", remedy)])
-    writer = SessionWriter.open(folder)
-    return writer, next(entry for entry in writer.runs if _name(entry) == run)
+    with SessionWriter.open(folder) as writer:
+        entry = next(entry for entry in writer.runs if _name(entry) == run)
+        return writer.judge(entry, accepted=accepted, reason=reason)

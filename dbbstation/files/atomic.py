@@ -15,31 +15,38 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import OutputError
+from dbbstation.files.inputs import was_read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
 _LOG = logging.getLogger(__name__)
 
 _MARK = ".new"
 
 
-def write_text(path: Path, text: str, *, force: bool = False) -> None:
-    """Write a text file, UTF-8 with LF.
-
-    Raises:
-        OutputError: it exists and `force` is not given, or it cannot be written; the old file is then untouched.
-    """
-    write_bytes(path, text.encode(), force=force)
+def write_text(path: Path, text: str, *, force: bool = False, rewrites: bool = False) -> None:
+    """Write a text file, UTF-8 with LF, as `write_bytes` does."""
+    write_bytes(path, text.encode(), force=force, rewrites=rewrites)
 
 
-def write_bytes(path: Path, data: bytes, *, force: bool = False) -> None:
+def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool = False) -> None:
     """Write a file.
 
+    Args:
+        path: of the file.
+        data: what it will hold.
+        force: replace a file that exists.
+        rewrites: the file is one that was read to be changed, such as a session file.
+
     Raises:
-        OutputError: it exists and `force` is not given, or it cannot be written; the old file is then untouched.
+        OutputError: it exists and `force` is not given, the same command has read it, or it cannot be written; the old file
+            is then untouched.
     """
     refuse_existing(path, force=force)
+    if not rewrites:
+        _refuse_input(path)
+    path = path.resolve()  # a link stays a link, what it leads to is replaced
     with _told(path):
         temporary = _temporary(path)
         try:
@@ -65,7 +72,7 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool 
     """
     if not folder.exists():
         with _told(folder):
-            folder.parent.mkdir(parents=True, exist_ok=True)
+            _make_parents(folder.parent)
             made = Path(tempfile.mkdtemp(prefix=f".{folder.name}", suffix=_MARK, dir=folder.parent))
             try:
                 made.chmod(_usual_mode(0o777))
@@ -80,6 +87,7 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool 
     for name in files:
         if not name.endswith("/"):
             _refuse_overwriting(folder / name, force=force)
+            _refuse_input(folder / name)
     with _told(folder):
         _replace_all(folder, files)
     for name in files:
@@ -98,11 +106,54 @@ def refuse_existing(path: Path, *, force: bool) -> None:
         raise OutputError(what, where=str(path), remedy="make the folder, or name another")
 
 
+def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:
+    """Refuse what cannot be written or would be overwritten, of all outputs of a command that are asked for.
+
+    Raises:
+        OutputError: as `refuse_existing`, or two outputs have one name.
+    """
+    named: set[Path] = set()
+    for path in paths:
+        if path is None:
+            continue
+        refuse_existing(path, force=force)
+        if path.resolve() in named:
+            raise OutputError("two outputs have this name", where=str(path), remedy="name another file for one of them")
+        named.add(path.resolve())
+
+
+def _refuse_input(path: Path) -> None:
+    """Never write over what the same command has read: `--force` is meant for results of an earlier one."""
+    if was_read(path):
+        what = "this file was read just now: the result would take its place"
+        raise OutputError(what, where=str(path), remedy="name another file")
+
+
 def _refuse_overwriting(path: Path, *, force: bool) -> None:
     if path.is_dir():
         raise OutputError("this is a folder, a file cannot be written there", where=str(path), remedy="name a file")
+    if path.is_symlink() and not path.exists():
+        what = f"this is a link to {path.readlink()}, which is not there"
+        raise OutputError(what, where=str(path), remedy="name the file itself")
+    if path.exists() and not path.is_file():
+        raise OutputError("this is a device or a pipe, no file", where=str(path), remedy="name a file")
     if path.exists() and not force:
         raise OutputError("the file exists already", where=str(path), remedy="give --force to replace it")
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove the temporary files in a folder that a power cut left; only where nobody else writes into it."""
+    for left in folder.glob(f".*{_MARK}"):
+        if left.is_file() and not left.is_symlink():
+            left.unlink(missing_ok=True)
+
+
+def _make_parents(folder: Path) -> None:
+    """Make a folder and those that it needs, so that all of them outlast a power cut."""
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for made in missing:
+        sync_folder(made.parent)
 
 
 def sync_folder(folder: Path) -> None:

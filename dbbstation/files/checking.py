@@ -14,7 +14,14 @@ from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.run_csv import PART, read_run
-from dbbstation.files.recordings.session import SESSION_FILE, RunState, SessionFolder, no_session, parse_session
+from dbbstation.files.recordings.session import (
+    SESSION_FILE,
+    RunState,
+    SessionFolder,
+    no_session,
+    parse_session,
+    unlisted_sealed,
+)
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.trace.loss import lost_samples
 
@@ -163,6 +170,10 @@ def _session(checked: Checked) -> None:
             # A run that died before its first sample is no fault of the session.
             found = checked.warnings if run.state is RunState.RECORDING else checked.problems
             found += error.problems
+    for path in unlisted_sealed(session):
+        what = "this sealed run is in no list: the session does not use it"
+        remedy = "`dbbstation session take-in` lists it, to be accepted or rejected"
+        checked.warnings.append(Problem(str(path), 0, 0, what, remedy))
     try:
         session.plan.check(session.machine)
     except TravelError as error:

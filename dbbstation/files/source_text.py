@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import stat
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
-from dbbstation.files.inputs import note_input
+from dbbstation.files.inputs import note_input, note_read
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-def read_bytes(path: Path, faults: list[Problem], *, is_input: bool = True) -> bytes | None:
+LARGEST_BYTES = 2_000_000_000
+"""Largest file that is read: an hour at a hundred thousand readings a second makes about as much."""
+
+
+def read_bytes(
+    path: Path, faults: list[Problem], largest: int = LARGEST_BYTES, *, is_input: bool = True
+) -> bytes | None:
     """Return a file's bytes, or None with the reason added to `faults`.
+
+    Regular files only: a pipe would be waited for and a device never ends.
 
     Args:
         path: of the file.
         faults: take the reason.
+        largest: number of bytes that are read at the most.
         is_input: outputs name it among their inputs; not so where the hash of the file stands in another input.
     """
     try:
-        data = path.read_bytes()
+        data = _bounded(path, faults, largest)
     except FileNotFoundError:
         faults.append(Problem(str(path), 0, 0, "there is no such file", "check the path"))
     except IsADirectoryError:
@@ -29,10 +39,30 @@ def read_bytes(path: Path, faults: list[Problem], *, is_input: bool = True) -> b
         why = (error.strerror or "unknown reason").lower()
         faults.append(Problem(str(path), 0, 0, f"cannot be read: {why}", "check its permissions and the disk"))
     else:
-        if is_input:
-            note_input(path, data)
+        if data is not None:
+            note_read(path)
+            if is_input:
+                note_input(path, data)
         return data
     return None
+
+
+def _bounded(path: Path, faults: list[Problem], largest: int) -> bytes | None:
+    found = path.stat()
+    if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+        what = "this is a pipe or a device, a file is needed"
+        faults.append(Problem(str(path), 0, 0, what, "write it to a file first"))
+        return None
+    if found.st_size > largest:
+        what = f"the file has {found.st_size:,} bytes, at most {largest:,} are read"
+        faults.append(Problem(str(path), 0, 0, what, "check that it is the file you mean"))
+        return None
+    with path.open("rb") as file:
+        data = file.read(largest + 1)
+    if len(data) > largest:
+        faults.append(Problem(str(path), 0, 0, f"the file goes on beyond {largest:,} bytes", "check which file it is"))
+        return None
+    return data
 
 
 def decode(data: bytes, file: str, faults: list[Problem]) -> str | None:

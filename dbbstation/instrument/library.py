@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 
+from dbbstation.catalogue import looked_up
 from dbbstation.errors import InputError, InstrumentError, Problem
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml.schema import validate
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.instrument.protocol import Protocol
+
+HOW_TO_ADD = "or give a .yaml file of your own"
+"""What a name that nobody knows may lack."""
 
 
 def instruments_folder() -> Path:
@@ -32,15 +35,10 @@ def load_instrument(name_or_file: str | Path) -> Protocol:
     path = Path(name_or_file)
     if path.suffix in {".yaml", ".yml"}:
         return read_protocol(path)
-    name = str(name_or_file)
-    known = known_instruments()
-    if name not in known:
-        near = get_close_matches(name, known, n=1)
-        raise InstrumentError(
-            f"no instrument is called {name!r}",
-            remedy=f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}; or give a .yaml file",
-        )
-    return read_protocol(instruments_folder() / f"{name}.yaml")
+    files = {name: instruments_folder() / f"{name}.yaml" for name in known_instruments()}
+    return read_protocol(
+        looked_up(str(name_or_file), files, called="instrument", error=InstrumentError, how_to_add=HOW_TO_ADD)
+    )
 
 
 def at_rate(protocol: Protocol, rate_hz: float | None) -> Protocol:

@@ -7,9 +7,8 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, TypeVar, cast
-
-import numba
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -32,7 +31,7 @@ def compiled(kernel: Kernel) -> Kernel:
     The kernel runs without Python's global lock, so that `in_blocks` can run it on all cores. Numba's own
     parallel loops are not used: their default thread layer aborts the process when two threads enter it.
     """
-    return cast("Kernel", numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=set(REORDER))(kernel))
+    return cast("Kernel", _Kernel(kernel, cache=True, nogil=True))
 
 
 def inlined(part: Kernel) -> Kernel:
@@ -41,7 +40,43 @@ def inlined(part: Kernel) -> Kernel:
     Seen from inside the kernel its work arrays have constant shapes and do not overlap: only so does the compiler
     turn loops into vector instructions (twice the speed of calls).
     """
-    return cast("Kernel", numba.njit(forceinline=True, error_model="numpy", fastmath=set(REORDER))(part))
+    return cast("Kernel", _Kernel(part, forceinline=True))
+
+
+class _Kernel:
+    """A loop that reaches the compiler when it is called: importing that takes longer than most commands in all.
+
+    Args:
+        function: the loop.
+        options: of the compiler.
+    """
+
+    def __init__(self, function: Callable[..., Any], **options: bool) -> None:
+        self._function = function
+        self._options = options
+        self._dispatcher: Callable[..., Any] | None = None
+
+    def __call__(self, *arguments: Any) -> Any:  # noqa: ANN401 - as the loop has them
+        """Run the loop."""
+        return (self._dispatcher or self.dispatcher())(*arguments)
+
+    def dispatcher(self) -> Callable[..., Any]:
+        """Return what the compiler makes of the loop, and of the parts that it calls."""
+        with _COMPILING:
+            if self._dispatcher is None:
+                import numba  # noqa: PLC0415 - takes a third of a second
+
+                function = cast("FunctionType", self._function)
+                seen = {name: function.__globals__.get(name) for name in function.__code__.co_names}
+                parts = {name: part.dispatcher() for name, part in seen.items() if isinstance(part, _Kernel)}
+                whole = FunctionType(function.__code__, {**function.__globals__, **parts})
+                how: Any = {"error_model": "numpy", "fastmath": set(REORDER), **self._options}
+                self._dispatcher = cast("Callable[..., Any]", numba.njit(**how)(whole))
+            return self._dispatcher
+
+
+_COMPILING = threading.RLock()
+"""Threads that call a kernel first at the same time compile it once."""
 
 
 def in_blocks(kernel: Callable[[int, int], None], count: int) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.sources.contract import Motion, Setup
+from dbbstation.trace.columns import each, temperatures
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -74,8 +75,7 @@ class Observation:
             is_path=True,
             kept=slice(before, None),
             time_s=time,
-            temperature_degc={name: _held_back(values, before) for name, values in raw.temperature_degc.items()},
-            motor_current_a=None if raw.motor_current_a is None else _held_back(raw.motor_current_a, before),
+            logged=each(raw.logged, lambda values: _held_back(values, before)),
             setup=setup,
             put_up=None if self.setup.place_known else self._standing(None if time is None else time[0]),
             reading_mm=_held_back(raw.length_mm, before),
@@ -90,7 +90,7 @@ class Observation:
             poses=np.tile(pose, (STANDING, 1)),
             is_path=True,
             time_s=None if until_s is None else until_s + np.arange(1.0 - STANDING, 1.0),
-            temperature_degc={name: np.repeat(values[:1], STANDING) for name, values in raw.temperature_degc.items()},
+            logged=each(temperatures(raw.temperature_degc), lambda values: np.repeat(values[:1], STANDING)),
             setup=self.setup,
             reading_mm=np.repeat(raw.length_mm[:1], STANDING),
         )

@@ -33,14 +33,14 @@ def commanded_poses(text: str, file: str, observation: Observation) -> NDArray[n
 
     Args:
         text: the program that was run.
-        file: its name; the extension tells the dialect.
+        file: its name; the extension tells the dialect, or what the program holds.
         observation: the run that it commanded.
 
     Raises:
         InputError: the program cannot be read, or does not run this circle.
-        StationError: no dialect has that extension.
+        StationError: no dialect has that extension, or several have it.
     """
-    toolpath = dialect_of_file(file).read(text, file)
+    toolpath = dialect_of_file(file, text).read(text, file)
     phi_deg = np.concatenate([observation.lead_in_deg, observation.raw.phi_deg])
     return poses_at_progress(toolpath, observation.raw.circle, phi_deg)
 

@@ -42,6 +42,13 @@ class Dialect(ABC):
         toolpath has `numbers`, its first and last line that are no comment carry them.
         """
 
+    def is_in(self, text: str) -> bool:  # noqa: ARG002
+        """Whether a program may be in this language; asked where several dialects have files of one ending.
+
+        A dialect that shares its ending looks for what only it has, such as the first line of its programs.
+        """
+        return True
+
     @abstractmethod
     def read(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
         """Return what a program commands.

@@ -1,33 +1,41 @@
-"""Every dialect by name: one file each in `dialects/`, found by looking, not by a list."""
+"""Every dialect by name: those of the package, found by looking in `dialects/`, and those of installed packages."""
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from functools import cache
-from inspect import getmembers, isabstract, isclass
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-import dbbstation.nc.dialects
-from dbbstation.errors import StationError
+from dbbstation.catalogue import added, in_folders, installed, looked_up
+from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.nc import dialects
 from dbbstation.nc.dialect import Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+GROUP = "dbbstation.dialects"
+"""Entry points of this group name classes that derive from `Dialect`."""
+
+HOW_TO_ADD = "one of your own is given as its file, FILE.py, or its package installed"
+"""What a name that nobody knows may lack."""
+
 
 @cache
 def known_dialects() -> Mapping[str, Dialect]:
-    """All dialects of the package, sorted by name."""
-    found: dict[str, Dialect] = {}
-    for module in pkgutil.iter_modules(dbbstation.nc.dialects.__path__):
-        content = importlib.import_module(f"dbbstation.nc.dialects.{module.name}")
-        for _, member in getmembers(content, isclass):
-            own = member.__module__ == content.__name__
-            if own and issubclass(member, Dialect) and not isabstract(member):
-                found[member.name] = member()
+    """All dialects of the package and of installed ones, sorted by name.
+
+    Raises:
+        InputError: a package has a dialect that cannot be used, or whose name is taken.
+    """
+    faults: list[Problem] = []
+    found: dict[str, Dialect] = dict(in_folders(Dialect, dialects))  # type: ignore[type-abstract]  # what derives from it is made
+    whose: dict[str, str] = {}
+    for other in installed(GROUP, Dialect, faults):  # type: ignore[type-abstract]  # what derives from it is made
+        added(found, whose, other.kind(), other.place, called="an NC dialect", faults=faults)
+    if faults:
+        raise InputError(faults)
     return MappingProxyType(dict(sorted(found.items())))
 
 
@@ -37,23 +45,30 @@ def dialect_named(name: str) -> Dialect:
     Raises:
         StationError: there is none.
     """
-    known = known_dialects()
-    if name not in known:
-        raise StationError(f"no NC dialect is called {name!r}", remedy=f"known are {', '.join(known)}")
-    return known[name]
+    return looked_up(name, known_dialects(), called="NC dialect", error=StationError, how_to_add=HOW_TO_ADD)
 
 
-def dialect_of_file(file: str) -> Dialect:
-    """Return the dialect that a file's extension stands for.
+def dialect_of_file(file: str, text: str) -> Dialect:
+    """Return the dialect that a program is in: its extension says, or what it holds where several have that one.
+
+    Args:
+        file: name of the program's file.
+        text: the program.
 
     Raises:
-        StationError: no dialect has that extension.
+        StationError: no dialect has that extension, or several have it and the program does not tell them apart.
     """
-    extension = PurePath(file).suffix.lower()
-    for dialect in known_dialects().values():
-        if dialect.extension == extension:
-            return dialect
-    extensions = ", ".join(f"{dialect.extension} ({name})" for name, dialect in known_dialects().items())
-    raise StationError(
-        f"no NC dialect has files that end with {extension!r}", where=file, remedy=f"known: {extensions}"
-    )
+    extension, known = PurePath(file).suffix.lower(), known_dialects()
+    having = [dialect for dialect in known.values() if dialect.extension == extension]
+    if not having:
+        extensions = ", ".join(f"{dialect.extension} ({name})" for name, dialect in known.items())
+        raise StationError(
+            f"no NC dialect has files that end with {extension!r}", where=file, remedy=f"known: {extensions}"
+        )
+    fitting = having if len(having) == 1 else [dialect for dialect in having if dialect.is_in(text)]
+    if len(fitting) != 1:
+        names = ", ".join(dialect.name for dialect in fitting or having)
+        raise StationError(
+            f"the program may be in several NC dialects: {names}", where=file, remedy="say which, with --from"
+        )
+    return fitting[0]

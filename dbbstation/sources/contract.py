@@ -19,6 +19,7 @@ import numpy as np
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
+from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Compliance, Machine
     from dbbstation.plan.plan import Plate
+    from dbbstation.trace.columns import Logged
 
 
 class Owner(StrEnum):
@@ -123,7 +125,7 @@ class Setup:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(WithLogged):
     """A whole run as commanded, in time order, with what was logged beside it.
 
     Rows before `kept` are the way there: they give backlash, lag and friction their history and are not
@@ -134,10 +136,8 @@ class Motion:
         is_path: the rows follow each other on one path; otherwise they are poses without a history.
         kept: the rows that count.
         time_s: since the session's first sample, shape (n,) [s]; None where unknown.
-        temperature_degc: logged temperatures by column name without its unit (`bar`, `jig`, `machine`,
-            `strut1` ...), each of shape (n,) [degC].
-        motor_current_a: logged motor currents, shape (n, 6) [A], NaN for a motor that was not logged; None where
-            none was.
+        logged: what was logged beside the bar, by the name of its column, shape (n,) each; `temperature_degc` and
+            `motor_current_a` give it by sensor and motor.
         load_n: axial forces that the motors hold, positive where the platform pulls, shape (n, 6) [N]; None: those of
             the machine file's weights at the commanded poses.
         setup: None for poses that nobody measured.
@@ -152,8 +152,7 @@ class Motion:
     is_path: bool = False
     kept: slice = field(default_factory=lambda: slice(None))
     time_s: NDArray[np.float64] | None = None
-    temperature_degc: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    motor_current_a: NDArray[np.float64] | None = None
+    logged: Logged = field(default_factory=dict)
     load_n: NDArray[np.float64] | None = None
     setup: Setup | None = None
     reading_mm: NDArray[np.float64] | None = None

@@ -17,6 +17,7 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.travel import middle
 from dbbstation.sources.contract import Effect, Motion, Need, Owner, Parameter, Setup, Texts
+from dbbstation.trace.columns import currents, temperatures
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -156,8 +157,7 @@ def _circle(machine: Machine) -> Motion:
         poses,
         is_path=True,
         time_s=time_s,
-        temperature_degc=dict.fromkeys(logged, warming),
-        motor_current_a=np.ones((len(theta), STRUTS)),
+        logged={**temperatures(dict.fromkeys(logged, warming)), **currents(np.ones((len(theta), STRUTS)))},
         setup=Setup("session", "mounting", "ball", "bar", centre, 1e-3, 1e-3, 5e-4),
         reading_mm=np.full(len(theta), 60.0) + 0.01 * np.sin(theta),
     )

@@ -82,8 +82,11 @@ class Workplace:
     _storage: Storage
 
     def close(self) -> None:
-        """Bring everything to disk."""
-        self._storage.close()
+        """Bring everything to disk, and let others write into the session."""
+        try:
+            self._storage.close()
+        finally:
+            self.writer.close()
 
 
 def assemble(job: Job, source: ReadingSource) -> Workplace:
@@ -104,4 +107,5 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     station = Station(Sequencer(plan, schedule, programs=names, patience=job.patience), source)
     storage = Storage(writer, time_of_day(job.clock, last_end(writer.session)), kept)
     station.subscribe(storage)
+    station.regularly(storage.sync_if_due)
     return Workplace(station, schedule, writer, storage)

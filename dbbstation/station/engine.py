@@ -10,7 +10,7 @@ from dbbstation.station.events import Event, Fault
 from dbbstation.station.states import FINAL, State
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from dbbstation.instrument.reading import Reading
     from dbbstation.station.commands import Command
@@ -48,6 +48,7 @@ class Station:
         self._source = source
         self._commands: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self._observers: list[Observer] = []
+        self._regular: list[Callable[[], None]] = []
 
     @property
     def state(self) -> State:
@@ -57,6 +58,10 @@ class Station:
     def subscribe(self, observer: Observer) -> None:
         """Call `observer` with every event from now on."""
         self._observers.append(observer)
+
+    def regularly(self, duty: Callable[[], None]) -> None:
+        """Call `duty` many times a second from now on, whether readings come or not."""
+        self._regular.append(duty)
 
     def send(self, command: Command) -> None:
         """Put a command into the queue; from any thread and from signal handlers, for which this queue is made."""
@@ -73,6 +78,8 @@ class Station:
             idle = False
             while self.state not in FINAL:
                 idle = not self._carry_command(wait=idle) and not self._carry_readings()
+                for duty in self._regular:
+                    duty()
         except StationError as error:
             self._tell_of(error)
             raise

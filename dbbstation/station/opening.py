@@ -57,7 +57,11 @@ def open_session(
     if not (folder / "session.yaml").is_file():
         return SessionWriter.create(folder, machine, plan, details)
     writer = SessionWriter.open(folder)
-    check_session(folder, machine, plan, with_programs=with_programs, session=writer.session)
+    try:
+        check_session(folder, machine, plan, with_programs=with_programs, session=writer.session)
+    except InputError:
+        writer.close()
+        raise
     return writer
 
 

@@ -74,11 +74,12 @@ def read_toolpath(path: Path, content: bytes) -> Toolpath:
     text = decode(content, str(path), faults)
     if text is None:
         raise InputError(faults)
-    return dialect_of_file(path.name).read(text, str(path))
+    return dialect_of_file(path.name, text).read(text, str(path))
 
 
 def _file_of(folder: Path, stem: str, faults: list[Problem]) -> Path | None:
-    candidates = [folder / (stem + dialect.extension) for dialect in known_dialects().values()]
+    extensions = sorted({dialect.extension for dialect in known_dialects().values()})
+    candidates = [folder / (stem + extension) for extension in extensions]
     found = [path for path in candidates if path.is_file()]
     if len(found) == 1:
         return found[0]

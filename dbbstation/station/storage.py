@@ -64,6 +64,15 @@ class Storage:
             case _:
                 pass
 
+    def sync_if_due(self) -> None:
+        """Bring to disk what has waited for a second, also while no readings come.
+
+        Raises:
+            OutputError: the disk refuses.
+        """
+        if self._journal is not None:
+            self._journal.sync_if_due()
+
     def close(self) -> None:
         """Bring a run that goes on to disk as far as it came; its file stays a `.part`."""
         if self._journal is None:

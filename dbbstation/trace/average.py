@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.trace.columns import each
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,8 +36,7 @@ def averaged(raw: RawCircle, sectors: int) -> RawCircle:
         t_s=means(raw.t_s, sector),
         phi_deg=means(raw.phi_deg, sector),
         length_mm=means(raw.length_mm, sector),
-        temperature_degc={name: means(values, sector) for name, values in raw.temperature_degc.items()},
-        motor_current_a=None if raw.motor_current_a is None else means(raw.motor_current_a, sector),
+        logged=each(raw.logged, lambda values: means(values, sector)),
     )
 
 

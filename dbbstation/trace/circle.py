@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+from dbbstation.trace.columns import WithLogged
 
+if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.plan.circle import Circle
+    from dbbstation.trace.columns import Logged
 
 
 @dataclass(frozen=True, eq=False)
-class RawCircle:
+class RawCircle(WithLogged):
     """One full turn of raw bar lengths in time order, no centre removed, shapes (n,) unless said otherwise.
 
     Attributes:
@@ -25,8 +26,7 @@ class RawCircle:
         t_s: time since the recording's first sample [s].
         phi_deg: progress along the turn, 0 up to 360 [deg].
         length_mm: distance between the ball centres [mm].
-        temperature_degc: by sensor [degC].
-        motor_current_a: shape (n, 6), NaN for a motor that was not logged [A]; None where none was.
+        logged: what was logged beside the bar, by the name of its column.
         start_uncertainty_deg: how well the beginning of the turn is known, one standard deviation; zero where angles
             were recorded [deg].
     """
@@ -36,8 +36,7 @@ class RawCircle:
     t_s: NDArray[np.float64]
     phi_deg: NDArray[np.float64]
     length_mm: NDArray[np.float64]
-    temperature_degc: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    motor_current_a: NDArray[np.float64] | None = None
+    logged: Logged = field(default_factory=dict)
     start_uncertainty_deg: float = 0.0
 
     def __len__(self) -> int:

@@ -11,6 +11,7 @@ from dbbstation.errors import TraceError
 from dbbstation.plan.circle import FULL_TURN_DEG, USUAL_STROKE_MM
 from dbbstation.trace.average import means
 from dbbstation.trace.circle import RawCircle
+from dbbstation.trace.columns import each
 from dbbstation.trace.loss import AFTER_LOSS, lost_samples, share_lost
 
 if TYPE_CHECKING:
@@ -324,6 +325,5 @@ def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64]
         t_s=recording.t_s[rows],
         phi_deg=phi,
         length_mm=length,
-        temperature_degc={sensor: values[rows] for sensor, values in recording.temperature_degc.items()},
-        motor_current_a=None if recording.motor_current_a is None else recording.motor_current_a[rows],
+        logged=each(recording.logged, lambda values: values[rows]),
     )

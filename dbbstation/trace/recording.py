@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+from dbbstation.trace.columns import WithLogged
 
+if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from dbbstation.trace.columns import Logged
+
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(WithLogged):
     """Samples of one run in time order, shapes (n,) unless said otherwise.
 
     Attributes:
@@ -22,8 +24,7 @@ class Recording:
         length_mm: distance between the ball centres, raw [mm].
         theta_deg: commanded angle from +X towards +Y [deg]; present where the rows are already cut to the
             circle, None where the circle has to be found in the trace.
-        temperature_degc: by sensor (`bar`, `jig`, `machine`, `strut1` ... `strut6`) [degC].
-        motor_current_a: shape (n, 6), NaN for a motor that was not logged [A]; None where none was.
+        logged: what was logged beside the bar, by the name of its column.
         usable: False for samples that the instrument itself called bad; they stay in the recording.
     """
 
@@ -31,8 +32,7 @@ class Recording:
     t_s: NDArray[np.float64]
     length_mm: NDArray[np.float64]
     theta_deg: NDArray[np.float64] | None = None
-    temperature_degc: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    motor_current_a: NDArray[np.float64] | None = None
+    logged: Logged = field(default_factory=dict)
     usable: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:

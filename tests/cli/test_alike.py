@@ -35,6 +35,7 @@ NO_TESTS = {
     "session accept": "takes one run by its name",
     "session reject": "takes one run by its name",
     "session seal": "hashes all recordings",
+    "session take-in": "takes recordings as they are named",
     "settings": "looks beside the session and does not read it",
     "study coverage": "its --plan chooses between its own two plans",
     "study blind": "judges whole sessions against their answers",
@@ -160,3 +161,10 @@ def test_a_dry_run_takes_the_options_of_program(run, tmp_path):
 
 def test_choosing_tests_without_a_dry_run_is_refused(run):
     assert run("check", PLAN, "--test", "a").code == USAGE
+
+
+def test_of_several_machines_none_is_dry_run(run, tmp_path):
+    """Nobody has said which of them the plan is for."""
+    outcome = run("check", PLAN, MACHINE, low(tmp_path), "--json")
+    assert outcome.code == DONE
+    assert outcome.data["dry_runs"] == []

@@ -61,7 +61,7 @@ def test_it_is_simulated_as_the_independent_machine_moves(truth, run, tmp_path):
     refused = run(*line)
     assert refused.code == FAILED
     assert "no error source is called `scale-bow`" in refused.err
-    assert "One of your own is given with --source-file FILE.py, or its package installed" in refused.err
+    assert "one of your own is given with --source-file FILE.py, or its package installed" in refused.err
     done = run(*line, "--source-file", EXAMPLE)
     assert done.code == 0, done.err
     simulated = load_sessions([tmp_path / "s"])

@@ -141,7 +141,7 @@ def _ambiguous(diagnosis):
     ("pair", "names"),
     [
         pytest.param((Gravity(), Backlash()), {"gravity", "backlash"}, marks=pytest.mark.nightly),
-        ((Backlash(), BarDrift()), {"backlash", "bar-drift"}),
+        pytest.param((Backlash(), BarDrift()), {"backlash", "bar-drift"}, marks=pytest.mark.slow),
     ],
 )
 def test_pairs_are_both_named(tmp_path, pair, names):

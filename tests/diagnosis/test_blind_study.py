@@ -20,7 +20,10 @@ LARGER = {"clean": 3, "single": 6, "pair": 1, "outside": 1, "concealed": 1}
 
 @pytest.fixture(
     scope="module",
-    params=[(SMALL, 2027), pytest.param((LARGER, 2026), marks=pytest.mark.nightly)],
+    params=[
+        pytest.param((SMALL, 2027), marks=pytest.mark.slow),
+        pytest.param((LARGER, 2026), marks=pytest.mark.nightly),
+    ],
     ids=["small", "larger"],
 )
 def study(request, tmp_path_factory):

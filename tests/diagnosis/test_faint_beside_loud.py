@@ -16,6 +16,7 @@ from tests.plant.session import record
 NAMES = ("gravity", "backlash", "servo-lag", "reversal-spike", "joint-friction", "screw-lead")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("decay_s", [0.15, pytest.param(0.4, marks=pytest.mark.nightly)])
 def test_short_spikes_are_found_beside_gravity_however_uncertain_their_height_is(tmp_path, decay_s):
     """Ten readings a second hardly tell a high short spike from a low long one; that there is one they tell."""

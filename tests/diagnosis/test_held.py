@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.held import held_beside, held_variance
@@ -16,6 +17,7 @@ OFFSET_MM = 0.12
 SESSIONS = 8
 
 
+@pytest.mark.slow
 def test_a_ball_off_the_tool_tip_is_as_uncertain_where_no_circle_sees_it_as_it_is_large_elsewhere(tmp_path):
     """Ten times the usual size of a ball off the tool tip, towards everywhere: both fits' errors against the truth."""
     source = sources_named(["tool-ball-offset"])

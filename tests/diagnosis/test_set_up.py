@@ -66,6 +66,7 @@ def test_a_warm_plate_is_no_ball_off_the_tool_tip(tmp_path):
     assert not [f.name for f in wrong if "jig-thermal" not in f.equivalent]
 
 
+@pytest.mark.slow
 def test_a_badly_seated_ball_beside_gravity_is_found_with_it(tmp_path):
     diagnosis = diagnosed(tmp_path / "s", 42, Gravity(), BadSeating({3: np.array([20.0, -25.0, 0.0])}))
     assert named(diagnosis) == {"gravity"}

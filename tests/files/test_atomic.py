@@ -118,3 +118,24 @@ def test_one_file_that_exists_refuses_all(tmp_path: Path) -> None:
     assert listing(tmp_path) == ["b.ngc"]
     write_folder(tmp_path, {"a.ngc": "a", "b.ngc": "b"}, force=True)
     assert (tmp_path / "b.ngc").read_text() == "b"
+
+
+def test_a_link_is_followed_and_a_dangling_one_refused(tmp_path):
+    target, link, dangling = tmp_path / "model.yaml", tmp_path / "link.yaml", tmp_path / "gone.yaml"
+    target.write_text("old", encoding="utf-8")
+    link.symlink_to(target)
+    dangling.symlink_to(tmp_path / "nowhere.yaml")
+    write_text(link, "new", force=True)
+    assert link.is_symlink()
+    assert target.read_text(encoding="utf-8") == "new"
+    with pytest.raises(OutputError, match=r"a link to .*nowhere\.yaml, which is not there"):
+        write_text(dangling, "new", force=True)
+    assert dangling.is_symlink()
+
+
+def test_a_pipe_is_never_replaced(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(OutputError, match="a device or a pipe"):
+        write_text(pipe, "new", force=True)
+    assert pipe.is_fifo()

@@ -15,6 +15,7 @@ from dbbstation.model.motors import motor_currents
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import sources_named
+from dbbstation.trace.columns import currents
 from tests.sources.runs import random_machine, random_run, run
 
 NAMES = ("gravity", "cog-shift", "strut-weight", "drive-friction")
@@ -111,7 +112,7 @@ def test_strut_weights_of_a_source_replace_those_of_the_machine_file(machine, rn
 def test_loads_are_those_where_the_machine_really_is(reference):
     """A platform that stands 2 mm to the side carries itself otherwise than the commanded pose says."""
     motion = run((100, 0, -1008), (0, 15))
-    motion = replace(motion, motor_current_a=np.zeros((len(motion), 6)))
+    motion = replace(motion, logged=currents(np.zeros((len(motion), 6))))
     drives, joints = sources_named(["drive-friction", "base-joints"])
     shifted = np.tile([2.0, 0.0, 0.0], 6)
     there = MachineModel(reference, (Fitted(drives, DRIVE), Fitted(joints, shifted)))
@@ -139,7 +140,7 @@ def test_poses_and_programs_do_without_currents(reference):
 
 
 def test_a_weightless_strut_adds_no_load(reference):
-    motion = replace(run((0, 0, -1008), (5, 5)), motor_current_a=np.zeros((202, 6)))
+    motion = replace(run((0, 0, -1008), (5, 5)), logged=currents(np.zeros((202, 6))))
     drives = sources_named(["drive-friction"])[0]
     bare = MachineModel(replace(reference, compliance=Compliance(1e-5)), (Fitted(drives, DRIVE),))
     light = MachineModel(replace(reference, strut_masses=StrutMasses(0.0, 0.0, 0.0)), (Fitted(drives, DRIVE),))

@@ -14,6 +14,7 @@ from dbbstation.plan.plan import Plate
 from dbbstation.sources.causes.base_joints import BaseJoints
 from dbbstation.sources.causes.strut_reference_length import StrutReferenceLength
 from dbbstation.sources.contract import Motion, Setup
+from dbbstation.trace.columns import currents, temperatures
 
 # [GRAV Table 4]: centre X, Y [mm], tilt A, B [deg]; all at Z = -1008 mm with a radius of 144 mm.
 CONDITIONS = {
@@ -133,8 +134,10 @@ def random_run(rng, count=300) -> Motion:
         time_s=time_s,
         setup=setup,
         reading_mm=reading,
-        temperature_degc=dict.fromkeys(("bar", "machine"), 20.0 + time_s / 2000.0),
-        motor_current_a=np.zeros((count, 6)),
+        logged={
+            **temperatures(dict.fromkeys(("bar", "machine"), 20.0 + time_s / 2000.0)),
+            **currents(np.zeros((count, 6))),
+        },
     )
 
 

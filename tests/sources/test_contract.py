@@ -19,8 +19,8 @@ SOURCES += [form for source in SOURCES if (form := source.by_temperature()) is n
 WITHOUT = {
     Need.PATH: {"is_path": False},
     Need.TIME: {"time_s": None},
-    Need.TEMPERATURE: {"temperature_degc": {}},
-    Need.CURRENT: {"motor_current_a": None},
+    Need.TEMPERATURE: {"logged": {}},
+    Need.CURRENT: {"logged": {}},
     Need.READING: {"reading_mm": None},
 }
 

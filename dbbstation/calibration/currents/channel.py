@@ -20,6 +20,7 @@ from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.motors import motor_currents
 from dbbstation.sources.causes.drive_friction import MOTOR_OF_GAIN, PER_MOTOR, driven_directions
 from dbbstation.trace.average import averaged
+from dbbstation.trace.columns import currents
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -96,7 +97,7 @@ def current_channel(layout: Layout, observations: Sequence[Observation]) -> Chan
 
 def _motion(run: Observation, current_a: NDArray[np.float64]) -> Motion:
     """Return a run with its currents as cleaned; a long one as means over sectors, in which loads hardly change."""
-    raw = replace(run.raw, motor_current_a=current_a)
+    raw = replace(run.raw, logged={**run.raw.logged, **currents(current_a)})
     if run.commanded is None and len(raw) > LONG * SECTORS:
         raw = averaged(raw, SECTORS)
     return replace(run, raw=raw).motion()

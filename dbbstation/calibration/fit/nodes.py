@@ -116,8 +116,7 @@ def nodes_of(run: Observation) -> Nodes | None:
         phi_deg=phi,
         t_s=np.interp(phi, raw.phi_deg[order], raw.t_s[order]),
         length_mm=np.full(len(phi), raw.circle.bar_mm),
-        temperature_degc={},
-        motor_current_a=None,
+        logged={},
     )
     count = np.bincount(sector, minlength=SECTORS)
     most = max(int(count.max()), PER_SECTOR + 1)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.catalogue import nearest
 from dbbstation.errors import InputError, ModelError, Problem
 from dbbstation.files.atomic import refuse_existing, write_text
 from dbbstation.files.formats.machine import machine_data, machine_parts
@@ -102,9 +103,7 @@ class _Sources:
     def fitted(self, location: Location, entry: SourceSchema, shared: str = "") -> Fitted | None:
         source = self._known.get(entry.name)
         if source is None:
-            near = difflib.get_close_matches(entry.name, self._known, n=1, cutoff=0.6)
-            remedy = f"did you mean `{near[0]}`?" if near else f"known: {', '.join(self._known)}."
-            remedy += f" {HOW_TO_ADD}"
+            remedy = f"{nearest(entry.name, self._known)}; {HOW_TO_ADD}"
             self._fault((*location, "name"), f"no error source is called `{entry.name}`", remedy)
             return None
         if (source.belongs_to is Owner.MACHINE) is bool(shared):

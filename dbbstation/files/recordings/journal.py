@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import OutputError
 from dbbstation.files.atomic import sync_folder
-from dbbstation.files.recordings import run_columns as columns
 from dbbstation.files.recordings.run_csv import PART
+from dbbstation.trace import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -144,11 +144,13 @@ class RunWriter:
             self.sync()
 
     def sync(self) -> None:
-        """Bring everything to disk.
+        """Bring everything to disk; nothing is left to do once the file is closed.
 
         Raises:
             OutputError: the disk refuses.
         """
+        if self._file.closed:
+            return
         with self._told():
             os.fsync(self._file.fileno())
         self._synced_at = self._clock()

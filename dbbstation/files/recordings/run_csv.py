@@ -1,22 +1,22 @@
 """Run files `runs/*.csv`: one circle, one direction, raw.
 
-Whole files are parsed by NumPy at once; line by line only to name what is wrong with a file that it refused. Of a
+One way leads in: bytes to lines (`run_lines`), lines to checked numbers (`run_numbers`), numbers to a recording. Of a
 file that was being recorded when the station died (`.csv.part`) the good lines are returned, the others named.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.recordings import run_columns as columns
-from dbbstation.files.recordings.run_lines import Lines, fault_of_line, good_lines, split_file
+from dbbstation.files.recordings.run_lines import Lines, lines_of
+from dbbstation.files.recordings.run_numbers import numbers_of
 from dbbstation.files.source_text import read_bytes
+from dbbstation.trace import columns
 from dbbstation.trace.recording import Recording
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def changed(file: str) -> Problem:
 
 
 def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False) -> RunFile:
-    """Parse the bytes of a run file.
+    """Parse the bytes of a run file: bytes to lines, lines to numbers, numbers to a recording, each checked.
 
     Args:
         data: whole file.
@@ -97,20 +97,9 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
     """
     faults: list[Problem] = []
     warnings: list[Problem] = []
-    lines = split_file(data, file, faults)
-    if lines is None or faults:
-        raise InputError(faults)
-    for name in lines.unknown:
-        what = f"the column `{name}` is not known; it is kept and not used"
-        warnings.append(Problem(file, lines.header_line, 0, what))
-    lines = _without_cut_line(lines, warnings)
-    if partial:
-        lines, bad = good_lines(lines)
-        warnings += bad
-    numbers = _numbers(lines, faults)
-    if not faults:
-        _check_values(lines, numbers, faults)
-    if faults:
+    lines = lines_of(data, file, faults, warnings, partial=partial)
+    numbers = None if lines is None else numbers_of(lines, faults)
+    if lines is None or numbers is None:
         raise InputError(_few(faults, file))
     return RunFile(
         recording=_recording(lines, numbers),
@@ -121,62 +110,11 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
     )
 
 
-def _without_cut_line(lines: Lines, warnings: list[Problem]) -> Lines:
-    """Drop a last line that does not end: its last digits may be missing without a trace. Its CRC can vouch for it."""
-    if lines.ended or not lines.rows:
-        return lines
-    number, last = lines.numbers[-1], lines.rows[-1]
-    if columns.CRC in lines.columns and fault_of_line(last, lines.columns) is None:
-        return lines
-    warnings.append(Problem(lines.file, number, 0, "the last line was cut off; it is left out"))
-    return lines.keep(slice(0, -1))
-
-
-def _numbers(lines: Lines, faults: list[Problem]) -> dict[str, NDArray[np.float64]]:
-    """Every numeric column, shape (n,); nothing where a line is wrong, with the lines added to `faults`."""
-    names = [name for name in lines.columns if name in columns.COLUMNS]
-    if not lines.rows:
-        faults.append(Problem(lines.file, lines.header_line, 0, "there are no samples below this line"))
-        return {}
-    if lines.regular() and not lines.bad_crc():
-        usecols = [lines.columns.index(name) for name in names]
-        text = io.BytesIO(b"\n".join(lines.rows))
-        try:
-            table = np.loadtxt(text, delimiter=",", usecols=usecols, comments=None, ndmin=2, encoding="latin-1")
-        except ValueError:
-            table = np.full((0, len(names)), np.nan)
-        if len(table) == len(lines.rows) and np.isfinite(table).all():
-            return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
-    for number, row in zip(lines.numbers, lines.rows, strict=True):
-        fault = fault_of_line(row, lines.columns)
-        if fault is not None:
-            faults.append(Problem(lines.file, number, 0, *fault))
-    if not faults:
-        what = "NumPy reads this file otherwise than line by line"
-        faults.append(Problem(lines.file, 0, 0, what, "write plain decimal numbers"))
-    return {}
-
-
-def _check_values(lines: Lines, numbers: dict[str, NDArray[np.float64]], faults: list[Problem]) -> None:
-    """Check that time rises and that every value has a plausible size."""
-    t = numbers[columns.TIME]
-    for index in np.flatnonzero(np.diff(t) <= 0) + 1:
-        what = "runs backwards" if t[index] < t[index - 1] else "stands still"
-        what = f"time {what} here: t_s {t[index]:g} after {t[index - 1]:g}"
-        remedy = "the file was reordered, or the clock was set while recording"
-        faults.append(Problem(lines.file, lines.numbers[index], 0, what, remedy))
-    for name, values in numbers.items():
-        column = columns.COLUMNS[name]
-        for index in np.flatnonzero(np.abs(values) > column.size)[:1]:
-            what = f"{name} is {values[index]:g}, sizes up to {column.size:g} {column.unit} are plausible"
-            faults.append(
-                Problem(lines.file, lines.numbers[index], 0, what, f"check the unit, {column.unit} is needed")
-            )
+_BY_THEMSELVES = (columns.TIME, columns.LENGTH, columns.THETA)
+"""Columns that a recording has in places of their own."""
 
 
 def _recording(lines: Lines, numbers: dict[str, NDArray[np.float64]]) -> Recording:
-    none = np.full(len(numbers[columns.TIME]), np.nan)
-    currents = [numbers.get(name, none) for name in columns.CURRENTS]
     usable = None
     if columns.STATUS in lines.columns:
         said = lines.texts(columns.STATUS)
@@ -186,8 +124,7 @@ def _recording(lines: Lines, numbers: dict[str, NDArray[np.float64]]) -> Recordi
         t_s=numbers[columns.TIME],
         length_mm=numbers[columns.LENGTH],
         theta_deg=numbers.get(columns.THETA),
-        temperature_degc={sensor: numbers[name] for name, sensor in columns.TEMPERATURES.items() if name in numbers},
-        motor_current_a=np.column_stack(currents) if any(name in numbers for name in columns.CURRENTS) else None,
+        logged={name: values for name, values in numbers.items() if name not in _BY_THEMSELVES},
         usable=usable,
     )
 

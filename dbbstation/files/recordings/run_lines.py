@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dbbstation.errors import Problem
-from dbbstation.files.recordings import run_columns as columns
 from dbbstation.files.source_text import decode
+from dbbstation.trace import columns
 
 _COMMA, _NEWLINE = ord(","), ord("\n")
 _CRC_LENGTH = 8
@@ -22,7 +22,6 @@ _HEX_DIGIT[np.frombuffer(b"0123456789abcdef", dtype=np.uint8)] = np.arange(16)
 _HEX_PLACES = 16 ** np.arange(_CRC_LENGTH - 1, -1, -1, dtype=np.int64)
 _CRC_TEXT = re.compile(rb"[0-9a-f]{8}")
 _NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
-_KNOWN = (*columns.COLUMNS, *columns.TEXTS)
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Lines:
     @property
     def unknown(self) -> tuple[str, ...]:
         """Columns that this program does not know."""
-        return tuple(name for name in self.columns if name not in _KNOWN)
+        return tuple(name for name in self.columns if not columns.is_known(name))
 
     def keep(self, rows: slice) -> Lines:
         """Return the same file with only these rows."""
@@ -87,6 +86,32 @@ class Lines:
         return bool((found != digits @ _HEX_PLACES).any())
 
 
+def lines_of(data: bytes, file: str, faults: list[Problem], warnings: list[Problem], *, partial: bool) -> Lines | None:
+    """Lines of a run file that are to be read.
+
+    Args:
+        data: whole file.
+        file: as named in messages.
+        faults: what makes the file useless is added.
+        warnings: what does not spoil it is added: unknown columns, a last line that was cut off, lines left out.
+        partial: keep the good lines of an interrupted recording only.
+
+    Returns:
+        None where there are faults.
+    """
+    lines = split_file(data, file, faults)
+    if lines is None or faults:
+        return None
+    for name in lines.unknown:
+        what = f"the column `{name}` is not known; it is kept and not used"
+        warnings.append(Problem(file, lines.header_line, 0, what))
+    lines = _without_cut_line(lines, warnings)
+    if partial:
+        lines, bad = good_lines(lines)
+        warnings += bad
+    return lines
+
+
 def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
     """Take a run file apart; None, or columns that cannot be used, are told in `faults`."""
     all_lines = data.replace(b"\r\n", b"\n").split(b"\n")
@@ -116,7 +141,7 @@ def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
 
 
 def _check_columns(names: tuple[str, ...], file: str, line: int, faults: list[Problem]) -> None:
-    unknown = [name for name in names if name not in _KNOWN]
+    unknown = [name for name in names if not columns.is_known(name)]
     for missing in (name for name in columns.REQUIRED if name not in names):
         near = difflib.get_close_matches(missing, unknown, n=1, cutoff=0.5)
         remedy = f"is it `{near[0]}`?" if near else f"columns here: {', '.join(names)}"
@@ -128,6 +153,17 @@ def _check_columns(names: tuple[str, ...], file: str, line: int, faults: list[Pr
     )
     if columns.CRC in names and names[-1] != columns.CRC:
         faults.append(Problem(file, line, 0, "the column `crc` must be the last", "it covers all others"))
+
+
+def _without_cut_line(lines: Lines, warnings: list[Problem]) -> Lines:
+    """Drop a last line that does not end: its last digits may be missing without a trace. Its CRC can vouch for it."""
+    if lines.ended or not lines.rows:
+        return lines
+    number, last = lines.numbers[-1], lines.rows[-1]
+    if columns.CRC in lines.columns and fault_of_line(last, lines.columns) is None:
+        return lines
+    warnings.append(Problem(lines.file, number, 0, "the last line was cut off; it is left out"))
+    return lines.keep(slice(0, -1))
 
 
 def fault_of_line(row: bytes, names: tuple[str, ...]) -> tuple[str, str] | None:

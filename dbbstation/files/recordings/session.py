@@ -20,6 +20,7 @@ from dbbstation.files.recordings.run_csv import PART, RunFile, read_run, sealed_
 from dbbstation.files.recordings.run_lines import split_file
 from dbbstation.files.recordings.session_checks import check_bar, check_runs
 from dbbstation.files.recordings.session_set_up import SetUpReadings, check_set_up_errors, mounted_name, set_up_readings
+from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import read_document, validate
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
@@ -388,9 +389,16 @@ def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Pr
     return found
 
 
+def unlisted_sealed(session: SessionFolder) -> tuple[Path, ...]:
+    """Return the sealed runs in a session's folder that its session file does not list."""
+    listed = {run.path.name for run in session.runs}
+    return tuple(path for path in sorted((session.folder / "runs").glob("*.csv")) if path.name not in listed)
+
+
 def part_entry(path: Path) -> RunEntry | None:
-    """Return what a half-recorded run says of itself; None where it died before it could."""
-    lines = split_file(path.read_bytes(), str(path), [])
+    """Return what the file of a run says of itself; None where it does not say which run it is."""
+    data = read_bytes(path, [])
+    lines = None if data is None else split_file(data, str(path), [])
     header = {} if lines is None else lines.header
     if (
         not header.get("test")

@@ -8,11 +8,12 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError, Problem
-from dbbstation.files.atomic import write_bytes, write_folder, write_text
+from dbbstation.files.atomic import remove_leftovers, write_bytes, write_folder, write_text
 from dbbstation.files.formats.machine import MachineFile, machine_data, machine_parts
 from dbbstation.files.formats.plan import InlinePlan, plan_data
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.recordings.journal import RunWriter, run_header, run_line, run_name
+from dbbstation.files.recordings.lock import SessionLock
 from dbbstation.files.recordings.session import (
     SESSION_FILE,
     Bar,
@@ -20,11 +21,14 @@ from dbbstation.files.recordings.session import (
     RunEntry,
     RunState,
     SessionFolder,
+    part_entry,
     read_session,
 )
+from dbbstation.files.recordings.session_checks import check_bar
 from dbbstation.files.recordings.session_set_up import readings_in
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import format_for
+from dbbstation.files.yaml.schema import format_for, validate
+from dbbstation.files.yaml.text import parse_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -138,8 +142,24 @@ def _make_folder(
     whole[MACHINE_FILE] = yaml_text({"format": format_for(MachineFile, nominal), **nominal})
     whole[PLAN_FILE] = yaml_text(plan_data(plan))
     names = (folder / MACHINE_FILE, folder / PLAN_FILE)
-    whole[SESSION_FILE] = _session_text(folder, names, details, entries)
+    whole[SESSION_FILE] = text = _session_text(folder, names, details, entries)
+    _check_details(text, folder, plan)
     write_folder(folder, whole)
+
+
+def _check_details(text: str, folder: Path, plan: InlinePlan) -> None:
+    """Hold what a session notes against its format and plan before anything is written.
+
+    Raises:
+        InputError: everything that no session may say, such as a bar's length in metres.
+    """
+    faults: list[Problem] = []
+    document = parse_yaml(text, str(folder / SESSION_FILE), faults)
+    session = None if document is None else validate(document, SessionFile, faults)
+    if document is not None and session is not None and session.bar is not None:
+        check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, plan.to_domain(), faults)
+    if faults:
+        raise InputError([replace(fault, file=str(folder), line=0, column=0) for fault in faults])
 
 
 class SessionWriter:
@@ -150,8 +170,25 @@ class SessionWriter:
     are taken over; where they are wrong, the next step raises InputError and leaves the file as it is.
     """
 
-    def __init__(self, session: SessionFolder) -> None:
-        self._session = session
+    def __init__(self, session: SessionFolder, lock: SessionLock) -> None:
+        self._session, self._lock = session, lock
+
+    def __enter__(self) -> Self:
+        """Return the writer."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let others write into the session."""
+        self.close()
+
+    def close(self) -> None:
+        """Let others write into the session; may be called twice."""
+        self._lock.close()
+
+    @property
+    def locked(self) -> bool:
+        """Whether no other process can write into the session; False on a file system that knows no locks."""
+        return self._lock.held
 
     @classmethod
     def create(
@@ -163,7 +200,7 @@ class SessionWriter:
             OutputError: the folder exists already, or cannot be written.
         """
         _make_folder(folder, machine, plan, details or SessionDetails(), (), {})
-        return cls(read_session(folder))
+        return cls(read_session(folder), SessionLock(folder))
 
     @classmethod
     def open(cls, folder: Path) -> Self:
@@ -171,9 +208,12 @@ class SessionWriter:
 
         Raises:
             InputError: every fault of the session.
-            OutputError: the session file cannot be written.
+            OutputError: another process writes into it, or the session file cannot be written.
         """
-        writer = cls(read_session(folder))
+        read_session(folder)  # no lock is left in what is no session
+        writer = cls(read_session(folder), SessionLock(folder))
+        for inner in (folder, folder / RUNS, folder / PROGRAMS):
+            remove_leftovers(inner)
         # A run that was sealed when the station died only lacks its hash.
         for run in writer.runs:
             if run.state is RunState.RECORDING and run.path.suffix == ".csv":
@@ -275,6 +315,31 @@ class SessionWriter:
         self._write()
         return judged
 
+    def take_in(self, path: Path) -> RunEntry:
+        """List a sealed run that lies in the folder and is in no list, as `complete`: it is still to be judged.
+
+        Raises:
+            InputError: it does not say which run of the plan it is, is damaged, or that run is listed already.
+            OutputError: the disk refuses.
+        """
+        found, file = part_entry(path), str(path)
+        if found is None or (found.test, found.direction) not in {
+            (name, direction) for name, test in self._session.plan.tests.items() for direction in test.directions
+        }:
+            what = "the file does not say which run of this plan it is"
+            raise InputError([Problem(file, 1, 0, what, "its first lines name test, direction and repeat")])
+        if any(
+            (run.test, run.direction, run.repeat) == (found.test, found.direction, found.repeat) for run in self.runs
+        ):
+            what = f"the session lists another run {found.label}"
+            raise InputError([Problem(file, 1, 0, what, "give one of them another repeat")])
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        entry = replace(found, state=RunState.COMPLETE, sha256=digest)
+        self._session.load(entry)
+        self._put(entry)
+        self._write()
+        return entry
+
     def add_program(self, name: str, content: bytes, *, model_sha256: str = "") -> Program:
         """Keep an NC program in the session; one of the same name and content is taken as it is.
 
@@ -299,7 +364,7 @@ class SessionWriter:
         details = SessionDetails(**{each.name: getattr(session, each.name) for each in fields(SessionDetails)})
         names = (session.machine_path, session.plan_path)
         text = _session_text(session.folder, names, details, session.runs)
-        write_text(file, text, force=True)
+        write_text(file, text, force=True, rewrites=True)
         self._session = replace(session, sha256=hashlib.sha256(text.encode()).hexdigest())
 
 

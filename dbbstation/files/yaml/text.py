@@ -64,9 +64,16 @@ class YamlDocument:
         return [((*location, key), entry) for key, entry in pairs if isinstance(entry, dict)]
 
 
+LARGEST_BYTES = 20_000_000
+"""Largest YAML file that is read: plans, models and settings have some hundred kilobytes at the most."""
+
+MOST_VALUES = 500_000
+"""Values that a document may have, aliases written out: nine aliases of nine aliases and so on would fill any memory."""
+
+
 def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
     """Read a YAML file; None with the reasons added to `faults` where that is impossible."""
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_BYTES)
     text = None if data is None else decode(data, str(path), faults)
     return None if text is None else parse_yaml(text, str(path), faults)
 
@@ -77,6 +84,9 @@ def parse_yaml(text: str, file: str, faults: list[Problem]) -> YamlDocument | No
         root = YAML(typ="safe", pure=True).compose(text)
     except YAMLError as error:
         faults.append(_syntax_problem(error, text, file))
+        return None
+    except RecursionError:
+        faults.append(Problem(file, 0, 0, "brackets or lists are nested too deeply", "check that it is the right file"))
         return None
     if root is None:
         faults.append(Problem(file, 1, 1, "the file is empty", "start it with `format: ` and the format's name"))
@@ -115,8 +125,14 @@ class _Walk:
         self.value_places: dict[Location, tuple[int, int]] = {}
         self.key_places: dict[Location, tuple[int, int]] = {}
         self._open: set[int] = set()
+        self._left = MOST_VALUES
 
     def value(self, node: Node, location: Location) -> Any:  # noqa: ANN401 - what a document holds is not known yet
+        self._left -= 1
+        if self._left <= 0:
+            if self._left == 0:
+                self._fault(node, f"more than {MOST_VALUES:,} values, aliases written out", "write fewer aliases")
+            return None
         self.value_places[location] = _place(node)
         if isinstance(node, ScalarNode):
             return self._scalar(node)
@@ -169,10 +185,15 @@ class _Walk:
         try:
             if kind == "float":
                 return float(digits.replace(".inf", "inf").replace(".nan", "nan"))
-            return int(digits, 0) if digits.lstrip("+-")[:2] in {"0o", "0x", "0b"} else int(digits)
+            whole = int(digits, 0) if digits.lstrip("+-")[:2] in {"0o", "0x", "0b"} else int(digits)
+            float(whole)  # beyond what any quantity can be
+        except OverflowError:
+            self._fault(node, "this number is too large", "check its digits")
         except ValueError:
-            self._fault(node, f"`{node.value}` is not a number", "write digits with a dot as decimal sign")
-            return None
+            self._fault(node, f"`{shortened(node.value)}` is not a number", "write digits with a dot as decimal sign")
+        else:
+            return whole
+        return None
 
     def _untagged(self, node: Node, kind: str) -> None:
         if node.tag != _TAG + kind:
@@ -180,6 +201,14 @@ class _Walk:
 
     def _fault(self, node: Node, what: str, remedy: str) -> None:
         self.faults.append(Problem(self.file, *_place(node), what, remedy))
+
+
+def shortened(text: str) -> str:
+    """Text as it is quoted in a message: of a long one its beginning."""
+    return text if len(text) <= LONGEST_QUOTED else f"{text[:LONGEST_QUOTED]}…"
+
+
+LONGEST_QUOTED = 60
 
 
 def _place(node: Node) -> tuple[int, int]:

@@ -6,6 +6,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dbbstation.nc.dialect import Dialect, plain
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, Step, rounded
@@ -13,7 +15,6 @@ from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, Step, rounded
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.nc.toolpath import Toolpath
@@ -66,21 +67,16 @@ class LinuxCNC(Dialect):
 
 
 def _body(toolpath: Toolpath) -> Iterator[str]:
-    kinds, words = toolpath.kind.tolist(), _axis_words(toolpath)
+    kinds, words = toolpath.kind.tolist(), _changed_words(toolpath)
     feeds, dwells = toolpath.feed.tolist(), toolpath.dwell_s.tolist()
-    last_words: tuple[str, ...] = ("",) * 6
     last_feed = math.nan
     for row, kind in enumerate(kinds):
-        if kind in {Step.RAPID, Step.FEED}:
-            new = words[row]
-            changed = [word for word, old in zip(new, last_words, strict=True) if word != old]
-            # A move to where the machine stands already is a move: LinuxCNC wants an axis in it.
-            line = ("G0 " if kind == Step.RAPID else "G1 ") + " ".join(changed or new[:1])
-            if kind == Step.FEED and feeds[row] != last_feed:
-                last_feed = feeds[row]
-                line += f" F{digits(last_feed)}"
-            last_words = new
-            yield line
+        if kind == Step.RAPID:
+            yield f"G0 {words[row]}"
+        elif kind == Step.FEED:
+            feed = "" if feeds[row] == last_feed else f" F{digits(feeds[row])}"
+            last_feed = feeds[row]
+            yield f"G1 {words[row]}{feed}"
         elif kind == Step.DWELL:
             yield f"G4 P{digits(dwells[row])}"
         else:
@@ -98,13 +94,26 @@ def _said(kind: Step, text: str) -> Iterator[str]:
         yield "M0"
 
 
-def _axis_words(toolpath: Toolpath) -> list[tuple[str, ...]]:
-    """Words of the axes for each row, as text."""
-    columns = []
-    for letter, decimals, values in zip(AXES, DECIMALS, rounded(toolpath.poses).T.tolist(), strict=True):
-        form = f"{letter}%.{decimals}f"
-        columns.append([form % value for value in values])
-    return list(zip(*columns, strict=True))
+def _changed_words(toolpath: Toolpath) -> list[str]:
+    """Words of the axes that each move changes, as text; nothing for rows that are no moves.
+
+    Moves that change the same axes are written together, by one form.
+    """
+    texts = [""] * len(toolpath)
+    moves = np.flatnonzero(toolpath.is_move)
+    poses = toolpath.poses[moves]
+    changed = np.ones(poses.shape, dtype=np.bool_)
+    changed[1:] = poses[1:] != poses[:-1]
+    # A move to where the machine stands already is a move: LinuxCNC wants an axis in it.
+    changed[~changed.any(axis=1), 0] = True
+    which = changed @ (1 << np.arange(len(AXES)))
+    for one in np.unique(which):
+        alike = np.flatnonzero(which == one)
+        axes = np.flatnonzero(changed[alike[0]])
+        form = " ".join(f"{AXES[axis]}%.{DECIMALS[axis]}f" for axis in axes)
+        for row, values in zip(moves[alike].tolist(), poses[np.ix_(alike, axes)].tolist(), strict=True):
+            texts[row] = form % tuple(values)
+    return texts
 
 
 def _path_control(corner_mm: float) -> str:

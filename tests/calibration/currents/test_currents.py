@@ -20,6 +20,7 @@ from dbbstation.files.formats.model import read_model
 from dbbstation.machine.geometry import StrutMasses
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.trace.columns import currents
 from tests.plant.mechanisms.currents import DriveCurrents
 from tests.plant.mechanisms.gravity import CentreOfGravityShift, Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
@@ -147,7 +148,7 @@ def test_a_wrong_weight_is_in_gains_and_compliance_and_nowhere_else(small, fitte
 
 def test_without_drive_friction_currents_change_nothing(small):
     _, recorded = small
-    bare = [replace(o, raw=replace(o.raw, motor_current_a=None)) for o in recorded.observations]
+    bare = [replace(o, raw=replace(o.raw, logged={})) for o in recorded.observations]
     names = sources(NAMES[:-1])
     with_currents = calibrate(recorded.machine, recorded.observations, names)
     assert with_currents.currents is None
@@ -171,7 +172,7 @@ def test_long_runs_say_as_much_as_their_means(tmp_path, fitted):
 def spoilt(recorded, change):
     """Runs with their currents changed by a function of the run's number and array."""
     return tuple(
-        replace(o, raw=replace(o.raw, motor_current_a=change(k, o.raw.motor_current_a.copy())))
+        replace(o, raw=replace(o.raw, logged=currents(change(k, o.raw.motor_current_a.copy()))))
         for k, o in enumerate(recorded.observations)
     )
 
@@ -288,9 +289,7 @@ def test_noise_that_remembers_counts_for_less(small, fitted, rng):
 
 def test_some_runs_without_currents_count_with_their_circles(small):
     _, recorded = small
-    partly = [
-        replace(o, raw=replace(o.raw, motor_current_a=None)) if o.test == "e" else o for o in recorded.observations
-    ]
+    partly = [replace(o, raw=replace(o.raw, logged={})) if o.test == "e" else o for o in recorded.observations]
     calibration = calibrate(recorded.machine, partly, sources())
     assert "2 of 10 runs have no motor currents: their circles count alone" in calibration.currents.notes
     assert len(calibration.residual_mm) == 10
@@ -298,7 +297,7 @@ def test_some_runs_without_currents_count_with_their_circles(small):
 
 def test_no_currents_and_no_masses_are_refused_by_name(small):
     _, recorded = small
-    none = [replace(o, raw=replace(o.raw, motor_current_a=None)) for o in recorded.observations]
+    none = [replace(o, raw=replace(o.raw, logged={})) for o in recorded.observations]
     with pytest.raises(ModelError, match="drive-friction needs current, which is not given here"):
         calibrate(recorded.machine, none, sources())
     with pytest.raises(CalibrationError, match=r"no motor has a current that could be used: motor 1: .* stands still"):

@@ -79,7 +79,7 @@ def test_samples_at_odd_places_and_gaps_are_no_matter(long_runs, rng):
     phi = phi[(phi < 42.0) | (phi > 48.0)]
     theta = np.radians(phi)
     length = 150.0 + 0.1 * np.cos(theta) + 0.05 * np.sin(2.0 * theta)
-    raw = replace(run.raw, t_s=phi, phi_deg=phi, length_mm=length, temperature_degc={})
+    raw = replace(run.raw, t_s=phi, phi_deg=phi, length_mm=length, logged={})
     found = nodes_of(replace(run, raw=raw))
     assert found is not None
     at = np.radians(found.coarse.raw.phi_deg)

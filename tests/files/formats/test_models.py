@@ -149,7 +149,7 @@ def test_a_model_that_could_not_be_read_back_is_not_written(tmp_path: Path, refe
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("name: struts", "name: strats", "no error source is called `strats`; did you mean `struts`?"),
+        ("name: struts", "name: strats", "no error source is called `strats`; did you mean struts?"),
         ("name: struts", "name: heavy", "heavy needs masses; give them in the machine file"),
         ("name: struts", "name: seat", "`seat` belongs to the mounting, not here; put it under `measurement_effects`"),
         ("name: seat", "name: struts", "`struts` belongs to the machine, not here; put it under `sources`"),

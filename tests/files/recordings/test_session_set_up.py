@@ -144,6 +144,7 @@ def test_a_slip_in_readings_written_in_meanwhile_is_told_and_nothing_is_overwrit
             writer.finish_run(journal)
     assert (session / "session.yaml").read_text() == written
     edit(session, "mounting: 9, fixed", "mounting: 2, fixed")
+    writer.close()
     assert [run.state.value for run in SessionWriter.open(session).runs][-1] == "complete"
 
 
@@ -157,6 +158,7 @@ def test_going_on_with_a_session_keeps_the_readings_to_the_digit(session: Path) 
         writer.judge(writer.finish_run(journal), accepted=True)
     again = read_session(session)
     assert (again.set_up_errors, len(again.runs)) == (before, 5)
+    writer.close()
     assert (
         "fixed_ball_um: [10.1, 35.0, -0.3], moving_ball_um: [-17.0, -34.0, null]"
         in (session / "session.yaml").read_text()

@@ -47,7 +47,7 @@ def reread(writer: SessionWriter) -> list[tuple[str, str, str]]:
 def test_a_new_session_holds_machine_and_plan(writer: SessionWriter, machine) -> None:
     session = read_session(writer.session.folder)
     assert sorted(path.name for path in session.folder.iterdir()) == [
-        "machine.yaml", "plan.yaml", "programs", "runs", "session.yaml"
+        ".lock", "machine.yaml", "plan.yaml", "programs", "runs", "session.yaml"
     ]  # fmt: skip
     assert session.plan == PLAN.to_domain()
     assert np.array_equal(session.machine.hexapod.base_joints_mm, machine.hexapod.base_joints_mm)
@@ -112,6 +112,7 @@ def test_the_station_died_while_recording(writer: SessionWriter) -> None:
     journal = writer.start_run("low", Direction.CW, COLUMNS, started=BEGUN, mounting=1)
     fill(journal)
     journal.close()
+    writer.close()
     again = SessionWriter.open(writer.session.folder)
     assert reread(again) == [("low cw 1", "recording", "low-cw-1.csv.part")]
     assert len(again.session.load(again.runs[0]).recording) == 700
@@ -130,6 +131,7 @@ def test_the_station_died_before_the_part_was_noted(writer: SessionWriter) -> No
     fill(journal)
     journal.close()
     (folder / "session.yaml").write_bytes(before)
+    writer.close()
     again = SessionWriter.open(folder)
     assert reread(again) == [("low cw 1", "recording", "low-cw-1.csv.part")]
     assert b"low-cw-1.csv.part" in (folder / "session.yaml").read_bytes()
@@ -143,6 +145,7 @@ def test_the_station_died_between_sealing_and_noting_it(writer: SessionWriter) -
     done = writer.finish_run(journal)
     (folder / "session.yaml").write_bytes(noted)
     assert read_session(folder).runs[0].state is RunState.RECORDING
+    writer.close()
     again = SessionWriter.open(folder)
     assert again.runs[0] == done
     assert reread(again) == [("low cw 1", "complete", "low-cw-1.csv")]
@@ -171,3 +174,34 @@ def test_a_whole_session_or_nothing(tmp_path: Path, machine) -> None:
     with pytest.raises(ValueError, match="length_mm is nan"):
         write_session(tmp_path / "whole", machine, PLAN, [FinishedRun("low", Direction.CCW, columns)])
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "details",
+    [
+        SessionDetails(bar=Bar("", 0.15, 0.0005, None, None, None)),
+        SessionDetails(ambient_temp_c=float("nan")),
+        SessionDetails(bar=Bar("", 100.0, 0.0005, None, None, None)),
+    ],
+    ids=["metres", "no number", "another bar"],
+)
+def test_details_that_no_session_may_have_make_no_folder(tmp_path: Path, machine, details) -> None:
+    with pytest.raises(InputError):
+        SessionWriter.create(tmp_path / "new", machine, PLAN, details)
+    assert not list(tmp_path.iterdir())
+    SessionWriter.create(tmp_path / "new", machine, PLAN, DETAILS).close()
+
+
+def test_a_seal_that_fails_tells_why_and_nothing_else_fails_after_it(writer: SessionWriter, monkeypatch) -> None:
+    journal = writer.start_run("low", Direction.CW, COLUMNS, started=BEGUN)
+    fill(journal)
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "rename", full)
+    with pytest.raises(OutputError, match="no space left on device"):
+        writer.finish_run(journal)
+    journal.sync()
+    journal.close()
+    assert journal.path.is_file()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from dbbstation.files.formats.jig import parse_jig
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.files.yaml.text import load_yaml
 
 FIXTURES = shipped_folder("fixtures")
 MACHINE = (FIXTURES / "machines" / "every-key.yaml").read_text()
@@ -330,3 +333,46 @@ def test_a_measured_ball_needs_plate_holder_and_uncertainty(tmp_path: Path) -> N
     assert faults_of(read_plan, tmp_path / "plan.yaml", text)[0].endswith(
         "balls.9-short: the key `holder` is missing; add it"
     )
+
+
+def _faults(tmp_path, text):
+    path, faults = tmp_path / "bomb.yaml", []
+    path.write_text(text, encoding="utf-8")
+    assert load_yaml(path, faults) is None
+    return [fault.what for fault in faults]
+
+
+def test_aliases_of_aliases_end_in_a_message(tmp_path):
+    """Nine aliases of nine aliases and so on, nine deep: 387 million values."""
+    lines = ["a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    for before, name in pairwise("abcdefghi"):
+        lines.append(f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]")
+    (what,) = _faults(tmp_path, "\n".join(lines))
+    assert "500,000 values" in what
+
+
+def test_brackets_without_end_end_in_a_message(tmp_path):
+    assert _faults(tmp_path, "a: " + "[" * 20000) == ["brackets or lists are nested too deeply"]
+
+
+@pytest.mark.parametrize(("number", "said"), [("0x" + "f" * 2000, "too large"), ("9" * 5000, "is not a number")])
+def test_numbers_beyond_all_bounds_are_not_quoted_whole(tmp_path, number, said):
+    (what,) = _faults(tmp_path, f"a: {number}")
+    assert said in what
+    assert len(what) < 150
+
+
+def test_a_pipe_is_not_waited_for_and_a_device_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    for path in (tmp_path / "pipe.yaml", Path("/dev/zero")):
+        faults = []
+        assert load_yaml(path, faults) is None
+        assert "a pipe or a device" in faults[0].what
+
+
+def test_a_file_beyond_the_limit_is_not_read(tmp_path):
+    path, faults = tmp_path / "large.yaml", []
+    with path.open("wb") as file:
+        file.truncate(30_000_000)
+    assert load_yaml(path, faults) is None
+    assert "30,000,000 bytes" in faults[0].what

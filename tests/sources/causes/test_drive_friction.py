@@ -13,6 +13,7 @@ from dbbstation.machine.kinematics import forward, inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.sources.causes.drive_friction import TURNED_OVER_MM, DriveFriction, driven_directions
 from dbbstation.sources.contract import Motion
+from dbbstation.trace.columns import currents
 from tests.sources.runs import random_machine, random_run, run
 
 DRIVES = DriveFriction()
@@ -30,7 +31,7 @@ def all_struts(reference, lengths_mm, time_s, load_n=None) -> Motion:
         frames.to_poses(reference.hexapod.rotation),
         is_path=True,
         time_s=np.asarray(time_s, dtype=float),
-        motor_current_a=np.zeros((len(lengths_mm), 6)),
+        logged=currents(np.zeros((len(lengths_mm), 6))),
         load_n=load_n,
     )
 
@@ -110,6 +111,6 @@ def test_a_machine_without_masses_is_told_what_its_file_lacks(reference):
 
 
 def test_poses_without_time_have_no_speed(reference):
-    motion = replace(run((0, 0, -1008), (10, 0)), time_s=None, motor_current_a=np.zeros((202, 6)))
+    motion = replace(run((0, 0, -1008), (10, 0)), time_s=None, logged=currents(np.zeros((202, 6))))
     with pytest.raises(ModelError, match="drive-friction needs time"):
         DRIVES.effect(motion, reference, VALUES)

@@ -13,6 +13,7 @@ from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Thermometer
 from dbbstation.sources.laws.by_temperature import following_thermometers
 from dbbstation.sources.registry import sources_named
+from dbbstation.trace.columns import temperatures
 from tests.sources.runs import random_run
 
 STRUTS, FRAME, BAR = (
@@ -28,7 +29,7 @@ def run_at(rng, **degc):
     shown = {name: Thermometer(ends, np.array([20.0, value, value])) for name, value in degc.items()}
     # What a run itself shows is coarser than the session's curve, which counts.
     logged = {name: np.full(len(motion), np.round(value)) for name, value in degc.items()}
-    return replace(motion, temperature_degc=logged, setup=replace(motion.setup, thermometers=shown))
+    return replace(motion, logged=temperatures(logged), setup=replace(motion.setup, thermometers=shown))
 
 
 def test_struts_grow_by_the_thermometers_on_them(reference, rng):
@@ -63,7 +64,7 @@ def test_without_its_thermometer_it_is_refused_by_name(reference, rng):
         STRUTS.require(run_at(rng, **{name: degc for name, degc in EACH.items() if name != "strut4"}))
     assert "strut4_temp_c, or machine_temp_c" in both.value.what
     with pytest.raises(ModelError, match="needs temperature"):
-        FRAME.require(replace(motion, temperature_degc={}))
+        FRAME.require(replace(motion, logged={}))
 
 
 def test_thermometers_are_followed_where_every_run_has_them(rng):

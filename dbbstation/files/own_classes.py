@@ -1,0 +1,96 @@
+"""Classes in Python files that a user names: error sources and NC dialects of one's own.
+
+A file is run as Python code, as any module is that one imports: name only files that you would run.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import sys
+import traceback
+from inspect import isabstract
+from types import ModuleType
+from typing import TYPE_CHECKING, TypeVar
+
+from dbbstation.catalogue import Found, classes_of, in_words
+from dbbstation.errors import Problem
+from dbbstation.files.source_text import decode, read_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+Base = TypeVar("Base")
+
+
+def classes_in_files(
+    files: Iterable[Path], base: type[Base], contract: str, faults: list[Problem]
+) -> list[Found[Base]]:
+    """Classes that derive from `base`, each with its place.
+
+    Args:
+        files: Python files; one that is named twice is run once.
+        base: what the classes derive from. Those whose name begins with an underscore, and abstract ones that others in
+            the file derive from, do not count.
+        contract: where to read what is asked of them.
+        faults: a file that is not there, not Python or has no such class is added.
+    """
+    found = []
+    for path in {path.resolve(): path for path in files}.values():
+        tree = _parsed(path, faults)
+        module = None if tree is None else _run(path, tree, faults)
+        if tree is None or module is None:
+            continue
+        lines = {node.name: node.lineno for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+        kinds = classes_of(module, base)
+        if not kinds:
+            faults.append(Problem(str(path), 0, 0, f"no class in it derives from {base.__name__}", contract))
+        for kind in kinds:
+            others = any(issubclass(other, kind) for other in kinds if other is not kind)
+            if not (isabstract(kind) and others):  # what others derive from may leave things to them
+                place = Problem(str(path), lines.get(kind.__name__, 0), 0, "")
+                found.append(Found(kind, place, contract))
+    return found
+
+
+def module_name(path: Path) -> str:
+    """Return a name that no other file has."""
+    return f"dbbstation_own_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:16]}"
+
+
+def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
+    """Read a file as Python; None with the fault and its place added."""
+    data = read_bytes(path, faults)
+    text = None if data is None else decode(data, str(path), faults)
+    if text is None:
+        return None
+    try:
+        return ast.parse(text, str(path))
+    except SyntaxError as error:
+        what = f"is not Python: {error.msg}"
+        faults.append(Problem(str(path), error.lineno or 0, error.offset or 0, what, "mend the line"))
+    except ValueError as error:
+        faults.append(Problem(str(path), 0, 0, f"is not Python: {error}", "name a Python file"))
+    return None
+
+
+def _run(path: Path, tree: ast.Module, faults: list[Problem]) -> ModuleType | None:
+    """Run a file as a module of its own; None with the fault and its line added. Nothing is written beside the file."""
+    module = ModuleType(module_name(path))
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module  # where dataclasses look up the types of their fields
+    try:
+        exec(compile(tree, str(path), "exec", dont_inherit=True), module.__dict__)  # noqa: S102 - asked for by name
+    except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+        del sys.modules[module.__name__]
+        what = f"cannot be run: {in_words(error)}"
+        faults.append(Problem(str(path), line_in(error, str(path)), 0, what, "mend the line"))
+        return None
+    return module
+
+
+def line_in(error: Exception, file: str) -> int:
+    """Return the last line of a file that an error came through; 0 where it did not."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return next((frame.lineno or 0 for frame in reversed(frames) if frame.filename == file), 0)

@@ -1,0 +1,78 @@
+"""An NC dialect by its name, or one of the user's own by its Python file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dbbstation.catalogue import Found, in_words
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.own_classes import classes_in_files, line_in
+from dbbstation.nc.dialect import Dialect
+from dbbstation.nc.registry import dialect_named
+from dbbstation.nc.toolpath import ToolpathBuilder
+
+CONTRACT = "see `A new dialect` in docs/nc.md"
+
+DECLARED = ("name", "extension", "what")
+"""What a dialect says of itself, a text each."""
+
+
+def dialect_given(name_or_file: str) -> Dialect:
+    """Return a dialect.
+
+    Args:
+        name_or_file: name of one that is known, or a file that ends in `.py`, which is run.
+
+    Raises:
+        StationError: nothing has this name.
+        InputError: the file is not there, not Python, or has not one dialect; or that does not read what it wrote.
+    """
+    if not name_or_file.endswith(".py"):
+        return dialect_named(name_or_file)
+    faults: list[Problem] = []
+    found = classes_in_files([Path(name_or_file)], Dialect, CONTRACT, faults)  # type: ignore[type-abstract]  # never made
+    if len(found) > 1:
+        names = ", ".join(one.kind.__name__ for one in found)
+        faults.append(Problem(name_or_file, 0, 0, f"there are several dialects in it: {names}", "leave one"))
+    if faults:
+        raise InputError(faults)
+    return _tried(found[0])
+
+
+def _tried(found: Found[Dialect]) -> Dialect:
+    """Return a dialect made from a class, after it has written a move and read it.
+
+    Raises:
+        InputError: what it lacks.
+    """
+    kind, place = found.kind, found.place
+    line = place.line
+    said = [f"it needs `{name}`, a text" for name in DECLARED if not isinstance(getattr(kind, name, None), str)]
+    if not said and not kind.extension.startswith("."):
+        said = ["its `extension` must begin with a dot"]
+    if not said:
+        try:
+            dialect = kind()
+            said = _unlike(dialect)
+        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+            said = [f"{in_words(error)}, when it was tried on two moves"]
+            line = line_in(error, place.file) or line
+        else:
+            if not said:
+                return dialect
+    raise InputError([Problem(place.file, line, 0, f"{kind.__name__}: {what}", found.remedy) for what in said])
+
+
+def _unlike(dialect: Dialect) -> list[str]:
+    """What a dialect reads otherwise than it wrote it."""
+    builder = ToolpathBuilder("trial")
+    builder.rapid(np.array([10.0, -20.0, -1000.0, 1.0, -2.0, 3.0]))
+    builder.feed(np.array([[10.5, -20.0, -1000.0, 1.0, -2.0, 3.5]]), 600.0)
+    wrote = builder.built()
+    read = dialect.read(dialect.write(wrote), "trial" + dialect.extension)
+    moves = read.poses[read.is_move]
+    if moves.shape != (2, 6) or not np.allclose(moves, wrote.poses[wrote.is_move], atol=1e-3):
+        return ["it does not read the two moves that it wrote"]
+    return []

@@ -1,0 +1,39 @@
+"""Compile the numerical loops for this computer: `python -m dbbstation.prepare`.
+
+The first command that needs a loop compiles it, which takes seconds, and keeps the code on disk. Whoever sets the program
+up can have that done beforehand; `dev.py` does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.sources.contract import Fitted, Motion, Setup
+from dbbstation.sources.registry import known_sources
+from dbbstation.sources.trial import tried
+
+
+def prepare() -> None:
+    """Call everything that is compiled, on a few poses of a machine that is shipped.
+
+    Raises:
+        InputError: the installation is not complete.
+    """
+    machine = read_machine(shipped_folder("fixtures") / "machines" / "every-key.yaml")
+    for source in known_sources().values():
+        tried(source, machine)
+    joints = Fitted.zero(known_sources()["base-joints"], machine)
+    model = MachineModel(machine, (joints,))
+    middle = np.array([0.0, 0.0, sum(machine.travel.z_mm) / 2.0, 0.0, 0.0, 0.0])
+    ball = Setup("", "", "", "", middle[:3], 0.0, 0.0, 0.0)
+    motion = Motion(np.tile(middle, (3, 1)) + np.arange(3.0)[:, None], is_path=True, setup=ball)
+    for one in (MachineModel(machine), model):
+        one.actual(motion)
+        one.bar(motion).by_source(joints.source, machine, joints.values)
+
+
+if __name__ == "__main__":
+    prepare()

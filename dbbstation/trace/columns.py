@@ -1,0 +1,147 @@
+"""Columns of a recorded run, each declared once: what it means, who reads it, which values are plausible.
+
+A new column is a line in `COLUMNS`. Reading, checking, writing, cutting and averaging take it from here, and an error source
+finds it in `Motion.logged` under its name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
+
+    Logged = Mapping[str, NDArray[np.float64]]
+
+
+class Kind(StrEnum):
+    """What a column is, and with that who reads it."""
+
+    TIME = "time"
+    """Cutting, sources that act in time."""
+    LENGTH = "length"
+    """Every fit."""
+    ANGLE = "angle"
+    """Cutting, in place of time."""
+    TEMPERATURE = "temperature"
+    """Sources that follow thermometers."""
+    CURRENT = "current"
+    """The channel of the motors."""
+    OTHER = "other"
+    """Sources that ask for it by its name."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One numeric column.
+
+    Attributes:
+        name: as the file has it.
+        kind: what it is, and who reads it.
+        unit: as printed.
+        meaning: one line with the sign.
+        decimals: as written by the station.
+        size: greatest plausible absolute value, in that unit.
+        of: sensor or motor that it is of, as in `strut3` or `motor3`; empty where there is one only.
+    """
+
+    name: str
+    kind: Kind
+    unit: str
+    meaning: str
+    decimals: int
+    size: float
+    of: str = ""
+
+
+_DEGREES_OF_TURNS = 36_000.0
+_SENSORS = ("bar", "jig", "machine", *(f"strut{i}" for i in range(1, 7)))
+_PULL = "positive when it pulls the platform towards the base"
+
+_DECLARED = (
+    Column("t_s", Kind.TIME, "s", "host time since the first sample, rising", 6, 1e6),
+    Column("length_mm", Kind.LENGTH, "mm", "distance between the two ball centres, raw", 6, 1e4),
+    Column(
+        "theta_deg",
+        Kind.ANGLE,
+        "deg",
+        "commanded angle from +X towards +Y, for both directions",
+        6,
+        _DEGREES_OF_TURNS,
+    ),
+    *(
+        Column(f"{one}_temp_c", Kind.TEMPERATURE, "degC", f"temperature of the {one}", 3, 150.0, one)
+        for one in _SENSORS
+    ),
+    *(
+        Column(f"motor{i}_current_a", Kind.CURRENT, "A", f"current of motor {i}, {_PULL}", 5, 1e3, f"motor{i}")
+        for i in range(1, 7)
+    ),
+)
+
+COLUMNS = {column.name: column for column in _DECLARED}
+"""Every numeric column by name."""
+
+TIME, LENGTH, THETA = "t_s", "length_mm", "theta_deg"
+REQUIRED = (TIME, LENGTH)
+STATUS = "status"
+"""What the instrument says of a sample; `STATUS_GOOD` or nothing where it can be trusted."""
+STATUS_GOOD = "ok"
+CRC = "crc"
+"""Checksum of the line, always the last column."""
+TEXTS = (STATUS, CRC)
+
+
+def is_known(name: str) -> bool:
+    """Whether the format has a column of this name."""
+    return name in COLUMNS or name in TEXTS
+
+
+class WithLogged:
+    """What carries the columns that were logged beside the bar, `logged`: values by the name of their column, shape (n,)."""
+
+    logged: Logged
+
+    @property
+    def temperature_degc(self) -> dict[str, NDArray[np.float64]]:
+        """Logged temperatures by sensor (`bar`, `jig`, `machine`, `strut1` ... `strut6`), shape (n,) each [degC]."""
+        return {COLUMNS[name].of: values for name, values in self.logged.items() if _is(name, Kind.TEMPERATURE)}
+
+    @property
+    def motor_current_a(self) -> NDArray[np.float64] | None:
+        """Logged currents of the six motors, NaN for one that was not logged, shape (n, 6) [A]; None where none was."""
+        there = next((values for name, values in self.logged.items() if _is(name, Kind.CURRENT)), None)
+        if there is None:
+            return None
+        return np.column_stack([self.logged.get(name, np.full(len(there), np.nan)) for name in _named(Kind.CURRENT)])
+
+
+def each(logged: Logged, change: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Logged:
+    """Return every column changed in one way: cut, averaged, continued."""
+    return {name: change(values) for name, values in logged.items()}
+
+
+def temperatures(by_sensor: Logged) -> Logged:
+    """Return temperatures by sensor, shape (n,) each [degC], as columns."""
+    names = {COLUMNS[name].of: name for name in _named(Kind.TEMPERATURE)}
+    return {names[sensor]: values for sensor, values in by_sensor.items()}
+
+
+def currents(current_a: NDArray[np.float64]) -> Logged:
+    """Return the currents of the six motors, shape (n, 6) [A], as columns."""
+    return dict(zip(_named(Kind.CURRENT), np.ascontiguousarray(current_a.T), strict=True))
+
+
+def _is(name: str, kind: Kind) -> bool:
+    return name in COLUMNS and COLUMNS[name].kind is kind
+
+
+def _named(kind: Kind) -> list[str]:
+    """Names of the columns of a kind, in the order of their declaration."""
+    return [column.name for column in _DECLARED if column.kind is kind]

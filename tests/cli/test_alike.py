@@ -35,7 +35,7 @@ NO_TESTS = {
     "session accept": "takes one run by its name",
     "session reject": "takes one run by its name",
     "session seal": "hashes all recordings",
-    "session take-in": "takes recordings as they are named",
+    "session take-in": "takes in all that lie in the folder",
     "settings": "looks beside the session and does not read it",
     "study coverage": "its --plan chooses between its own two plans",
     "study blind": "judges whole sessions against their answers",

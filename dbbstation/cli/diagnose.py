@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.exclude import exclude_option
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.source_files import source_file_option
 
@@ -32,7 +32,7 @@ STAGES = {
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
 @click.option("--sources", metavar="A,B,...", help="Error sources to compare [default: all].")
 @source_file_option
-@exclude_option
+@chosen_tests_options
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
 @click.option(
     "--keep-unexplained",
@@ -47,6 +47,7 @@ def diagnose(
     *,
     sources: str | None,
     source_files: tuple[Path, ...],
+    tests: tuple[str, ...],
     exclude: tuple[str, ...],
     out: Path | None,
     keep_unexplained: bool,
@@ -87,7 +88,7 @@ def diagnose(
     candidates = [name.strip() for name in sources.split(",")] if sources else None
     known = every_source(source_files)
     with count_bar("reading runs") as reading, stage_bar("diagnosis", STAGES) as progress:
-        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress, reading)
+        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress, reading, tests)
     found, summary = diagnosed.diagnosis, diagnosed.summary()
     if out is not None:
         unnamed = _kept(found) if keep_unexplained else None

@@ -53,6 +53,7 @@ def diagnose_sessions(
     known: Mapping[str, ErrorSource] | None = None,
     progress: Callable[[str], None] = lambda _: None,
     reading: Callable[[int, int], None] = lambda _done, _of: None,
+    only: Sequence[str] = (),
 ) -> Diagnosed:
     """Read sessions of one machine and find what a kinematic calibration of them leaves out.
 
@@ -64,6 +65,7 @@ def diagnose_sessions(
         known: every error source by name; those of the package if None.
         progress: told each stage of the work as it begins.
         reading: told how many runs of a session, of how many, are read.
+        only: names of tests to take; empty for all.
 
     Raises:
         InputError: faults of files and traces.
@@ -76,7 +78,7 @@ def diagnose_sessions(
         if not source.candidate:
             what = f"{source.name} is no cause: it only keeps in a model what a diagnosis left without a name"
             raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
-    recorded = load_sessions(paths, exclude, reading)
+    recorded = load_sessions(paths, exclude, reading, only)
     for warning in recorded.warnings:
         say(f"note: {warning}")
     usable, lacking = usable_sources(recorded.machine, recorded.observations, named)

@@ -45,6 +45,7 @@ def load_sessions(
     paths: Sequence[Path],
     exclude: Sequence[str] = (),
     progress: Callable[[int, int], None] = lambda _done, _of: None,
+    only: Sequence[str] = (),
 ) -> Recorded:
     """Read sessions, cut their accepted runs to circles and attach what was commanded.
 
@@ -52,15 +53,19 @@ def load_sessions(
         paths: session folders or session files.
         exclude: names of tests to leave out.
         progress: told how many runs of a session, of how many, are read.
+        only: names of tests to take; empty for all.
 
     Raises:
         InputError: every fault of every file and trace; a session that is given twice; sessions of different
-            machines; no accepted run; an excluded test that no session has.
+            machines; no accepted run; a test that is named and that no session has.
     """
     sessions = _unique_names([read_session(path) for path in paths])
     warnings = _check_one_machine(sessions)
     _check_no_copies(sessions)
-    _check_excluded(sessions, exclude)
+    every = {test for session in sessions for test in session.plan.tests}
+    _check_named(sessions, every, exclude, " to exclude")
+    _check_named(sessions, every, only)
+    exclude = [*exclude, *(test for test in every if only and test not in only)]
     observations: list[Observation] = []
     problems: list[Problem] = []
     logs: dict[str, list[tuple[float, Recording]]] = {}
@@ -219,10 +224,10 @@ def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
     return told
 
 
-def _check_excluded(sessions: Sequence[SessionFolder], exclude: Sequence[str]) -> None:
-    tests = {test for session in sessions for test in session.plan.tests}
-    unknown = [name for name in exclude if name not in tests]
+def _check_named(sessions: Sequence[SessionFolder], every: set[str], named: Sequence[str], why: str = "") -> None:
+    """Refuse names of tests that no session has."""
+    unknown = [name for name in named if name not in every]
     if unknown:
-        what = f"no session has a test {', '.join(unknown)} to exclude"
-        known = f"tests are {', '.join(sorted(tests))}"
+        what = f"no session has a test {', '.join(unknown)}{why}"
+        known = f"tests are {', '.join(sorted(every))}"
         raise InputError([Problem(str(sessions[0].folder), 0, 0, what, known)])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.exclude import exclude_option
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.source_files import source_file_option
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     metavar="SOURCE.PARAMETER,...",
     help="Parameters to hold at nominal, as many as the tests cannot identify.",
 )
-@exclude_option
+@chosen_tests_options
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the calibrated model here.")
 @figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the model file and the figure.")
@@ -56,6 +56,7 @@ def calibrate(
     law_over_time: bool,
     method: str,
     prescribe: str | None,
+    tests: tuple[str, ...],
     exclude: tuple[str, ...],
     out: Path | None,
     figure: Path | None,
@@ -91,14 +92,13 @@ def calibrate(
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.errors import ModelError
-    from dbbstation.files.atomic import refuse_existing, write_bytes
+    from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source, sources_of
     from dbbstation.recorded import load_sessions
     from dbbstation.sources.registry import sources_named
 
-    for path in filter(None, (out, figure)):
-        refuse_existing(path, force=force)
+    refuse_outputs((out, figure), force=force)
     chosen = KINEMATIC_SOURCES if sources is None else tuple(filter(None, map(str.strip, sources.split(","))))
     every = every_source(source_files)
     for name in set(sources_of(source_files, every)) - set(chosen):
@@ -110,7 +110,7 @@ def calibrate(
             remedy=f"name one such as {KINEMATIC_SOURCES[0]}, or leave --sources out",
         )
     with count_bar("reading runs") as reading:
-        recorded = load_sessions(sessions, exclude, reading)
+        recorded = load_sessions(sessions, exclude, reading, tests)
     for warning in recorded.warnings:
         say(f"note: {warning}")
     fitted = fitted if law_over_time else _following_thermometers(fitted, recorded.observations)
@@ -248,7 +248,7 @@ def _print_misfit(summary: Mapping[str, Any]) -> None:
 
 
 def _print_parameters(summary: Mapping[str, Any]) -> None:
-    from dbbstation.cli.output import print_table
+    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
 
     rows = []
     for source in summary["sources"]:
@@ -258,8 +258,9 @@ def _print_parameters(summary: Mapping[str, Any]) -> None:
             value, uncertainty, unit = number["value"], number["uncertainty"], number["unit"]
             if unit == "mm" and source["name"] not in IN_MM:
                 value, uncertainty, unit = 1e3 * value, 1e3 * uncertainty, "µm"
-            rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), value, "±", uncertainty, unit])
-    print_table(["source", "parameter", "value", "", "u", "unit"], rows)
+            known = [value, uncertainty, COVERAGE_FACTOR * uncertainty, unit]
+            rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), *known])
+    print_table(["source", "parameter", "value", "u", EXPANDED, "unit"], rows)
 
 
 SAID_OF_SCATTER = {

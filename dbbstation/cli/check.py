@@ -2,32 +2,59 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.circle_options import approach_of, circle_options
 from dbbstation.cli.source_files import source_file_option
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.errors import Problem
+    from dbbstation.files.checking import Checked
+    from dbbstation.nc.circle_program import Approach
 
 
 @click.command()
 @click.argument("files", nargs=-1, type=click.Path(path_type=Path), metavar="FILE...")
 @source_file_option
+@chosen_tests_options
+@circle_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.option("--schema", metavar="FORMAT", help="Print the JSON Schema of a format, such as dbb-plan/2, and stop.")
-def check(files: tuple[Path, ...], *, source_files: tuple[Path, ...], as_json: bool, schema: str | None) -> None:
-    r"""Validate machines, plans, jigs, models, runs (.csv, .csv.part), recordings of drives and session folders.
+def check(
+    files: tuple[Path, ...],
+    *,
+    source_files: tuple[Path, ...],
+    tests: tuple[str, ...],
+    exclude: tuple[str, ...],
+    step_deg: float,
+    clearance_mm: float,
+    bar_stays_on: bool,
+    as_json: bool,
+    schema: str | None,
+) -> None:
+    r"""Validate machines, plans, jigs, models, settings, runs (.csv, .csv.part), recordings of drives and session folders.
 
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
     its runs: hashes, checksums, units, and whether the machine can travel the plan's circles.
 
+    Plans and one machine together are also dry-run: every program that `dbbstation program` would write with the same options
+    is held against the travel of axes, angles and struts and against the feeds, on its whole way. All faults are listed.
+
     \b
     Examples:
       dbbstation check plan.yaml machine.yaml
+      dbbstation check plan.yaml machine.yaml --exclude h --clearance-mm 50
       dbbstation check 2026-11-20-hexapod-7
       dbbstation check --schema dbb-plan/2 > dbb-plan-2.schema.json
     """
-    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.output import print_json
     from dbbstation.errors import InputError
 
     if schema is not None:
@@ -43,25 +70,96 @@ def check(files: tuple[Path, ...], *, source_files: tuple[Path, ...], as_json: b
 
     known = every_source(source_files)
     results = [check_one(file, known) for file in files]
+    machines = _sound(results, "dbb-machine")
+    # Of several machines nobody has said which the plans are for.
+    runs = [
+        _dry_run(plan, machine, tests, exclude, step_deg, approach_of(clearance_mm, bar_stays_on=bar_stays_on))
+        for plan in _sound(results, "dbb-plan")
+        for machine in (machines if len(machines) == 1 else ())
+    ]
+    if (tests or exclude) and not runs:
+        raise click.UsageError(
+            "--test and --exclude choose tests of a dry run: give plans and one machine, without faults"
+        )
     problems = [problem for result in results for problem in result.problems]
+    problems += [problem for run in runs for problem in run.problems]
     if as_json:
         print_json(
             {
                 "files": [
                     {"file": str(r.path), "format": r.kind, "ok": not r.problems, "summary": r.summary} for r in results
                 ],
+                "dry_runs": [
+                    {"plan": str(r.plan), "machine": str(r.machine), "programs": r.programs, "ok": not r.problems}
+                    for r in runs
+                ],
                 "problems": [asdict(problem) for problem in problems],
                 "warnings": [asdict(warning) for result in results for warning in result.warnings],
             }
         )
     else:
-        for result in results:
-            for warning in result.warnings:
-                say(f"note: {warning}")
-            if not result.problems:
-                click.echo(f"ok  {result.path}  {result.summary}")
+        _print(results, runs)
     if problems:
         raise InputError(set(problems))
+
+
+def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:
+    """Print what is in order, and notes; faults come as the command's error."""
+    from dbbstation.cli.output import say
+
+    for result in results:
+        for warning in result.warnings:
+            say(f"note: {warning}")
+        if not result.problems:
+            click.echo(f"ok  {result.path}  {result.summary}")
+    for run in runs:
+        if not run.problems:
+            click.echo(f"ok  {run.plan} on {run.machine}  dry run: {run.programs} programs within travel and feeds")
+
+
+@dataclass(frozen=True)
+class DryRun:
+    """The programs of a plan, tried on a machine.
+
+    Attributes:
+        plan: file of the plan.
+        machine: file of the machine.
+        programs: how many were tried.
+        problems: what `program` would refuse.
+    """
+
+    plan: Path
+    machine: Path
+    programs: int
+    problems: list[Problem]
+
+
+def _sound(results: Sequence[Checked], kind: str) -> list[Path]:
+    """Files of a format that have no faults."""
+    return [one.path for one in results if one.kind.partition("/")[0] == kind and not one.problems]
+
+
+def _dry_run(
+    plan_file: Path,
+    machine_file: Path,
+    tests: tuple[str, ...],
+    exclude: tuple[str, ...],
+    step_deg: float,
+    approach: Approach | None,
+) -> DryRun:
+    from dbbstation.cli.progress import count_bar
+    from dbbstation.errors import Problem
+    from dbbstation.files.formats.machine import read_machine
+    from dbbstation.files.formats.plan import read_plan
+    from dbbstation.nc.export import dry_run
+
+    plan, machine = read_plan(plan_file), read_machine(machine_file)
+    chosen = chosen_of(plan.name, plan.tests, tests, exclude)
+    with count_bar("programs") as trying:
+        count, faults = dry_run(plan, machine, tests=chosen, step_deg=step_deg, approach=approach, progress=trying)
+    on = f"on {machine_file}: "
+    problems = [Problem(str(plan_file), 0, 0, f"{on}{fault.where}: {fault.what}", fault.remedy) for fault in faults]
+    return DryRun(plan_file, machine_file, count, problems)
 
 
 def _print_schema(name: str) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.exclude import exclude_option
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.figure_option import figure_option, format_of
 
 if TYPE_CHECKING:
@@ -19,11 +19,20 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("a", type=click.Path(path_type=Path), metavar="A")
 @click.argument("b", type=click.Path(path_type=Path), metavar="B")
-@exclude_option
+@chosen_tests_options
 @figure_option()
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def compare(a: Path, b: Path, *, exclude: tuple[str, ...], figure: Path | None, force: bool, as_json: bool) -> None:
+def compare(
+    a: Path,
+    b: Path,
+    *,
+    tests: tuple[str, ...],
+    exclude: tuple[str, ...],
+    figure: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
     r"""Put two sessions side by side, without a model: differences are B less A.
 
     For last year against today, or a simulation against a recording. The result is where they differ, by how much
@@ -46,7 +55,7 @@ def compare(a: Path, b: Path, *, exclude: tuple[str, ...], figure: Path | None, 
 
     if figure is not None:
         refuse_existing(figure, force=force)
-    one, other = _both(a, b, exclude)
+    one, other = _both(a, b, tests, exclude)
     for name, recorded in (("A", one), ("B", other)):
         for warning in recorded.warnings:
             say(f"note: {name}: {warning}")
@@ -64,7 +73,7 @@ def compare(a: Path, b: Path, *, exclude: tuple[str, ...], figure: Path | None, 
         _print(summary)
 
 
-def _both(a: Path, b: Path, exclude: tuple[str, ...]) -> tuple[Recorded, Recorded]:
+def _both(a: Path, b: Path, tests: tuple[str, ...], exclude: tuple[str, ...]) -> tuple[Recorded, Recorded]:
     """Read both sessions, told apart by more than their names.
 
     Raises:
@@ -75,9 +84,9 @@ def _both(a: Path, b: Path, exclude: tuple[str, ...]) -> tuple[Recorded, Recorde
     from dbbstation.recorded import load_sessions
 
     with count_bar(f"reading {a.name}") as reading:
-        one = load_sessions([a], exclude, reading)
+        one = load_sessions([a], exclude, reading, tests)
     with count_bar(f"reading {b.name}") as reading:
-        other = load_sessions([b], exclude, reading)
+        other = load_sessions([b], exclude, reading, tests)
     if set(one.sessions.values()) == set(other.sessions.values()):
         what = f"this is the same session as {a}, byte for byte"
         raise InputError([Problem(str(b), 0, 0, what, "give two sessions")])

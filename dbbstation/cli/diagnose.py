@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.exclude import exclude_option
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.source_files import source_file_option
 
@@ -32,7 +32,7 @@ STAGES = {
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
 @click.option("--sources", metavar="A,B,...", help="Error sources to compare [default: all].")
 @source_file_option
-@exclude_option
+@chosen_tests_options
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the joint model here.")
 @click.option(
     "--keep-unexplained",
@@ -47,6 +47,7 @@ def diagnose(
     *,
     sources: str | None,
     source_files: tuple[Path, ...],
+    tests: tuple[str, ...],
     exclude: tuple[str, ...],
     out: Path | None,
     keep_unexplained: bool,
@@ -77,18 +78,17 @@ def diagnose(
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.diagnosed import diagnose_sessions
-    from dbbstation.files.atomic import refuse_existing, write_bytes
+    from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source
 
     if keep_unexplained and out is None:
         raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
-    for path in filter(None, (out, figure)):
-        refuse_existing(path, force=force)
+    refuse_outputs((out, figure), force=force)
     candidates = [name.strip() for name in sources.split(",")] if sources else None
     known = every_source(source_files)
     with count_bar("reading runs") as reading, stage_bar("diagnosis", STAGES) as progress:
-        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress, reading)
+        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress, reading, tests)
     found, summary = diagnosed.diagnosis, diagnosed.summary()
     if out is not None:
         unnamed = _kept(found) if keep_unexplained else None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.exclude import exclude_option
+from dbbstation.cli.chosen_tests import chosen_tests_options
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,10 +19,16 @@ from dbbstation.cli.source_files import source_file_option
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
 @click.option("--model", required=True, type=click.Path(path_type=Path), help="Model file of `calibrate`.")
 @source_file_option
-@exclude_option
+@chosen_tests_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def evaluate(
-    sessions: tuple[Path, ...], *, model: Path, source_files: tuple[Path, ...], exclude: tuple[str, ...], as_json: bool
+    sessions: tuple[Path, ...],
+    *,
+    model: Path,
+    source_files: tuple[Path, ...],
+    tests: tuple[str, ...],
+    exclude: tuple[str, ...],
+    as_json: bool,
 ) -> None:
     r"""Compare recordings with the nominal machine (before) and with a model (after), which must be of the same machine.
 
@@ -53,7 +59,7 @@ def evaluate(
     settings = shop_settings()
     identified = read_model(model, every_source(source_files))
     with count_bar("reading runs") as reading:
-        recorded = load_sessions(sessions, exclude, reading)
+        recorded = load_sessions(sessions, exclude, reading, tests)
     check_model_is_of(recorded.machine, identified.model.machine)
     for warning in recorded.warnings:
         say(f"note: {warning}")

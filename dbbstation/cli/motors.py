@@ -22,7 +22,8 @@ def print_currents(summary: Mapping[str, Any]) -> None:
         return
     click.echo()
     click.echo(
-        f"motor currents, with the platform's weight of {currents['weight_taken_as_known_n']:.0f} N taken as known"
+        f"motor currents, with the platform's weight of {currents['weight_taken_as_known_n']:.0f} N taken as known; "
+        "±: u, one standard uncertainty"
     )
     titles = ["motor", "N/A", "±", "friction N", "±", "per speed N s/mm", "±", "per load N/kN", "±", "asymmetry N", "±"]
     kinds = (
@@ -51,7 +52,7 @@ def print_currents(summary: Mapping[str, Any]) -> None:
             [name.removesuffix("_mm"), *(text for channel in channels for text in _with_uncertainty(by[channel], 3))]
             for name, by in currents["centre_of_gravity"].items()
         ]
-        click.echo("centre of gravity, actual minus machine file, platform axes [mm]")
+        click.echo("centre of gravity, actual minus machine file, platform axes [mm]; ±: u, one standard uncertainty")
         print_table(["", *titles], shifts)
     for note in currents["notes"]:
         click.echo(f"note: {note}")

@@ -11,6 +11,12 @@ import click
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+COVERAGE_FACTOR = 2.0
+"""k of the expanded uncertainty U = k u that people read: about 95 % of a normal distribution [GUM 6.3.3]."""
+
+EXPANDED = f"U (k = {COVERAGE_FACTOR:g})"
+"""Its name in headings."""
+
 _LOG = logging.getLogger(__name__)
 
 

@@ -42,7 +42,7 @@ def predict(
     """
     import numpy as np
 
-    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_json, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
@@ -81,7 +81,10 @@ def predict(
         )
         return
     say(f"{len(actual)} poses written to {out}")
-    say(f"greatest position error {error_um.max():.1f} µm, known to {worst_u_um:.1f} µm (one standard deviation)")
+    say(
+        f"greatest position error {error_um.max():.1f} µm; greatest uncertainty u {worst_u_um:.1f} µm, "
+        f"{EXPANDED} {COVERAGE_FACTOR * worst_u_um:.1f} µm"
+    )
     for text in identified.directions_lost:
         say(f"not known, and not in the uncertainty: {text}")
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.circle_options import approach_of, circle_options
 from dbbstation.cli.correction import largest_correction_option
 from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
@@ -27,24 +29,8 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder to write to.")
 @click.option("--model", "model_file", type=_FILE, help="Compensate with this calibrated model.")
 @source_file_option
-@click.option("--test", "tests", multiple=True, metavar="NAME", help="This test only; may be given more than once.")
-@shop_option(
-    "--step-deg",
-    setting="program.step_deg",
-    type=click.FloatRange(0.01, 5.0),
-    default=0.1,
-    show_default=True,
-    help="Angle between points [deg].",
-)
-@shop_option(
-    "--clearance-mm",
-    setting="program.clearance_mm",
-    type=click.FloatRange(0.0),
-    default=20.0,
-    show_default=True,
-    help="Height of rapid moves above the first point [mm].",
-)
-@click.option("--bar-stays-on", is_flag=True, help="Start and end with the bar on its balls: no rapids, no stops.")
+@chosen_tests_options
+@circle_options
 @click.option(
     "--time-s",
     type=float,
@@ -63,6 +49,7 @@ def program(
     model_file: Path | None,
     source_files: tuple[Path, ...],
     tests: tuple[str, ...],
+    exclude: tuple[str, ...],
     step_deg: float,
     clearance_mm: float,
     bar_stays_on: bool,
@@ -81,7 +68,7 @@ def program(
     Examples:
       dbbstation program --plan table2.yaml --machine machine.yaml --out nominal
       dbbstation program --plan table2.yaml --machine machine.yaml --model model.yaml --out compensated
-      dbbstation program --plan table2.yaml --machine machine.yaml --test a --test f --out two --json
+      dbbstation program --plan table2.yaml --machine machine.yaml --test a,f --out two --json
     """
     from dbbstation.cli.output import say
     from dbbstation.cli.programs import loaded_inverse, origin_of, print_programs
@@ -90,7 +77,6 @@ def program(
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.own_dialects import dialect_given
-    from dbbstation.nc.circle_program import Approach
     from dbbstation.nc.export import circle_programs
 
     written_in = dialect_given(dialect)
@@ -103,9 +89,9 @@ def program(
             written_in,
             inverse=inverse,
             origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse),
-            tests=tests,
+            tests=chosen_of(plan.name, plan.tests, tests, exclude),
             step_deg=step_deg,
-            approach=None if bar_stays_on else Approach(clearance_mm),
+            approach=approach_of(clearance_mm, bar_stays_on=bar_stays_on),
             progress=writing,
         )
     write_folder(out, {each.name: each.text for each in programs}, force=force)

@@ -156,7 +156,7 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
 
     found = sealing(folder)
     if found.files and not dry_run:
-        write_text(found.path, found.text, force=True)
+        write_text(found.path, found.text, force=True, rewrites=True)
     if as_json:
         print_json({"session": str(found.path), "sealed": [] if dry_run else found.files, "without_hash": found.files})
         return

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
 from dbbstation.cli.source_files import source_file_option
 
 
@@ -14,10 +15,21 @@ from dbbstation.cli.source_files import source_file_option
 @source_file_option
 @click.option("--plan", required=True, type=click.Path(path_type=Path), help="Test plan.")
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder to make.")
+@chosen_tests_options
 @click.option("--samples", default=720, show_default=True, type=click.IntRange(36), help="Samples per turn.")
 @click.option("--interval-s", default=200.0, show_default=True, help="Time from the start of one run to the next [s].")
+@click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def simulate(
-    *, model: Path, source_files: tuple[Path, ...], plan: Path, out: Path, samples: int, interval_s: float
+    *,
+    model: Path,
+    source_files: tuple[Path, ...],
+    plan: Path,
+    out: Path,
+    tests: tuple[str, ...],
+    exclude: tuple[str, ...],
+    samples: int,
+    interval_s: float,
+    as_json: bool,
 ) -> None:
     r"""Write the session that a ball bar would record on the machine of a model, without noise.
 
@@ -32,7 +44,7 @@ def simulate(
     from dataclasses import replace
     from datetime import UTC, datetime, timedelta
 
-    from dbbstation.cli.output import say
+    from dbbstation.cli.output import print_json, say
     from dbbstation.errors import OutputError
     from dbbstation.files.formats.model import read_model
     from dbbstation.files.formats.plan import read_inline_plan
@@ -46,10 +58,12 @@ def simulate(
     identified = read_model(model, every_source(source_files))
     machine_model = identified.model.of_the_machine()
     inline = read_inline_plan(plan)
-    tests = inline.to_domain()
-    tests.check(machine_model.machine)
+    planned = inline.to_domain()
+    planned.check(machine_model.machine)
+    chosen = chosen_of(planned.name, planned.tests, tests, exclude)
     begun = datetime(2000, 1, 1, tzinfo=UTC)  # a date that nobody takes for a measurement's
-    order = [(test, 1) for test in tests.tests.values()] + [(tests.tests[name], 2) for name in tests.repeat_at_end]
+    order = [(planned.tests[name], 1) for name in chosen]
+    order += [(planned.tests[name], 2) for name in planned.repeat_at_end if name in chosen]
     runs: list[FinishedRun] = []
     for mounting, (test, repeat) in enumerate(order, start=1):
         setup, actual = setup_of(test), machine_model
@@ -63,4 +77,7 @@ def simulate(
             started = begun + timedelta(seconds=started_s)
             runs.append(FinishedRun(test.name, direction, columns, repeat, mounting, started))
     write_session(out, machine_model.machine, inline, runs)
-    say(f"{len(runs)} runs written to {out}")
+    if as_json:
+        print_json({"session": str(out), "runs": len(runs), "tests": chosen})
+    else:
+        say(f"{len(runs)} runs written to {out}")

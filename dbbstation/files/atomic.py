@@ -15,31 +15,37 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import OutputError
+from dbbstation.files.inputs import was_read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
 _LOG = logging.getLogger(__name__)
 
 _MARK = ".new"
 
 
-def write_text(path: Path, text: str, *, force: bool = False) -> None:
-    """Write a text file, UTF-8 with LF.
-
-    Raises:
-        OutputError: it exists and `force` is not given, or it cannot be written; the old file is then untouched.
-    """
-    write_bytes(path, text.encode(), force=force)
+def write_text(path: Path, text: str, *, force: bool = False, rewrites: bool = False) -> None:
+    """Write a text file, UTF-8 with LF, as `write_bytes` does."""
+    write_bytes(path, text.encode(), force=force, rewrites=rewrites)
 
 
-def write_bytes(path: Path, data: bytes, *, force: bool = False) -> None:
+def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool = False) -> None:
     """Write a file.
 
+    Args:
+        path: of the file.
+        data: what it will hold.
+        force: replace a file that exists.
+        rewrites: the file is one that was read to be changed, such as a session file.
+
     Raises:
-        OutputError: it exists and `force` is not given, or it cannot be written; the old file is then untouched.
+        OutputError: it exists and `force` is not given, the same command has read it, or it cannot be written; the old file
+            is then untouched.
     """
     refuse_existing(path, force=force)
+    if not rewrites:
+        _refuse_input(path)
     path = path.resolve()  # a link stays a link, what it leads to is replaced
     with _told(path):
         temporary = _temporary(path)
@@ -81,6 +87,7 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool 
     for name in files:
         if not name.endswith("/"):
             _refuse_overwriting(folder / name, force=force)
+            _refuse_input(folder / name)
     with _told(folder):
         _replace_all(folder, files)
     for name in files:
@@ -97,6 +104,29 @@ def refuse_existing(path: Path, *, force: bool) -> None:
     if not path.parent.is_dir():
         what = f"cannot be written: there is no folder {path.parent}"
         raise OutputError(what, where=str(path), remedy="make the folder, or name another")
+
+
+def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:
+    """Refuse what cannot be written or would be overwritten, of all outputs of a command that are asked for.
+
+    Raises:
+        OutputError: as `refuse_existing`, or two outputs have one name.
+    """
+    named: set[Path] = set()
+    for path in paths:
+        if path is None:
+            continue
+        refuse_existing(path, force=force)
+        if path.resolve() in named:
+            raise OutputError("two outputs have this name", where=str(path), remedy="name another file for one of them")
+        named.add(path.resolve())
+
+
+def _refuse_input(path: Path) -> None:
+    """Never write over what the same command has read: `--force` is meant for results of an earlier one."""
+    if was_read(path):
+        what = "this file was read just now: the result would take its place"
+        raise OutputError(what, where=str(path), remedy="name another file")
 
 
 def _refuse_overwriting(path: Path, *, force: bool) -> None:

@@ -20,6 +20,15 @@ class InputBook:
 
     def __init__(self) -> None:
         self._digests: dict[Path, str] = {}
+        self._read: set[Path] = set()
+
+    def note_read(self, path: Path) -> None:
+        """Note that a file was read, whether or not outputs name it among their inputs."""
+        self._read.add(path.resolve())
+
+    def was_read(self, path: Path) -> bool:
+        """Whether a file was read so far."""
+        return path.resolve() in self._read
 
     def note(self, path: Path, digest: str) -> None:
         """Note a file; one that is read again after a change counts as it was last."""
@@ -62,6 +71,19 @@ def note_input(path: Path, data: bytes) -> None:
     book = _BOOK.get()
     if book is not None:
         book.note(path, digest)
+
+
+def note_read(path: Path) -> None:
+    """Note that a file was read, so that no output takes its place."""
+    book = _BOOK.get()
+    if book is not None:
+        book.note_read(path)
+
+
+def was_read(path: Path) -> bool:
+    """Whether this command has read a file; False where nobody keeps a book."""
+    book = _BOOK.get()
+    return book is not None and book.was_read(path)
 
 
 def inputs_so_far() -> dict[str, str]:

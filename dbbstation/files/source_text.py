@@ -6,7 +6,7 @@ import stat
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
-from dbbstation.files.inputs import note_input
+from dbbstation.files.inputs import note_input, note_read
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,8 +39,10 @@ def read_bytes(
         why = (error.strerror or "unknown reason").lower()
         faults.append(Problem(str(path), 0, 0, f"cannot be read: {why}", "check its permissions and the disk"))
     else:
-        if is_input and data is not None:
-            note_input(path, data)
+        if data is not None:
+            note_read(path)
+            if is_input:
+                note_input(path, data)
         return data
     return None
 

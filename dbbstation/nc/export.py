@@ -123,6 +123,44 @@ def circle_programs(
     return programs
 
 
+def dry_run(
+    plan: Plan,
+    machine: Machine,
+    *,
+    tests: Sequence[str] = (),
+    step_deg: float = STEP_DEG,
+    approach: Approach | None = USUAL_APPROACH,
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> tuple[int, list[StationError]]:
+    """Try the nominal programs of all runs of a plan, and write none.
+
+    Args:
+        plan: the tests.
+        machine: nominal machine, whose travel and feeds hold.
+        tests: names of the tests wanted, which the plan has; empty for all.
+        step_deg: greatest angle between programmed points [deg].
+        approach: see `circle_toolpath`.
+        progress: told how many of how many are done.
+
+    Returns:
+        Number of programs, and what `circle_programs` would refuse: for each program the first point outside the travel and
+        the first feed that the machine does not reach.
+    """
+    runs = [(name, direction) for name in tests or plan.tests for direction in plan.tests[name].directions]
+    faults: list[StationError] = []
+    for done, (name, direction) in enumerate(runs):
+        progress(done, len(runs))
+        circle = plan.tests[name].run(direction)
+        path = circle_toolpath(circle, f"test {name} {direction}", step_deg=step_deg, approach=approach)
+        for check in (check_reach, check_feeds):
+            try:
+                check(machine, path)
+            except StationError as error:
+                faults.append(error)
+    progress(len(runs), len(runs))
+    return len(runs), faults
+
+
 def compensated_program(
     path: Toolpath,
     dialect: Dialect,

@@ -40,6 +40,12 @@ def test_a_new_column_reaches_the_sources_that_ask_for_it(monkeypatch):
         parse_run(run_header("h", Direction.CCW, 1, names) + b"".join(too_fast), "h.csv")
 
 
+def test_the_sensors_and_motors_of_the_format():
+    of = {kind: [column.of for column in COLUMNS.values() if column.kind is kind] for kind in Kind}
+    assert of[Kind.TEMPERATURE] == ["bar", "jig", "machine", *(f"strut{k}" for k in range(1, 7))]
+    assert of[Kind.CURRENT] == [f"motor{k}" for k in range(1, 7)]
+
+
 def test_sensors_and_motors_are_found_by_their_names():
     logged = {**temperatures({"strut3": np.array([20.0, 21.0])}), **currents(np.arange(12.0).reshape(2, 6))}
     assert set(logged) == {"strut3_temp_c", *(f"motor{k}_current_a" for k in range(1, 7))}

@@ -364,7 +364,7 @@ class SessionWriter:
         details = SessionDetails(**{each.name: getattr(session, each.name) for each in fields(SessionDetails)})
         names = (session.machine_path, session.plan_path)
         text = _session_text(session.folder, names, details, session.runs)
-        write_text(file, text, force=True)
+        write_text(file, text, force=True, rewrites=True)
         self._session = replace(session, sha256=hashlib.sha256(text.encode()).hexdigest())
 
 

@@ -1,0 +1,60 @@
+"""`--test` and `--exclude`: which tests a command takes, alike in every command that takes some."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from dbbstation.errors import StationError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+
+def _names(_context: click.Context, _parameter: click.Parameter, given: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name.strip() for text in given for name in text.split(",") if name.strip()))
+
+
+def chosen_tests_options(function: _Function) -> _Function:
+    """Give a command both options; it takes `tests` and `exclude`, tuples of names."""
+    options = (
+        click.option(
+            "--test",
+            "tests",
+            multiple=True,
+            metavar="TEST,...",
+            callback=_names,
+            help="Take these tests only; may be given more than once.",
+        ),
+        click.option(
+            "--exclude",
+            multiple=True,
+            metavar="TEST,...",
+            callback=_names,
+            help="Leave tests out; may be given more than once.",
+        ),
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+def chosen_of(plan: str, known: Iterable[str], tests: Sequence[str], exclude: Sequence[str]) -> list[str]:
+    """Return the tests of a plan that were chosen: those named, in that order, or all; without those left out.
+
+    Raises:
+        StationError: a name that the plan does not have; nothing is left.
+    """
+    names = list(known)
+    unknown = [name for name in (*tests, *exclude) if name not in names]
+    if unknown:
+        raise StationError(
+            f"the plan has no test {', '.join(unknown)}", where=plan, remedy=f"it has {', '.join(names)}"
+        )
+    chosen = [name for name in tests or names if name not in exclude]
+    if not chosen:
+        raise StationError("no test is left", where=plan, remedy="exclude fewer")
+    return chosen

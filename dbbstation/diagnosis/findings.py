@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TYPE_CHECKING
+
+from dbbstation.inference.verdict import Value, Verdict
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
@@ -13,23 +14,18 @@ if TYPE_CHECKING:
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.held_out import HeldOut
 
-
-class Verdict(StrEnum):
-    """What can be said of a source."""
-
-    IDENTIFIED = "identified"
-    AMBIGUOUS = "ambiguous"
-    RULED_OUT = "ruled-out"
-    NOT_TESTABLE = "not-testable"
-
-
-@dataclass(frozen=True)
-class Value:
-    """A number with its standard uncertainty and unit."""
-
-    value: float
-    uncertainty: float
-    unit: str
+__all__ = [
+    "Curve",
+    "CurvePoint",
+    "Diagnosis",
+    "Location",
+    "NextTest",
+    "Shift",
+    "SourceFinding",
+    "Unexplained",
+    "Value",
+    "Verdict",
+]
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.fft import next_fast_len, rfft
 from scipy.sparse import csr_array
 
-from dbbstation.diagnosis.forms import Bump, Form, Lobes, PlaneStep, Step, Wave, WaveOfTurn
 from dbbstation.diagnosis.shapes import BALL, EVERY, PLAUSIBLE_MM, READING, TABLE, TOOL, Ranges, Samples, Shape
+from dbbstation.inference.forms import Bump, Form, Lobes, PlaneStep, Step, Wave, WaveOfTurn
 from dbbstation.inference.square_root import free_directions
 from dbbstation.machine.geometry import STRUTS
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dbbstation.diagnosis.forms import Form, Hats, Lobes, Plane, Proportional, Sign, Spring
+from dbbstation.inference.forms import Form, Hats, Lobes, Plane, Proportional, Sign, Spring
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames

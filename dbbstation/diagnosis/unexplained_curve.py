@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.findings import Curve, CurvePoint
-from dbbstation.diagnosis.forms import HATS, Hats, Plane, PlaneStep
 from dbbstation.diagnosis.shapes import BALL, EVERY, LEVER_MM, OF_STRUTS, PULL, READING, TABLE, TOOL, TOWARDS, UNITS
 from dbbstation.inference.concealment import concealment
+from dbbstation.inference.forms import HATS, Hats, Plane, PlaneStep
 from dbbstation.inference.model_comparison import Member
 from dbbstation.inference.square_root import free_directions
 

@@ -13,7 +13,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import log_ndtr, logsumexp
 
 from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member, with_slack_of
 
@@ -34,6 +34,9 @@ MOST_EXPANDED = 40
 
 SWEEPS = 2
 """Times that every member is given the variant and size that suit it best beside the others."""
+
+MANY = 6
+"""Members from which on their sizes are settled all at once where each has one form only: one inversion for all of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +104,12 @@ class Posterior:
         return float(logsumexp(list(self.weights.values())))
 
 
-def search(comparison: ModelComparison, causes: Sequence[Cause], seeds: Iterable[Sequence[Member]] = ()) -> Posterior:
+def search(
+    comparison: ModelComparison,
+    causes: Sequence[Cause],
+    seeds: Iterable[Sequence[Member]] = (),
+    most_expanded: int = MOST_EXPANDED,
+) -> Posterior:
     """Posterior over sets of causes.
 
     Args:
@@ -109,16 +117,19 @@ def search(comparison: ModelComparison, causes: Sequence[Cause], seeds: Iterable
         causes: to choose from.
         seeds: members of hypotheses to look at beside those that the search finds itself, such as those of an earlier one
             about another linearisation.
+        most_expanded: hypotheses whose neighbours are looked at, at the most.
     """
-    return _Search(comparison, causes).run(seeds)
+    return _Search(comparison, causes, most_expanded).run(seeds)
 
 
 class _Search:
-    def __init__(self, comparison: ModelComparison, causes: Sequence[Cause]) -> None:
+    def __init__(self, comparison: ModelComparison, causes: Sequence[Cause], most_expanded: int) -> None:
         self._comparison = comparison
         self._causes = {cause.name: cause for cause in causes}
         self._seen: dict[frozenset[str], Hypothesis] = {}
         self._scored: dict[frozenset[str], float] = {}
+        self._most = most_expanded
+        self._top = -np.inf  # log posterior of the most probable hypothesis so far
 
     def run(self, seeds: Iterable[Sequence[Member]]) -> Posterior:
         """Look at neighbours of the most probable hypothesis not yet looked at, until none is likely."""
@@ -128,7 +139,7 @@ class _Search:
         self._pairs(())
         expanded: set[frozenset[str]] = set()
         challenged: set[frozenset[str]] = set()
-        while len(expanded) < MOST_EXPANDED:
+        while len(expanded) < self._most:
             waiting = [
                 h
                 for key, h in self._seen.items()
@@ -146,11 +157,6 @@ class _Search:
             self._challenge(best)
         weights = {**self._scored, **{key: h.log_posterior for key, h in self._seen.items()}}
         return Posterior(tuple(sorted(self._seen.values(), key=lambda h: -h.log_posterior)), weights)
-
-    @property
-    def _top(self) -> float:
-        """Log posterior of the most probable hypothesis so far."""
-        return max(h.log_posterior for h in self._seen.values())
 
     def _expand(self, hypothesis: Hypothesis) -> None:
         """Look at neighbours: one more, one less, one in the place of another."""
@@ -231,26 +237,59 @@ class _Search:
             return
         found = self._settled(list(members))
         self._seen[key] = found
+        self._top = max(self._top, found.log_posterior)
         if not found.lean:
             worth = [f + m.cause.log_prior_odds for m, f in zip(found.members, found.log_factors, strict=True)]
             self._look_at(found.without(found.members[int(np.argmin(worth))].cause.name))
 
     def _settled(self, members: list[Member]) -> Hypothesis:
+        """Sizes and variants that suit each member beside the others, and what each is worth there."""
+        many = len(members) > MANY
         for _ in range(SWEEPS if len(members) > 1 else 1):
+            at_once = [one for one, _, _ in self._comparison.each_beside_others(members)] if many else members
             for k, member in enumerate(members):
+                if many and _single(member):
+                    members[k] = at_once[k]
+                    continue
                 others = [*members[:k], *members[k + 1 :]]
                 members[k] = self._comparison.scan(others, [member.cause]).best[0]
             members = self._with_slack(members)
         members, more = self._as_close_as_it_is(members)
         evidence, factors = self._comparison.log_evidence(members), []
+        possible = self._possible(members)
+        more += sum(possible)
+        each = self._comparison.each_beside_others(members) if many else []
         for k, member in enumerate(members):
+            if many and _single(member):
+                factors.append(each[k][1] + possible[k])
+                more += each[k][1] - each[k][2]
+                continue
             others = [*members[:k], *members[k + 1 :]]
             scan = self._comparison.scan(others, [member.cause])
             averaged = float(scan.log_factor[0] - scan.log_best[0])
-            factors.append(evidence - self._comparison.log_evidence(others) + averaged)
+            factors.append(evidence - self._comparison.log_evidence(others) + averaged + possible[k])
             more += averaged
         odds = sum(member.cause.log_prior_odds for member in members)
         return Hypothesis(tuple(members), evidence + more + odds, tuple(factors))
+
+    def _possible(self, members: list[Member]) -> list[float]:
+        """What it makes of the evidence that amplitudes of each member are known not to be negative.
+
+        A prior that is cut off at zero has twice the density above it, and the likelihood counts there alone: the posterior
+        probability of being above zero over the prior one, which is a half.
+        """
+        found = [0.0] * len(members)
+        if not any(any(member.variant.positive) for member in members):
+            return found
+        estimates = self._comparison.estimates(members)
+        sigma = np.sqrt(np.diag(estimates.covariance))
+        first = 0
+        for k, member in enumerate(members):
+            for j, positive in enumerate(member.variant.positive):
+                if positive:
+                    found[k] += float(log_ndtr(estimates.values[first + j] / sigma[first + j]) + np.log(2.0))
+            first += len(member.columns)
+        return found
 
     def _as_close_as_it_is(self, members: list[Member]) -> tuple[list[Member], float]:
         """Members with the share of their slack that suits each best, and what averaging over the shares adds."""
@@ -279,3 +318,8 @@ class _Search:
             found.append(with_slack_of(member, values[:own]))
             values = values[len(member.columns) :]
         return found
+
+
+def _single(member: Member) -> bool:
+    """Whether a cause has one form only, which follows its formula."""
+    return len(member.cause.variants) == 1 and not len(member.variant.slack)

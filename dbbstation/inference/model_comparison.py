@@ -58,6 +58,7 @@ class Variant:
         slack: columns of what the formula may be off by, shape (d,).
         slack_sd: standard deviations of their coefficients at the amplitudes `slack_at`, shape (d,).
         slack_at: root mean square of the amplitudes, in plausible ones, that the slack was made for.
+        positive: which amplitudes cannot be negative, shape (p,); empty where all can.
     """
 
     columns: NDArray[np.int64]
@@ -70,6 +71,7 @@ class Variant:
     slack: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     slack_sd: NDArray[np.float64] = field(default_factory=lambda: NO_SLACK)
     slack_at: float = 1.0
+    positive: tuple[bool, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,6 +263,36 @@ class ModelComparison:
                 slot, size = divmod(int(own[slim].argmax()), len(SCALES))
                 narrow[-1] = Member(cause, cause.variants[slim[slot]], float(SCALES[size]))
         return Scan(causes, log_factor, tuple(best), log_best, tuple(narrow))
+
+    def each_beside_others(self, members: Sequence[Member]) -> list[tuple[Member, float, float]]:
+        """Every member beside all the others, in its own variant, without slack, at all sizes; one inversion serves all.
+
+        With A the information of all amplitudes and priors, the inverse of a block of A's inverse is what that block has
+        beside all others [Schur complement; Horn and Johnson, Matrix Analysis, 2nd ed., sec. 0.7.3].
+
+        Returns:
+            Per member: it with the size that suits it best; its log Bayes factor averaged over sizes, with the weight of its
+            variant; and that of its best size without weights.
+        """
+        columns, sd = _stacked(members)
+        information = sd[:, None] * self._gram[np.ix_(columns, columns)] * sd + np.eye(len(sd))
+        inverse = np.linalg.inv(information)
+        values = inverse @ (sd * self._towards[columns])
+        found, first = [], 0
+        for member in members:
+            own = slice(first, first + len(member.variant.columns))
+            first += len(member.columns)
+            beside = np.linalg.inv(inverse[own, own])
+            towards = beside @ values[own] / member.scale
+            blocks = (beside - np.eye(len(beside))) / member.scale**2
+            seen, axes = np.linalg.eigh(blocks)
+            along = np.square(axes.T @ towards)
+            factors = _log_factors(np.maximum(seen, 0.0)[None], along[None])[0]
+            weighted = factors + LOG_SCALE_WEIGHTS + member.variant.log_weight
+            best = int(weighted.argmax())
+            averaged = float(weighted[best] + np.log(np.exp(weighted - weighted[best]).sum()))
+            found.append((replace(member, scale=float(SCALES[best])), averaged, float(factors[best])))
+        return found
 
     def _eliminated(self, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Cholesky factor of the members' information, what it makes of the target, and their log evidence."""

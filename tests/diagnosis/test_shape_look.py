@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.forms import Bump, Wave
 from dbbstation.diagnosis.shape_look import Look, Ranges, looked_for
 from dbbstation.diagnosis.shapes import BALL, EVERY, PLAUSIBLE_MM, READING, TABLE, TOOL, Samples
+from dbbstation.inference.forms import Bump, Wave
 from dbbstation.inference.square_root import Columns
 
 NOISE_MM = 5e-4

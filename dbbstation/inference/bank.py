@@ -1,0 +1,343 @@
+"""Columns of all laws and patterns of a channel, and the causes that are made of them.
+
+Laws are laid out on the grid of their nonlinear parameters at first. One that a hypothesis takes in is laid out anew at its
+best values: exact columns, tangents, and what its formula may be off by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.coloured import Coloured, bands_of, coloured_noise
+from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
+from dbbstation.inference.model_form import modulated
+from dbbstation.inference.patterns import NAMED, Family, log_odds
+from dbbstation.inference.projection import BesideBase, CauseColumns
+from dbbstation.inference.square_root import compress, solve
+
+if TYPE_CHECKING:
+    from collections.abc import Container, Iterable, Sequence
+
+    from numpy.typing import NDArray
+    from scipy.sparse import csr_array
+
+    from dbbstation.inference.channel import Channel, Law
+    from dbbstation.inference.patterns import Pattern
+    from dbbstation.inference.pieces import Left
+
+DRAWS = 4
+"""Draws of white noise from which it is seen how much of the noise a model takes out."""
+
+TANGENT = 1e-3
+"""Step of a nonlinear parameter for its tangent, in units of the spacing of its grid."""
+
+QUIETEST = 1e-9
+"""Share of the residual below which nothing is noise: digits run out there."""
+
+LOOKED_FOR = frozenset({Family.WAVE, Family.BUMP, Family.STEP, Family.PULSES})
+"""Families whose members were picked from many by the residual itself."""
+
+
+class Bank:
+    """Columns and causes.
+
+    Args:
+        channel: that they are of.
+
+    Attributes:
+        patterns: by the name of the cause.
+        laws: by name.
+        noise: that columns are whitened for.
+        whitening: that does it, over the kept rows; None where the noise is white.
+    """
+
+    def __init__(self, channel: Channel) -> None:
+        self.channel = channel
+        self.patterns: dict[str, Pattern] = {}
+        self.laws: dict[str, Law] = {law.name: law for law in channel.laws}
+        self.noise = Coloured(channel.size)
+        self.whitening: csr_array | None = None
+        self._columns = CauseColumns(channel.base.samples[channel.kept])
+        self._everywhere: list[NDArray[np.float64]] = []
+        self._of_patterns: dict[str, Cause] = {}
+        self._of_laws = {law.name: Cause(law.name, self._on_a_grid(law), law.log_odds) for law in channel.laws}
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """All of them, laws first."""
+        return (*self._of_laws.values(), *self._of_patterns.values())
+
+    def but_for(self, refused: Container[str]) -> list[Cause]:
+        """Causes but for those that were refused."""
+        return [cause for cause in self.causes if cause.name not in refused]
+
+    def worthy(self, left: Left, found: Sequence[Pattern]) -> list[Pattern]:
+        """Patterns that are worth their prior odds beside what was fitted.
+
+        Args:
+            left: what that leaves of the kept rows, in units of noise.
+            found: picked from many.
+        """
+        found = [p for p in {p.name: p for p in found}.values() if p.name not in self.patterns]
+        if not found:
+            return []
+        samples = self.whitened(np.hstack([p.samples for p in found]))
+        taken = left.axes.T @ samples
+        comparison = ModelComparison(samples.T @ samples - taken.T @ taken, samples.T @ left.rest)
+        ends = np.cumsum([0, *(p.samples.shape[1] for p in found)])
+        size = self.channel.size / left.noise
+        causes = [self._cause(p, np.arange(a, b), size) for p, a, b in zip(found, ends[:-1], ends[1:], strict=True)]
+        scan = comparison.scan((), causes)
+        return [p for p, c, worth in zip(found, causes, scan.log_factor, strict=True) if worth + c.log_prior_odds > 0.0]
+
+    def drop(self, names: Iterable[str]) -> None:
+        """Leave out patterns that were looked for and are of no use; their columns stay where they are."""
+        for name in names:
+            del self.patterns[name], self._of_patterns[name]
+
+    def samples(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Columns over all rows, shape (n, p)."""
+        starts = np.cumsum([0, *(part.shape[1] for part in self._everywhere)])
+        found = np.empty((len(self.channel.residual), len(columns)))
+        for k, column in enumerate(columns):
+            part = int(np.searchsorted(starts, column, side="right")) - 1
+            found[:, k] = self._everywhere[part][:, column - starts[part]]
+        return found
+
+    def fitted(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Columns over the kept rows, whitened, shape (m, p)."""
+        return np.asarray(self._columns.samples[:, columns], dtype=np.float64)
+
+    def beside(self) -> BesideBase:
+        """Causes beside the base."""
+        return BesideBase(self._columns, self.channel.known, self.channel.held, self.noise.innovation)
+
+    def add(self, more: Sequence[Pattern]) -> list[str]:
+        """Take in patterns that are not there yet, and return their names."""
+        fresh = [p for p in {p.name: p for p in more}.values() if p.name not in self.patterns]
+        if not fresh:
+            return []
+        numbers = self._add(np.hstack([p.samples for p in fresh]))
+        self.patterns |= {p.name: p for p in fresh}
+        first = 0
+        for pattern in fresh:
+            width = pattern.samples.shape[1]
+            own = numbers[first : first + width]
+            first += width
+            self._of_patterns[pattern.name] = self._cause(pattern, own, self.channel.size)
+        for name, cause in self._of_patterns.items():
+            pattern = self.patterns[name]
+            self._of_patterns[name] = replace(cause, log_prior_odds=self._odds(pattern))
+        return [p.name for p in fresh]
+
+    def measure_noise(self, *, white: bool = False) -> Coloured:
+        """Noise from what base, laws and patterns together leave; columns are whitened for it from then on.
+
+        What was looked for in the residual takes part only where it is worth its odds: the largest of many chance peaks takes
+        more from noise than a column may. What all columns take out of noise of this kind is put back, by frequency: it is seen
+        by what they take out of draws.
+
+        Args:
+            white: take it for white, whatever it is.
+        """
+        least = max(QUIETEST * self.channel.size, self.channel.least_noise)
+        stretches = self.channel.stretches
+        for _ in range(NOISE_ROUNDS):
+            beside = self.beside()
+            target = self.target
+            rng = np.random.default_rng(len(target))
+            draws = rng.standard_normal((len(target), DRAWS))
+            left = beside.left(np.column_stack([target, draws]), self._taking_part(beside))
+            used = len(target) - float(np.mean(np.sum(left[:, 1:] ** 2, axis=0)))
+            innovation = float(np.sqrt(np.sum(left[:, 0] ** 2) / max(len(target) - used, 1.0)))
+            before, found = self.noise, self.noise.with_innovation(max(innovation, least))
+            if self.channel.time is not None and not white:
+                found = self._colour_of(left, draws, stretches, found)
+            self._take(found)
+            if _alike(found, before):
+                break
+        return self.noise
+
+    def log_likelihood(self) -> float:
+        """Log likelihood of the kept rows under the base and this noise alone, but for what is the same for every noise."""
+        target, innovation = self.target, self.noise.innovation
+        rest = target - self.base @ self.base_values(np.zeros(len(self.channel.residual)))
+        seen = np.linalg.svd(self.base / innovation, compute_uv=False)
+        seen = seen[seen > RANK * seen[:1]]
+        spent = 0.0 if self.noise.is_white else float(np.log(len(target)))  # two parameters [Schwarz 1978]
+        squares = 0.5 * float(rest @ rest) / innovation**2
+        return -len(target) * float(np.log(innovation)) - squares - float(np.log(seen).sum()) - spent
+
+    def _colour_of(
+        self, left: NDArray[np.float64], draws: NDArray[np.float64], stretches: Sequence[slice], level: Coloured
+    ) -> Coloured:
+        """Noise whose spectrum is that of whitened rows, what columns take out of draws put back; at a level if alike."""
+        bands = bands_of(left[:, 0], stretches)
+        if bands is None:
+            return level
+        taken = np.zeros(len(bands.count))
+        for k in range(draws.shape[1]):
+            whole, rest = bands_of(draws[:, k], stretches), bands_of(left[:, 1 + k], stretches)
+            if whole is not None and rest is not None:
+                taken += (rest.log_power - whole.log_power) / draws.shape[1]
+        colour = np.log(self.noise.gain(bands.frequency))
+        found = coloured_noise(replace(bands, log_power=bands.log_power - taken - colour))
+        # Squares say the level best once the colour is right.
+        return level if _alike(found.with_innovation(level.innovation), level) else found
+
+    def _taking_part(self, beside: BesideBase) -> NDArray[np.float64]:
+        """Prior standard deviations of all columns that noise is measured beside, zero for the others."""
+        scan = beside.comparison(self.target).scan((), self.causes)
+        sd = np.zeros(self._columns.count)
+        for cause, worth in zip(scan.causes, scan.log_factor, strict=True):
+            pattern = self.patterns.get(cause.name)
+            if pattern is not None and pattern.family in LOOKED_FOR and worth + cause.log_prior_odds <= 0.0:
+                continue
+            for variant in cause.variants:
+                sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
+        return sd
+
+    def _take(self, noise: Coloured) -> None:
+        """Whiten all columns for a noise."""
+        same = (noise.share, noise.decay) == (self.noise.share, self.noise.decay)
+        self.noise = noise
+        if same:
+            return
+        self.whitening = noise.whitening(self.channel.stretches)
+        self._columns = CauseColumns(self.whitened(self.channel.base.samples))
+        if self._everywhere:
+            self._columns.add(self.whitened(np.hstack(self._everywhere)))
+
+    def whitened(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Kept ones of all rows, shape (n, ...), with their noise made white."""
+        kept = rows[self.channel.kept]
+        return kept if self.whitening is None else np.asarray(self.whitening @ kept)
+
+    @property
+    def target(self) -> NDArray[np.float64]:
+        """Residual of the kept rows, its noise made white, shape (m,)."""
+        return self.whitened(self.channel.residual)
+
+    @property
+    def base(self) -> NDArray[np.float64]:
+        """Columns of the base over the kept rows, whitened, shape (m, k)."""
+        return self._columns.base
+
+    def base_values(self, effect: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of the base columns beside an effect over all rows, shape (k,)."""
+        target = self.whitened(self.channel.residual - effect)
+        block = compress(np.arange(self.base.shape[1]), self.base, target)
+        return solve([block], self.channel.known, self.noise.innovation, self.channel.held).x
+
+    def refine(self, name: str, nonlinear: tuple[float, ...], amplitudes: NDArray[np.float64]) -> None:
+        """Lay out a law at values of all its parameters, with tangents and slack.
+
+        Args:
+            name: of the law.
+            nonlinear: values of its nonlinear parameters.
+            amplitudes: shape (p,).
+        """
+        law = self.laws[name]
+        exact = law.columns(nonlinear)
+        tangents, spacings = [], []
+        for k, grid in enumerate(law.grids):
+            spacing = spacing_of(grid, nonlinear[k])
+            moved = [[v + sign * TANGENT * spacing * (i == k) for i, v in enumerate(nonlinear)] for sign in (1.0, -1.0)]
+            up, down = (law.columns(tuple(values)) @ amplitudes for values in moved)
+            tangents.append((up - down) / (2.0 * TANGENT * spacing))
+            spacings.append(spacing)
+        slack = np.column_stack([*tangents, self._discrepancy(law, exact @ amplitudes)])
+        own = self._add(np.hstack([exact, slack]))
+        width = exact.shape[1]
+        sd = np.concatenate([spacings, np.full(slack.shape[1] - len(tangents), law.form_uncertainty)])
+        at = max(float(np.sqrt(np.mean(np.square(amplitudes / law.plausible)))), 1e-12)
+        points = float(np.prod([len(grid) for grid in law.grids]))
+        # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
+        weight = -float(np.log(max(points / 2.5 ** len(law.grids), 1.0)))
+        variant = Variant(
+            own[:width],
+            law.plausible,
+            nonlinear,
+            slack=own[width:],
+            slack_sd=sd,
+            slack_at=at,
+            log_weight=weight,
+            positive=law.positive,
+        )
+        self._of_laws[name] = replace(self._of_laws[name], variants=(variant,))
+
+    def _discrepancy(self, law: Law, effect: NDArray[np.float64]) -> NDArray[np.float64]:
+        if law.form_uncertainty == 0.0:
+            return np.zeros((len(effect), 0))
+        if law.discrepancy is not None:
+            return law.discrepancy(effect)
+        if law.follows is None:
+            return np.zeros((len(effect), 0))
+        return modulated([effect[:, None]], [law.follows.values[:, None]], None)
+
+    def _on_a_grid(self, law: Law) -> tuple[Variant, ...]:
+        points = list(product(*law.grids))
+        weight = -float(np.log(len(points)))
+        return tuple(
+            Variant(self._add(law.columns(point)), law.plausible, point, log_weight=weight, positive=law.positive)
+            for point in points
+        )
+
+    def _cause(self, pattern: Pattern, own: NDArray[np.int64], plausible: float) -> Cause:
+        size = np.full(len(own), plausible)
+        variants = tuple(
+            Variant(own[list(part)], size[list(part)], label=label, log_weight=weight)
+            for part, weight, label in pattern.choices
+        )
+        if pattern.family is Family.BLOCKS:
+            variants = self._blocks(own, size)
+        if not variants:
+            variants = (Variant(own, size),)
+        return Cause(pattern.name, variants, self._odds(pattern), named=pattern.family in NAMED)
+
+    def _blocks(self, own: NDArray[np.int64], size: NDArray[np.float64]) -> tuple[Variant, ...]:
+        """All blocks each with its own offset, or one of them alone."""
+        half = float(np.log(0.5))
+        alone = [
+            Variant(own[k : k + 1], size[:1], label=self.channel.names[k], log_weight=half - float(np.log(len(own))))
+            for k in range(len(own))
+        ]
+        return (Variant(own, size, log_weight=half), *alone)
+
+    def _odds(self, pattern: Pattern) -> float:
+        """Log prior odds: a family's, shared by its members over all variables and by the forms that were tried."""
+        every = (*self.patterns.values(), pattern)
+        over = {tuple(v.name for v in p.variables) for p in every if p.family is pattern.family}
+        return log_odds(len(over), pattern.tried)
+
+    def _add(self, samples: NDArray[np.float64]) -> NDArray[np.int64]:
+        self._everywhere.append(samples)
+        return self._columns.add(self.whitened(samples))
+
+
+def _alike(one: Coloured, other: Coloured) -> bool:
+    """Whether two noises are the same for anything that is compared."""
+    pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
+    return all(abs(a - b) < SETTLED * max(a, b) for a, b in pairs)
+
+
+NOISE_ROUNDS = 5
+"""Times that the noise is measured, each time beside what the last level lets in."""
+
+RANK = 1e-9
+"""Share of the largest singular value of the base below which a direction says nothing."""
+
+SETTLED = 0.03
+"""Change of the noise that is none: its spectrum is hardly known better."""
+
+
+def spacing_of(grid: Sequence[float], value: float) -> float:
+    """Spacing of a rising grid about a value; of a single point, its size."""
+    if len(grid) == 1:
+        return max(abs(grid[0]), 1e-300)
+    k = int(np.clip(np.searchsorted(grid, value), 1, len(grid) - 1))
+    return float(grid[k] - grid[k - 1])

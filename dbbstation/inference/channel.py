@@ -1,0 +1,186 @@
+"""A channel: what was measured less what was simulated, with everything that may have gone into the difference.
+
+It knows no machine. A client brings residual rows in blocks, variables, base columns that are fitted anew with every
+hypothesis, and laws: physical causes as columns. `settle` compares sets of laws and of patterns without physics.
+
+    residual = base + sum of laws + sum of patterns + noise
+
+Rows may be held back (`kept`): columns exist for all rows, and only the kept ones are fitted, so that the others can be
+predicted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.square_root import Block, Columns, compress, lost_directions, solve
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.patterns import Pattern
+    from dbbstation.inference.square_root import Solution
+    from dbbstation.inference.variables import Variable
+
+NAMED_ODDS = float(np.log(0.05 / 0.95))
+"""Log prior odds of a law: one object in twenty has any one of them so that it matters."""
+
+LARGEST = 10.0
+"""Effect of a base column, in root mean squares of the residual, from which on its value is certainly of interest: what leaves a
+base parameter more uncertain than that does not see it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """What is fitted anew with every hypothesis.
+
+    Attributes:
+        names: of the columns, shape (k,).
+        samples: what one unit of each does to the residual, shape (n, k).
+        prior: standard deviation of each about zero, infinite where nothing is known, shape (k,).
+        random: which are effects of the set-up, averaged over rather than reported, shape (k,); those need a finite prior.
+    """
+
+    names: tuple[str, ...]
+    samples: NDArray[np.float64]
+    prior: NDArray[np.float64]
+    random: NDArray[np.bool_]
+
+    @classmethod
+    def flat(cls, names: Sequence[str], samples: NDArray[np.float64]) -> Base:
+        """Columns of which nothing is known beforehand."""
+        count = samples.shape[1]
+        return cls(tuple(names), samples, np.full(count, np.inf), np.zeros(count, dtype=bool))
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A physical cause, as columns.
+
+    Attributes:
+        name: unique in its channel.
+        columns: what one unit of each amplitude does to the residual at values of the nonlinear parameters, over all rows,
+            shape (n, p).
+        plausible: usual size of each amplitude, one standard deviation, shape (p,).
+        parameters: names of the amplitudes, then of the nonlinear parameters.
+        units: of these.
+        grids: values of each nonlinear parameter to begin with, rising.
+        positive: which amplitudes cannot be negative, shape (p,); empty where all can.
+        form_uncertainty: share of the effect by which real objects depart from the formula, one standard deviation.
+        follows: variable along which they do; None where the formula is exact or `discrepancy` says it.
+        discrepancy: columns of what the formula may be off by from its effect, (n,) to (n, q), of which `form_uncertainty`
+            is the standard deviation; by default, the effect times smooth functions of `follows`.
+        log_odds: log prior odds.
+        detail: rows of the shortest feature, where a band limit may hide it; 0 where none does.
+    """
+
+    name: str
+    columns: Callable[[tuple[float, ...]], NDArray[np.float64]]
+    plausible: NDArray[np.float64]
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    grids: tuple[tuple[float, ...], ...] = ()
+    positive: tuple[bool, ...] = ()
+    form_uncertainty: float = 0.0
+    follows: Variable | None = None
+    discrepancy: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
+    log_odds: float = NAMED_ODDS
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """Residual rows and what may have gone into them.
+
+    Attributes:
+        residual: measured less simulated, rows of a block together and in time order, shape (n,).
+        unit: of it.
+        blocks: rows of each block (run, file, day), covering all rows in order.
+        names: of the blocks.
+        variables: that effects without physics may follow.
+        base: what is fitted anew with every hypothesis.
+        laws: physical causes.
+        time: of the rows, rising within blocks, shape (n,); None where their order means nothing.
+        simulated: the simulated value as a variable, to ask whether it is late; None: it is not asked.
+        kept: rows that are fitted, shape (n,); all if not given.
+        least_noise: standard deviation of one row that is always there, whatever the rows seem to say: what the way they were made
+            leaves of a perfect object, in the unit of the residual.
+        patterns: that need no look, where a client makes them itself; None: all kinds over all variables.
+    """
+
+    residual: NDArray[np.float64]
+    unit: str
+    blocks: tuple[slice, ...]
+    names: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    base: Base
+    laws: tuple[Law, ...] = ()
+    time: NDArray[np.float64] | None = None
+    simulated: Variable | None = None
+    kept: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    least_noise: float = 0.0
+    patterns: tuple[Pattern, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not len(self.kept):
+            object.__setattr__(self, "kept", np.ones(len(self.residual), dtype=bool))
+
+    def without(self, rows: NDArray[np.bool_]) -> Channel:
+        """The same with some rows held back, shape (n,)."""
+        return replace(self, kept=self.kept & ~rows)
+
+    @property
+    def target(self) -> NDArray[np.float64]:
+        """Residual of the kept rows."""
+        return self.residual[self.kept]
+
+    @cached_property
+    def size(self) -> float:
+        """Root mean square of what the base leaves of the kept rows: no effect is much larger, in the unit of the residual."""
+        left = self.target - self.base.samples[self.kept] @ self.fitted(self.target, self._about).x
+        return max(float(np.sqrt(np.mean(left**2))), 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300)
+
+    @cached_property
+    def known(self) -> Columns:
+        """Priors and scales of the base."""
+        rms = np.sqrt(np.mean(self.base.samples[self.kept] ** 2, axis=0))
+        scale = LARGEST * max(self._about, 1e-300) / np.maximum(rms, 1e-300)
+        scale = np.where(np.isfinite(self.base.prior), np.minimum(self.base.prior, scale), scale)
+        return Columns(self.base.prior, scale, self.base.random)
+
+    @cached_property
+    def held(self) -> NDArray[np.float64]:
+        """Directions of the base that the rows do not see, kept at zero, shape (h, f)."""
+        return lost_directions([self._block(self.target)], self.known, self._about)
+
+    def fitted(self, target: NDArray[np.float64], noise: float) -> Solution:
+        """Fit the base alone to kept rows of a target, at a noise of one row."""
+        return solve([self._block(target)], self.known, noise, self.held)
+
+    @property
+    def kept_blocks(self) -> list[slice]:
+        """Blocks as slices of the kept rows; those that have none are left out."""
+        counts = np.cumsum([0, *(int(self.kept[rows].sum()) for rows in self.blocks)])
+        return [slice(int(a), int(b)) for a, b in pairwise(counts) if b > a]
+
+    @property
+    def stretches(self) -> list[slice]:
+        """Kept rows that follow one another without a gap, as slices of the kept rows."""
+        rows = np.flatnonzero(self.kept)
+        block = np.searchsorted([b.stop for b in self.blocks], rows, side="right")
+        edges = np.flatnonzero((np.diff(rows) != 1) | (np.diff(block) != 0)) + 1
+        return [slice(int(a), int(b)) for a, b in pairwise([0, *edges, len(rows)])]
+
+    @property
+    def _about(self) -> float:
+        """A first idea of the noise: the spread of the residual."""
+        return max(float(np.std(self.target)), 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300)
+
+    def _block(self, target: NDArray[np.float64]) -> Block:
+        return compress(np.arange(self.base.samples.shape[1]), self.base.samples[self.kept], target)

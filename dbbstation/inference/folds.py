@@ -1,0 +1,106 @@
+"""Held-out error of a whole selection: everything is chosen anew from the rows that are left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.channel import Channel
+    from dbbstation.inference.settle import Settled
+
+FOLDS = 10
+"""Stretches of rows that are held back in turn, where there are not enough blocks."""
+
+ENOUGH_BLOCKS = 5
+"""Blocks from which on whole blocks are held back."""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """One part that was held back.
+
+    Attributes:
+        name: of the part.
+        rows: how many.
+        before: root mean square error with the base alone, in the unit of the residual.
+        after: with what was chosen from the other parts.
+    """
+
+    name: str
+    rows: int
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class HeldOutError:
+    """What predictions leave of rows that took no part in choosing or fitting.
+
+    Attributes:
+        folds: each part.
+    """
+
+    folds: tuple[Fold, ...]
+
+    @property
+    def before(self) -> float:
+        """Over all parts, with the base alone."""
+        return self._all([fold.before for fold in self.folds])
+
+    @property
+    def after(self) -> float:
+        """Over all parts, with what was chosen."""
+        return self._all([fold.after for fold in self.folds])
+
+    def _all(self, errors: list[float]) -> float:
+        counts = np.array([fold.rows for fold in self.folds], dtype=np.float64)
+        return float(np.sqrt(np.sum(counts * np.square(errors)) / counts.sum()))
+
+
+def held_out_error(
+    channel: Channel, choose: Callable[[Channel], Settled], progress: Callable[[str], None] = lambda _: None
+) -> HeldOutError:
+    """Hold back parts in turn: blocks where there are five or more, else ten stretches of consecutive rows.
+
+    Args:
+        channel: all rows.
+        choose: the whole selection, laws, patterns, noise and looks, from the rows that a channel keeps.
+        progress: told which part is held back.
+    """
+    found = []
+    for name, rows in parts_of(channel):
+        progress(f"held out: {name}")
+        settled = choose(channel.without(rows))
+        none = np.zeros(len(channel.residual))
+        base = channel.base.samples @ settled.base_values(none)
+        before, after = channel.residual[rows] - base[rows], (channel.residual - settled.predicted())[rows]
+        found.append(Fold(name, int(rows.sum()), _rms(before), _rms(after)))
+    return HeldOutError(tuple(found))
+
+
+def parts_of(channel: Channel) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Parts that are held back, with a name each: rows, shape (n,)."""
+    number = np.zeros(len(channel.residual), dtype=np.int64)
+    if len(channel.blocks) >= ENOUGH_BLOCKS:
+        # More blocks than folds: neighbours go together.
+        for k, rows in enumerate(channel.blocks):
+            number[rows] = k * min(FOLDS, len(channel.blocks)) // len(channel.blocks)
+    else:
+        number = np.arange(len(number)) * FOLDS // len(number)
+    found = []
+    for k in range(int(number.max()) + 1):
+        rows = number == k
+        ends = np.flatnonzero(rows)
+        found.append((f"rows {ends[0] + 1} to {ends[-1] + 1}", rows))
+    return found
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))

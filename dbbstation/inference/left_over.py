@@ -1,0 +1,146 @@
+"""Whether what a hypothesis leaves is noise: its sum of squares, its periodogram, its runs of sign, its blocks, its variables.
+
+"Nothing is left beyond noise" holds only where all of these pass. Each is a probability by chance, times the number of things
+that were looked at [Bonferroni; Miller, Simultaneous Statistical Inference, 2nd ed., sec. 1.3].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import chi2, f, norm
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.variables import Variable
+
+SIGNIFICANT = 0.001
+"""Probability by chance, over all tests, below which something is left."""
+
+BINS = 20
+"""Pieces of a variable that are asked for by themselves, with as many rows in each."""
+
+FEWEST = 20
+"""Rows that a test of their order needs."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """One way of asking whether something is left.
+
+    Attributes:
+        name: `sum of squares`, `wave in time`, `runs of sign`, `blocks`, or a variable.
+        probability: that noise alone leaves as much.
+        rms: of what stands out, beyond noise, in the unit of the residual.
+        where: place, in words; empty where it has none.
+    """
+
+    name: str
+    probability: float
+    rms: float
+    where: str
+
+
+@dataclass(frozen=True)
+class LeftOver:
+    """What is left, looked at in all these ways."""
+
+    looks: tuple[Look, ...]
+
+    @property
+    def worst(self) -> Look:
+        """The one that is least probable by chance."""
+        return min(self.looks, key=lambda look: look.probability)
+
+    @property
+    def probability(self) -> float:
+        """That noise alone leaves as much in any of these ways."""
+        return min(1.0, len(self.looks) * self.worst.probability)
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether nothing is left beyond noise."""
+        return self.probability >= SIGNIFICANT
+
+
+def left_over(settled: Settled, freedom: float | None = None) -> LeftOver:
+    """Test what the best hypothesis leaves of the kept rows, its noise made white.
+
+    Args:
+        settled: what the comparison came to.
+        freedom: degrees of freedom of what is left; from the number of amplitudes if None.
+    """
+    channel, bank = settled.channel, settled.bank
+    rows = channel.residual - settled.predicted()
+    left = bank.whitened(rows) / settled.noise.innovation
+    if freedom is None:
+        used = sum(len(member.variant.columns) for member in settled.best.members) + channel.base.samples.shape[1]
+        freedom = max(float(len(left) - used), 1.0)
+    square = float(left @ left) / freedom
+    beyond = float(np.sqrt(max(square - 1.0, 0.0))) * settled.noise.sigma
+    # The noise was measured on the same rows, beside more columns: it is known about as well as the square.
+    looks = [Look("sum of squares", float(f.sf(square, freedom, freedom)), beyond, "")]
+    if channel.time is not None:
+        looks += _in_order(left, channel.stretches, settled.noise.sigma)
+    blocks = channel.kept_blocks
+    if len(blocks) > 1:
+        looks.append(_by_block(left, blocks, settled.noise.sigma))
+    for variable in channel.variables:
+        values = variable.values[channel.kept]
+        if len(np.unique(values)) > 1:
+            looks.append(_over(left, replace(variable, values=values), settled.noise.sigma))
+    return LeftOver(tuple(looks))
+
+
+def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: float) -> list[Look]:
+    """Wave in time, and runs of one sign."""
+    longest = left[max(stretches, key=lambda rows: rows.stop - rows.start)]
+    found = []
+    if len(longest) >= FEWEST:
+        power = np.abs(np.fft.rfft(longest - longest.mean())[1 : (len(longest) + 1) // 2]) ** 2
+        at = int(power.argmax())
+        # Share of the largest of m exponential powers [Fisher, Proc. R. Soc. A 125 (1929) 54].
+        share = float(power[at] / power.sum())
+        chance = min(1.0, len(power) * (1.0 - share) ** (len(power) - 1))
+        size = sigma * 2.0 * float(np.sqrt(power[at])) / len(longest) / float(np.sqrt(2.0))
+        found.append(Look("wave in time", chance, size, f"about every {len(longest) / (at + 1):.4g} rows"))
+    signs = np.sign(left)
+    up, down = float((signs > 0).sum()), float((signs < 0).sum())
+    if min(up, down) >= FEWEST / 2:
+        runs = 1.0 + float((np.diff(signs[signs != 0.0]) != 0.0).sum())
+        total = up + down
+        expected = 1.0 + 2.0 * up * down / total
+        variance = (expected - 1.0) * (expected - 2.0) / (total - 1.0)  # [Wald and Wolfowitz, 1940]
+        z = (runs - expected) / float(np.sqrt(max(variance, 1e-12)))
+        found.append(Look("runs of sign", float(norm.cdf(z)), sigma * float(np.std(left)), ""))
+    return found
+
+
+def _by_block(left: NDArray[np.float64], blocks: Sequence[slice], sigma: float) -> Look:
+    """Means of blocks."""
+    counts = np.array([rows.stop - rows.start for rows in blocks], dtype=np.float64)
+    means = np.array([left[rows].mean() for rows in blocks])
+    terms = counts * means**2
+    worst = int(terms.argmax())
+    size = sigma * abs(float(means[worst]))
+    return Look("blocks", float(chi2.sf(terms.sum(), len(blocks))), size, f"most in block {worst + 1}")
+
+
+def _over(left: NDArray[np.float64], variable: Variable, sigma: float) -> Look:
+    """Means over pieces of a variable with as many rows in each."""
+    values = variable.values
+    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, BINS + 1)))
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, max(len(edges) - 2, 0))
+    counts = np.bincount(place, minlength=len(edges) - 1).astype(np.float64)
+    means = np.bincount(place, left, minlength=len(edges) - 1) / np.maximum(counts, 1.0)
+    terms = counts * means**2
+    worst = int(terms.argmax())
+    ends = edges[[worst, min(worst + 1, len(edges) - 1)]]
+    where = f"most from {ends[0]:.4g} to {ends[1]:.4g} {variable.unit}".strip()
+    return Look(variable.name, float(chi2.sf(terms.sum(), len(terms))), sigma * abs(float(means[worst])), where)

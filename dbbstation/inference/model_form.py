@@ -1,0 +1,75 @@
+"""What a real object may do that the formula of a cause does not say: its effect, modulated along what it depends on.
+
+The effect as fitted times a few smooth functions of its variable stands for all of this [Kennedy and O'Hagan, J. R. Stat.
+Soc. B 63 (2001) 425, sec. 4, on model discrepancy].
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import comb
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+DEGREE = 3
+"""Of the polynomials that modulate an effect: four functions over the range of a variable."""
+
+LATER = 2.0
+"""Samples by which a transit may be later: a degree of the turn."""
+
+
+def bernstein(values: NDArray[np.float64], low: float, high: float, degree: int = DEGREE) -> NDArray[np.float64]:
+    """Bernstein polynomials of a degree over a range, shape (..., degree + 1); they add up to one.
+
+    [Farin, Curves and Surfaces for CAGD, 5th ed., eq 5.1]
+    """
+    share = np.clip((values - low) / max(high - low, 1e-12), 0.0, 1.0)[..., None]
+    k = np.arange(degree + 1)
+    return np.asarray(comb(degree, k) * share**k * (1.0 - share) ** (degree - k), dtype=np.float64)
+
+
+def modulated(
+    effects: Sequence[NDArray[np.float64]],
+    along: Sequence[NDArray[np.float64]],
+    signs: Sequence[NDArray[np.float64]] | None,
+) -> NDArray[np.float64]:
+    """Effects of m movers times smooth functions of what each follows, over all runs, shape (n, q).
+
+    Args:
+        effects: per run, what each mover adds to the reading, shape (n, m).
+        along: per run, the variable of each, shape (n, m).
+        signs: per run, the direction of each, where effects may differ by it, shape (n, m); None where not.
+    """
+    effect, values = np.vstack(effects), np.vstack(along)
+    ways = [np.ones_like(effect)] if signs is None else [np.vstack(signs) > 0.0, np.vstack(signs) <= 0.0]
+    found = []
+    for mover in range(effect.shape[1]):
+        own, at = effect[:, mover], values[:, mover]
+        if not own.any():
+            continue
+        functions = bernstein(at, float(at.min()), float(at.max()))
+        found += [functions * (own * way[:, mover])[:, None] for way in ways]
+        if signs is not None:
+            found.append(_other_transits(effects, signs, mover))
+    return np.hstack(found) if found else np.zeros((len(effect), 0))
+
+
+def _other_transits(
+    effects: Sequence[NDArray[np.float64]], signs: Sequence[NDArray[np.float64]], mover: int
+) -> NDArray[np.float64]:
+    """What a quicker and a later transit after a reversal would change, shape (n, 2).
+
+    The formula says over which way an effect turns to its other side. One column turns it at once; the other one turns it
+    a little later.
+    """
+    found = []
+    for effect, sign in zip(effects, signs, strict=True):
+        own, way = effect[:, mover], np.sign(sign[:, mover])
+        level = float(own @ way) / max(float(way @ way), 1.0)
+        found.append(np.column_stack([level * way, np.gradient(own) * LATER]))
+    return np.vstack(found)

@@ -1,0 +1,253 @@
+"""Patterns: effects without physics over the variables of a channel, and how probable each kind is beforehand.
+
+Some are forms with a name that people know: linear, once and twice per turn, hysteresis, a product of two variables, drift.
+Others are any smooth curve, over all rows or by direction of travel. Waves, bumps, steps and pulses are looked for in what a
+fit leaves; see `looks`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.curves import Power, Spline
+from dbbstation.inference.forms import Form, Sign, Wave
+from dbbstation.inference.variables import TRAVELS, Kind, rates_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.variables import Variable
+
+FAMILY_ODDS = float(np.log(0.1 / 0.9))
+"""Log prior odds that a kind of effect without physics is there: one recording in ten. All variables of a kind share them, and so
+do the frequencies or places that a wave, a bump, a step or a pulse was picked from."""
+
+CURVES = 7
+"""Functions of a smooth curve: it bends about five times over its range."""
+
+DISTINCT = 5
+"""Different values that a variable needs for a curve over it."""
+
+WAVE_SHARE = 0.15
+"""Share of a turn that an angle must cover for a wave of one turn to differ from a straight line by more than a hundredth."""
+
+
+class Family(StrEnum):
+    """Kinds of effects without physics."""
+
+    LINEAR = "linear"
+    ONCE = "once per turn"
+    TWICE = "twice per turn"
+    HYSTERESIS = "hysteresis"
+    SPEED = "speed"
+    LAG = "lag"
+    DRIFT = "drift"
+    PRODUCT = "product"
+    CURVE = "curve"
+    BY_DIRECTION = "curve by direction"
+    WAVE = "wave"
+    BUMP = "bump"
+    STEP = "step"
+    PULSES = "pulses"
+    BLOCKS = "offset by block"
+
+
+NAMED = frozenset(
+    {Family.LINEAR, Family.ONCE, Family.TWICE, Family.HYSTERESIS, Family.SPEED, Family.LAG, Family.DRIFT, Family.BLOCKS}
+)
+"""Those that a search tries in pairs: each may show only beside the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """One effect without physics.
+
+    Attributes:
+        family: its kind.
+        variables: that it follows; none for blocks.
+        samples: what each amplitude does, over all rows, shape (n, p), about one at the most.
+        form: of its curve, over the first variable, or over the row number where it follows none; None for a product.
+        units: what one of each amplitude is per what, shape (p,); empty texts are the channel's own unit.
+        per: by what each amplitude is to be divided for that, shape (p,).
+        label: what tells it from others of its family over the same variables.
+        tried: how many independent forms it was picked from.
+        choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
+            from the others.
+    """
+
+    family: Family
+    variables: tuple[Variable, ...]
+    samples: NDArray[np.float64]
+    form: Form | None = None
+    units: tuple[str, ...] = ()
+    per: tuple[float, ...] = ()
+    label: str = ""
+    tried: float = 1.0
+    choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Unique name, such as `once per turn of q1`."""
+        over = " and ".join(variable.name for variable in self.variables)
+        text = f"{self.family}{_JOIN.get(self.family, ' over ')}{over}" if over else str(self.family)
+        return f"{text}, {self.label}" if self.label else text
+
+
+_JOIN = {
+    Family.LINEAR: " in ",
+    Family.ONCE: " of ",
+    Family.TWICE: " of ",
+    Family.HYSTERESIS: " of ",
+    Family.SPEED: " of ",
+    Family.LAG: " of ",
+    Family.DRIFT: " with ",
+    Family.PRODUCT: " of ",
+}
+"""Between a family and its variables."""
+
+
+def patterns(
+    variables: Sequence[Variable], blocks: Sequence[slice], time: NDArray[np.float64] | None, simulated: Variable | None
+) -> list[Pattern]:
+    """Patterns that need no look at the residual.
+
+    Args:
+        variables: of the channel.
+        blocks: rows of each, in time order.
+        time: of the rows, shape (n,); None where their order is unknown: then nothing has a direction or a speed.
+        simulated: what the simulation says; None where it is not asked whether it is late.
+    """
+    usable = [v for v in variables if len(np.unique(v.values)) >= 2]  # noqa: PLR2004 - a constant has no effect
+    found = [pattern for v in usable for pattern in _over(v)]
+    if time is not None:
+        for variable in usable:
+            if variable.kind in TRAVELS:
+                found += _by_direction(variable, blocks)
+        paths = [v for v in usable if v.kind in TRAVELS and v.is_path(blocks)]
+        found += [_speed(v, time, blocks, Family.SPEED) for v in paths]
+        if simulated is not None and simulated.is_path(blocks):
+            found.append(_speed(simulated, time, blocks, Family.LAG))
+    found += [_product(a, b) for a, b in combinations(usable, 2) if Kind.TIME not in (a.kind, b.kind)]
+    if len(blocks) > 1:
+        found.append(_of_blocks(blocks, len(usable[0].values) if usable else max(b.stop for b in blocks)))
+    return [pattern for pattern in found if np.ptp(pattern.samples, axis=0).max(initial=0.0) > 0.0]
+
+
+def log_odds(members: int, tried: float = 1.0) -> float:
+    """Log prior odds of one pattern among so many of its family, picked from so many forms."""
+    return FAMILY_ODDS - float(np.log(max(members, 1) * max(tried, 1.0)))
+
+
+def turn(variable: Variable, order: int) -> Wave:
+    """Wave that closes `order` times per turn of an angle."""
+    return Wave(order / (variable.period or variable.extent))
+
+
+def covers_turns(variable: Variable) -> bool:
+    """Whether it is an angle that covers enough of a turn to show a wave of one turn."""
+    return variable.period is not None and variable.extent >= WAVE_SHARE * variable.period
+
+
+def _over(variable: Variable) -> list[Pattern]:
+    """Patterns over one variable whatever the order of the rows is."""
+    unit = f"/{variable.unit}" if variable.unit else f" per unit of {variable.name}"
+    straight = Power(variable.low, variable.high)
+    family = Family.DRIFT if variable.kind is Kind.TIME else Family.LINEAR
+    found = [Pattern(family, (variable,), straight.columns(variable.values), straight, (unit,), (variable.half_range,))]
+    if covers_turns(variable):
+        for order, name in ((1, Family.ONCE), (2, Family.TWICE)):
+            wave = turn(variable, order)
+            found.append(Pattern(name, (variable,), wave.columns(variable.values), wave, ("", ""), (1.0, 1.0)))
+    if len(np.unique(variable.values)) >= DISTINCT:
+        spline = Spline(variable.low, variable.high, CURVES)
+        found.append(Pattern(Family.CURVE, (variable,), spline.columns(variable.values), spline))
+    return found
+
+
+def _by_direction(variable: Variable, blocks: Sequence[slice]) -> list[Pattern]:
+    """Patterns that change sign with the direction of travel; none where it goes one way only."""
+    sign = variable.directions(blocks)
+    if not (sign > 0.0).any() or not (sign < 0.0).any():
+        return []
+    found = [_hysteresis(variable, blocks, sign)]
+    if len(np.unique(variable.values)) >= DISTINCT:
+        spline = Spline(variable.low, variable.high, CURVES)
+        found.append(Pattern(Family.BY_DIRECTION, (variable,), spline.columns(variable.values) * sign[:, None], spline))
+    return found
+
+
+def _hysteresis(variable: Variable, blocks: Sequence[slice], sign: NDArray[np.float64]) -> Pattern:
+    """Plus one way and minus the other way; it turns at once, or over a way after each reversal, as play does."""
+    widths = [share * variable.extent for share in TRANSITS]
+    # A row at which it turns may belong to either way: as it came there, or as it goes on.
+    arriving = variable.arriving(blocks)
+    leaving = np.concatenate([np.append(arriving[rows][1:], arriving[rows][-1:]) for rows in blocks])
+    samples = np.column_stack([sign, arriving, leaving, *(play(variable.values, blocks, width) for width in widths)])
+    labels = (
+        "at once",
+        "at once, a row later",
+        "at once, a row earlier",
+        *(f"over {width:.3g} {variable.unit}".strip() for width in widths),
+    )
+    weight = -float(np.log(len(labels)))
+    choices = tuple(((k,), weight, label) for k, label in enumerate(labels))
+    width = len(labels)
+    return Pattern(Family.HYSTERESIS, (variable,), samples, Sign(), ("",) * width, (1.0,) * width, choices=choices)
+
+
+TRANSITS = (0.003, 0.01, 0.03, 0.1)
+"""Ways after a reversal over which hysteresis turns to its other side, in shares of the range."""
+
+
+def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> NDArray[np.float64]:
+    """Where a thing is within a play, from -1 to 1, as it is pushed to and fro, shape (n,).
+
+    [play operator; Visintin, Differential Models of Hysteresis, 1994, sec. III.2]
+
+    Args:
+        values: where it is pushed to.
+        blocks: rows of each; each begins in the middle.
+        width: of the play, in the unit of the values.
+    """
+    found = np.empty(len(values))
+    for rows in blocks:
+        own = values[rows]
+        inside = np.empty(len(own))
+        last = 0.0
+        for k, change in enumerate(np.diff(own, prepend=own[:1]).tolist()):
+            last = min(max(last + 2.0 * change / width, -1.0), 1.0)
+            inside[k] = last
+        found[rows] = inside
+    return found
+
+
+def _speed(variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], family: Family) -> Pattern:
+    """In proportion to how fast it changes; of the simulated value this is what a lag does."""
+    rate = rates_of(variable.values, time, blocks)
+    size = float(np.abs(rate).max(initial=0.0))
+    # What is late by T lags behind by T times its rate.
+    unit = "s" if family is Family.LAG else f" per {variable.unit or variable.name}/s"
+    return Pattern(family, (variable,), rate[:, None] / (size or 1.0), None, (unit,), (size or 1.0,))
+
+
+def _product(one: Variable, other: Variable) -> Pattern:
+    """Product of two variables; of angles, products of their cosines and sines: waves of their sum and difference."""
+    a, b = (
+        turn(v, 1).columns(v.values) if covers_turns(v) else Power(v.low, v.high).columns(v.values)
+        for v in (one, other)
+    )
+    return Pattern(Family.PRODUCT, (one, other), (a[:, :, None] * b[:, None, :]).reshape(len(a), -1))
+
+
+def _of_blocks(blocks: Sequence[slice], rows: int) -> Pattern:
+    samples = np.zeros((rows, len(blocks)))
+    for k, own in enumerate(blocks):
+        samples[own, k] = 1.0
+    return Pattern(Family.BLOCKS, (), samples)

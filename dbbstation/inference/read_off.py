@@ -1,0 +1,359 @@
+"""Findings of a channel, read off the probabilities of sets of causes: verdict, size with uncertainty, place, equivalents."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import expit
+
+from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.settle import moved
+from dbbstation.inference.verdict import Value, Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.model_comparison import Cause, Member
+    from dbbstation.inference.patterns import Family
+    from dbbstation.inference.settle import Settled
+
+SURE = 0.95
+"""Probability from which on something is said to be there."""
+
+OUT = 5.0
+"""Standard deviations by which the norm of an effect must be out to be said to be there, or would have to be to be ruled out."""
+
+ABSENT = 0.01
+"""Probability up to which something that would have been seen is ruled out, or its prior probability if that is less."""
+
+EVEN = 0.5
+"""Probability from which on a cause that is not certain is rather there than not."""
+
+EQUIVALENT = 0.999
+"""Cosine between the effects of two causes, beside base and other causes, from which on nothing measured here tells one from the
+other: what is left of one beside the other is 4.5 % of it."""
+
+MOST_ALTERNATIVES = 6
+"""Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
+
+HALF = 0.5
+"""Share of its largest value from which on an effect counts as being there, for the spans over which it is."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Where an effect is.
+
+    Attributes:
+        variable: name.
+        low: from here on [unit].
+        high: up to here [unit].
+        unit: of the variable.
+    """
+
+    variable: str
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is said of one cause.
+
+    Attributes:
+        name: of it.
+        verdict: what can be said.
+        family: kind of effect; None for a law.
+        variables: that it follows.
+        probability: that it is there, or one of its class.
+        log_factor: log Bayes factor beside the others.
+        rms: of its effect, that the base cannot take up, root mean square over rows where it is there; in the unit of the residual.
+        sigmas: norm of that effect over its standard deviation.
+        whole_rms: of its effect about its mean.
+        confounded: share of that which the base parameters can take up, R².
+        values: amplitudes and nonlinear parameters, by name.
+        spans: of variables, where it is at least half as large as at its largest.
+        rows: first and last row of each stretch of time, where it is one in time; empty otherwise.
+        blocks: root mean square of it in each block.
+        equivalent: causes that nothing measured here tells from it, itself first; empty where there are none.
+        ambiguous_with: causes of which one is there for sure, if not this one.
+        text: why, in a sentence; empty where the verdict says it all.
+    """
+
+    name: str
+    verdict: Verdict
+    family: Family | None
+    variables: tuple[str, ...]
+    probability: float
+    log_factor: float
+    rms: float
+    sigmas: float
+    whole_rms: float
+    confounded: float
+    values: dict[str, Value]
+    spans: tuple[Span, ...]
+    rows: tuple[tuple[int, int], ...]
+    blocks: tuple[float, ...]
+    equivalent: tuple[str, ...] = ()
+    ambiguous_with: tuple[str, ...] = ()
+    text: str = ""
+
+
+def read_off(settled: Settled) -> tuple[Finding, ...]:
+    """One finding per law and per pattern, those that are there first, largest first."""
+    judge = _Judge(settled)
+    found = [judge.finding(cause) for cause in settled.causes]
+    found += [judge.refused(name, why) for name, why in settled.refused.items()]
+    order = [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT]
+    return tuple(sorted(found, key=lambda one: (order.index(one.verdict), -one.log_factor)))
+
+
+class _Judge:
+    def __init__(self, settled: Settled) -> None:
+        self._settled, self._best = settled, settled.best
+        self._members = {member.cause.name: member for member in self._best.members}
+        self._without = settled.bank.base_values(np.zeros(len(settled.channel.residual)))
+        self._classes = {name: self._class(member) for name, member in self._members.items()}
+        estimates = settled.comparison.estimates(self._best.members) if self._members else None
+        self._values: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+        first = 0
+        for name, member in self._members.items():
+            own = slice(first, first + len(member.columns))
+            first = own.stop
+            if estimates is not None:
+                self._values[name] = (estimates.values[own], estimates.covariance[own, own])
+        absent = [cause for cause in settled.causes if cause.name not in self._members]
+        scan = settled.comparison.scan(self._best.members, absent)
+        self._beside = {c.name: (float(g), m) for c, g, m in zip(scan.causes, scan.log_factor, scan.best, strict=True)}
+
+    def refused(self, name: str, why: str) -> Finding:
+        """Finding of a law that would have to be what it cannot be."""
+        blocks = (0.0,) * len(self._settled.channel.blocks)
+        return Finding(name, Verdict.RULED_OUT, None, (), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {}, (), (), blocks, text=why)
+
+    def finding(self, cause: Cause) -> Finding:
+        """What is said of one cause."""
+        pattern = self._settled.bank.patterns.get(cause.name)
+        member = self._members.get(cause.name)
+        equal = self._classes.get(cause.name, (cause.name,))
+        probability = self._probability(equal)
+        gain, shown = self._beside[cause.name] if member is None else (self._best.log_factor(cause.name), member)
+        if member is None:
+            # The prior must not say how much could hide.
+            shown = replace(shown, scale=float(SCALES[-1]))
+            found = self._settled.comparison.estimates([shown, *self._best.members])
+            own = len(shown.columns)
+            values, covariance = found.values[:own], found.covariance[:own, :own]
+        else:
+            values, covariance = self._values[cause.name]
+        sigmas = self._sigmas(shown, values, covariance)
+        effect = self._settled.bank.samples(shown.columns) @ values
+        whole, rms, confounded = self._concealed(effect)
+        verdict, others, text = self._verdict(cause, member, probability, sigmas)
+        variables = pattern.variables if pattern else ()
+        there = verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS} and member is not None
+        channel = self._settled.channel
+        return Finding(
+            name=cause.name,
+            verdict=verdict,
+            family=pattern.family if pattern else None,
+            variables=tuple(v.name for v in variables),
+            probability=probability,
+            log_factor=gain,
+            rms=rms,
+            sigmas=sigmas,
+            whole_rms=whole,
+            confounded=confounded,
+            values=self._named_values(shown, values, covariance),
+            spans=tuple(_span(effect, v.values, v.name, v.unit) for v in variables) if there else (),
+            rows=_stretches(effect) if there and pattern is not None and pattern.family == "pulses" else (),
+            blocks=tuple(_rms(effect[rows] - effect.mean()) for rows in channel.blocks) if there else (),
+            equivalent=equal if len(equal) > 1 else (),
+            ambiguous_with=others,
+            text=text,
+        )
+
+    def _verdict(
+        self, cause: Cause, member: Member | None, probability: float, sigmas: float
+    ) -> tuple[Verdict, tuple[str, ...], str]:
+        """Verdict, with whom it is ambiguous, and why."""
+        if member is not None and probability >= SURE:
+            if sigmas >= OUT:
+                return Verdict.IDENTIFIED, (), ""
+            return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
+        if probability >= EVEN or member is not None:
+            others = self._ambiguity(cause.name)
+            text = f"These rows cannot tell it from {', '.join(others)}." if others else "These rows do not decide it."
+            return Verdict.AMBIGUOUS, others, text
+        for name, equal in self._classes.items():
+            if cause.name in equal:
+                return Verdict.AMBIGUOUS, (name,), f"Nothing measured here tells it from {name}."
+        for name in self._members:
+            if self._probability(self._classes[name]) < SURE and cause.name in self._ambiguity(name):
+                return Verdict.AMBIGUOUS, (name,), f"These rows cannot tell it from {name}."
+        return self._absent(cause, probability)
+
+    def _absent(self, cause: Cause, probability: float) -> tuple[Verdict, tuple[str, ...], str]:
+        """The same of a cause that is rather not there."""
+        seen = self._seen(cause, self._best.members)
+        if seen < OUT:
+            for name in self._members:
+                if self._seen(cause, self._best.without(name)) >= OUT:
+                    return Verdict.NOT_TESTABLE, (), f"Beside {name} these rows would not show it."
+            if self._seen(cause, (), base=False) >= OUT:
+                return Verdict.NOT_TESTABLE, (), "The fitted parameters would take it up."
+            return Verdict.NOT_TESTABLE, (), "These rows would not show it at its plausible size."
+        if probability > max(ABSENT, float(expit(cause.log_prior_odds))):
+            return Verdict.NOT_TESTABLE, (), "These rows leave it open: they neither show nor exclude it."
+        return Verdict.RULED_OUT, (), "It would have been seen at its plausible size and was not needed."
+
+    def _seen(self, cause: Cause, others: tuple[Member, ...], *, base: bool = True) -> float:
+        """Standard deviations by which its plausible size stands out, in the middle of its directions."""
+        variant = max(cause.variants, key=lambda v: len(v.columns))
+        if base:
+            products = self._settled.comparison.beside(others, variant.columns)
+        else:
+            samples = self._settled.bank.fitted(variant.columns) / self._settled.noise.innovation
+            products = samples.T @ samples
+        scaled = variant.plausible[:, None] * products * variant.plausible
+        return float(np.median(np.sqrt(np.maximum(np.linalg.eigvalsh(scaled), 0.0))))
+
+    def _sigmas(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
+        """By how many standard deviations the norm of an effect beside the base is out."""
+        products = self._settled.comparison.beside((), member.columns)
+        norm = float(np.sqrt(np.maximum(values @ products @ values, 0.0)))
+        if norm == 0.0:
+            return 0.0
+        slope = products @ values / norm
+        return norm / float(np.sqrt(np.maximum(slope @ covariance @ slope, 1e-300)))
+
+    def _concealed(self, effect: NDArray[np.float64]) -> tuple[float, float, float]:
+        """Root mean square of an effect about its mean, that of what the base leaves of it, and the share that this takes up."""
+        kept = effect[self._settled.channel.kept]
+        whole = _rms(kept - kept.mean())
+        fitted = self._settled.bank.base_values(-effect) - self._without
+        rest = _rms(kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept])
+        share = 1.0 - (rest / whole) ** 2 if whole > 0.0 else 0.0
+        return whole, rest, float(np.clip(share, 0.0, 1.0))
+
+    def _named_values(
+        self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
+    ) -> dict[str, Value]:
+        """Amplitudes and nonlinear parameters with their uncertainty; what a formula may be off by is part of it."""
+        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        width = len(member.variant.columns)
+        law = self._settled.bank.laws.get(member.cause.name)
+        if law is not None:
+            found = {
+                name: Value(float(values[k]), float(np.hypot(sigma[k], law.form_uncertainty * values[k])), law.units[k])
+                for k, name in enumerate(law.parameters[:width])
+            }
+            shaped = moved(law, member, values)
+            for k, name in enumerate(law.parameters[width:]):
+                known = len(member.variant.slack) > k
+                found[name] = Value(shaped[k], float(sigma[width + k]) if known else np.nan, law.units[width + k])
+            return found
+        pattern = self._settled.bank.patterns[member.cause.name]
+        unit = self._settled.channel.unit
+        if len(pattern.per) < width:
+            return {}
+        names = _NAMES.get(str(pattern.family), tuple(f"amplitude {k + 1}" for k in range(width)))[:width]
+        names = ("slope",) if pattern.family in {"linear", "drift"} else names
+        return {
+            name: Value(
+                float(values[k] / pattern.per[k]), float(sigma[k] / pattern.per[k]), _unit(unit, pattern.units[k])
+            )
+            for k, name in enumerate(names)
+        }
+
+    def _probability(self, names: Iterable[str]) -> float:
+        return self._settled.posterior.probability(names)
+
+    def _ambiguity(self, name: str) -> tuple[str, ...]:
+        """Causes of which one is there for sure, if not this one; none where there are none such."""
+        posterior, probable = self._settled.posterior, self._probability((name,))
+        chosen = list(self._classes.get(name, (name,)))
+        alone: dict[str, float] = {}
+        for other in (cause.name for cause in self._settled.causes if cause.name not in chosen):
+            both = posterior.probability_of(lambda key, pair={name, other}: pair <= key)  # type: ignore[misc]
+            # What is there beside it anyway is no alternative to it.
+            if both < EVEN * probable:
+                alone[other] = self._probability((other,)) - both
+        for other in sorted(alone, key=lambda n: -alone[n]):
+            if self._probability(chosen) >= SURE or len(chosen) > MOST_ALTERNATIVES:
+                break
+            chosen.append(other)
+        if self._probability(chosen) < SURE:
+            return ()
+        return tuple(other for other in chosen if other != name)
+
+    def _class(self, member: Member) -> tuple[str, ...]:
+        """Causes whose effects nothing measured here tells from those of a member, itself first."""
+        others = self._best.without(member.cause.name)
+        rivals = [c for c in self._settled.causes if c.name not in self._members and not c.setup]
+        size = len(member.variant.columns)
+        found = [member.cause.name]
+        for cause in rivals:
+            same = [v for v in cause.variants if len(v.columns) == size]
+            if same and self._same(member.variant.columns, same[0].columns, others):
+                found.append(cause.name)
+        return tuple(found)
+
+    def _same(self, one: NDArray[np.int64], other: NDArray[np.int64], others: tuple[Member, ...]) -> bool:
+        """Whether two causes of as many amplitudes span the same effects beside base and others."""
+        products = self._settled.comparison.beside(others, np.concatenate([one, other]))
+        size = len(one)
+        a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
+        cosines = np.linalg.svd(_inverse_root(a) @ across @ _inverse_root(b), compute_uv=False)
+        return bool(len(cosines) and cosines.min() > EQUIVALENT)
+
+
+_NAMES = {
+    "once per turn": ("cosine", "sine"),
+    "twice per turn": ("cosine", "sine"),
+    "wave": ("cosine", "sine"),
+    "hysteresis": ("half width",),
+    "speed": ("per speed",),
+    "lag": ("delay",),
+    "bump": ("height",),
+    "step": ("height",),
+}
+
+
+def _unit(unit: str, per: str) -> str:
+    """Unit of an amplitude; one that stands by itself is no quotient of the channel's."""
+    return f"{unit}{per}" if per == "" or per.startswith(("/", " per")) else per
+
+
+def _span(effect: NDArray[np.float64], values: NDArray[np.float64], name: str, unit: str) -> Span:
+    """Range of a variable over which an effect, about its median, is at least half as large as anywhere."""
+    away = np.abs(effect - np.median(effect))
+    there = values[away >= HALF * away.max()]
+    return Span(name, float(there.min()), float(there.max()), unit)
+
+
+def _stretches(effect: NDArray[np.float64]) -> tuple[tuple[int, int], ...]:
+    """First and last rows of the stretches where an effect is not zero."""
+    inside = np.concatenate([[False], np.abs(effect) > 0.0, [False]])
+    edges = np.flatnonzero(np.diff(inside.astype(np.int64)))
+    return tuple((int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True))
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _inverse_root(products: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse square root of products of columns; directions that are nothing are left out."""
+    value, axes = np.linalg.eigh(products)
+    usable = value > RANK * max(float(value[-1]), 1e-300)
+    return np.asarray((axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T, dtype=np.float64)
+
+
+RANK = 1e-9
+"""Rank tolerance: share of the largest eigenvalue below which a direction says nothing."""

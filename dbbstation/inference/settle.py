@@ -1,0 +1,360 @@
+"""Which set of laws and patterns explains a channel: compare, look at what is left, lay out anew, until nothing changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.bank import Bank
+from dbbstation.inference.hypotheses import Hypothesis, search
+from dbbstation.inference.looks import looked_for
+from dbbstation.inference.patterns import patterns
+from dbbstation.inference.pieces import Left
+from dbbstation.inference.square_root import free_directions
+from dbbstation.inference.stretches import stretches
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.channel import Channel, Law
+    from dbbstation.inference.coloured import Coloured
+    from dbbstation.inference.hypotheses import Posterior
+    from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
+    from dbbstation.inference.patterns import Pattern
+    from dbbstation.inference.projection import BesideBase
+
+MOST_EXPANDED = 8
+"""Hypotheses whose neighbours are looked at in a search, at the most: a table may have dozens of members, each with neighbours."""
+
+MOST_ROUNDS = 12
+"""Times that hypotheses, noise and looks may settle against each other."""
+
+MOST_LOOKS = 15
+"""Looks at what is left, one beside what the other brought, at the most."""
+
+SEEDS = 3
+"""Most probable hypotheses that are looked at again after each change."""
+
+MOST_GROWN = 40
+"""Causes that are taken in one after the other before the search begins, at the most."""
+
+RIVALS = 3
+"""Laws in the place of each member that are laid out at their own best values before they are compared."""
+
+NEGATIVE_SIGMA = 3.0
+"""Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """What the comparison came to.
+
+    Attributes:
+        channel: that was explained.
+        bank: columns and causes.
+        noise: of one row, from what everything together leaves.
+        measured_noise: whether rows are in time order, so that their noise is known apart from its neighbours' resemblance.
+        comparison: that the posterior came from.
+        posterior: over sets of causes.
+        refused: laws that would have to be what they cannot be, and why.
+    """
+
+    channel: Channel
+    bank: Bank
+    noise: Coloured
+    comparison: ModelComparison
+    posterior: Posterior
+    refused: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def best(self) -> Hypothesis:
+        """The most probable hypothesis."""
+        return self.posterior.best
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """That were compared."""
+        return tuple(cause for cause in self.bank.causes if cause.name not in self.refused)
+
+    @property
+    def log_probability(self) -> float:
+        """Log probability of noise and best hypothesis together, but for what is the same for all of this channel."""
+        return self.bank.log_likelihood() + self.best.log_posterior
+
+    def effect(self, names: Sequence[str] | None = None) -> NDArray[np.float64]:
+        """What members of the best hypothesis do, over all rows, in the unit of the residual, shape (n,).
+
+        Args:
+            names: of the members; all if None.
+        """
+        total = np.zeros(len(self.channel.residual))
+        values = self.comparison.estimates(self.best.members).values if self.best.members else np.zeros(0)
+        for member in self.best.members:
+            own, values = values[: len(member.columns)], values[len(member.columns) :]
+            if names is None or member.cause.name in names:
+                total += self.bank.samples(member.columns) @ own
+        return total
+
+    def base_values(self, effect: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Values of the base columns beside an effect, that of all members if None, shape (k,)."""
+        return self.bank.base_values(self.effect() if effect is None else effect)
+
+    def predicted(self) -> NDArray[np.float64]:
+        """What base and members say of the residual, over all rows, shape (n,)."""
+        effect = self.effect()
+        return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)
+
+    def second_start_agrees(self) -> bool:
+        """Whether a search that begins with nothing comes to the same most probable set of causes."""
+        return search(self.comparison, self.causes).best.names == self.best.names
+
+
+def settle(
+    channel: Channel,
+    *,
+    look: bool = True,
+    static: bool = True,
+    most_expanded: int = MOST_EXPANDED,
+    most_looks: int = MOST_LOOKS,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Settled:
+    """Compare sets of laws and patterns on a channel.
+
+    Args:
+        channel: what is to be explained.
+        look: look for waves, bumps, steps, and pulses in time that nobody named.
+        static: compare with the patterns that need no look, too.
+        most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
+        most_looks: looks at what is left, one beside what the other brought, at the most.
+        progress: told what is being done.
+    """
+    options = _Options(look=look, static=static, most_expanded=most_expanded, most_looks=most_looks)
+    found = _settled(_begun(channel, options), (), options, progress)
+    if found.noise.is_white or not look:
+        return found
+    # What lasts for a while and is not yet known looks like noise whose neighbours resemble each other, and that noise then
+    # hides it: the other way round, first everything that stands out of white noise, may end at something more probable.
+    bank = _begun(channel, options)
+    bank.measure_noise(white=True)
+    members = _looked(bank, (), {}, progress, options.most_looks, white=True)
+    bank.measure_noise()
+    comparison = bank.beside().comparison(bank.target)
+    members = grown(comparison, bank.causes, members)
+    odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
+    if bank.log_likelihood() + comparison.log_evidence(members) + odds < found.log_probability:
+        return found
+    other = _settled(bank, members, options, progress)
+    return max((found, other), key=lambda settled: settled.log_probability)
+
+
+@dataclass(frozen=True)
+class _Options:
+    look: bool
+    static: bool
+    most_expanded: int
+    most_looks: int
+
+
+def _begun(channel: Channel, options: _Options) -> Bank:
+    bank = Bank(channel)
+    if options.static:
+        every = channel.patterns
+        bank.add(
+            patterns(channel.variables, channel.blocks, channel.time, channel.simulated) if every is None else every
+        )
+    return bank
+
+
+def _settled(bank: Bank, best: tuple[Member, ...], options: _Options, progress: Callable[[str], None]) -> Settled:
+    """Look, compare, lay out anew, until nothing changes.
+
+    Args:
+        bank: of columns; they become more.
+        best: members to begin with.
+        options: of `settle`.
+        progress: told what is being done.
+    """
+    channel, look = bank.channel, options.look
+    seeds: dict[frozenset[str], tuple[Member, ...]] = {}
+    laid_out: set[str] = set()
+    refused: dict[str, str] = {}
+    looked: set[frozenset[str]] = set()
+    # Laws come first, at their best values: what they leave is looked at, and not what they do.
+    looking = look and not channel.laws
+    for number in range(MOST_ROUNDS):
+        bank.measure_noise()
+        if looking:
+            best = _looked(bank, best, refused, progress, options.most_looks)
+        progress(f"sets of causes, round {number + 1}")
+        beside = bank.beside()
+        comparison = beside.comparison(bank.target)
+        causes = bank.but_for(refused)
+        start = [grown(comparison, causes, best), *seeds.values()]
+        posterior = search(comparison, causes, start, options.most_expanded)
+        seeds |= {h.names: h.members for h in posterior.hypotheses[:SEEDS]}
+        settled = Settled(channel, bank, bank.noise, comparison, posterior, dict(refused))
+        best = posterior.best.members
+        if rough := [m for m in _laws_of(settled) if m.cause.name not in laid_out]:
+            for member in rough:
+                laid_out.add(member.cause.name)
+                _lay_out(bank, beside, posterior.best, member)
+            continue
+        if impossible := _negative(settled):
+            refused |= impossible
+            continue
+        if not look or (looking and posterior.best.names in looked):
+            break
+        if looking:
+            looked.add(posterior.best.names)
+        looking = look
+    return settled
+
+
+def _looked(
+    bank: Bank,
+    members: tuple[Member, ...],
+    refused: Mapping[str, str],
+    progress: Callable[[str], None],
+    most_looks: int,
+    *,
+    white: bool = False,
+) -> tuple[Member, ...]:
+    """Look at what is left, take in what is worth it, and look again beside that, until nothing more stands out."""
+    for number in range(most_looks):
+        new = bank.add(_seen(bank, members))
+        noise = bank.measure_noise(white=white)
+        progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
+        comparison = bank.beside().comparison(bank.target)
+        members = grown(comparison, bank.but_for(refused), members)
+        taken = {member.cause.name for member in members}
+        bank.drop(set(new) - taken)
+        if not taken & set(new):
+            break
+    return members
+
+
+def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[Member] = ()) -> tuple[Member, ...]:
+    """Causes taken in one after the other, the one that is worth most beside the others first; a start for a search.
+
+    What the others make up for in the end is left out again.
+
+    Args:
+        comparison: of their columns.
+        causes: to choose from.
+        start: members to begin with; those of causes that are no longer there are left out.
+    """
+    there = {cause.name: cause for cause in causes}
+    members = [
+        replace(m, cause=there[m.cause.name])
+        for m in start
+        if m.cause.name in there and any(v is m.variant for v in there[m.cause.name].variants)
+    ]
+    while len(members) < MOST_GROWN:
+        taken = {member.cause.name for member in members}
+        scan = comparison.scan(members, [cause for cause in causes if cause.name not in taken])
+        if not scan.causes:
+            break
+        worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
+        k = int(worth.argmax())
+        if worth[k] <= 0.0:
+            break
+        members.append(scan.best[k])
+    while members:
+        each = comparison.each_beside_others(members)
+        members = [member for member, _, _ in each]
+        worth = np.array([factor + member.cause.log_prior_odds for member, factor, _ in each])
+        if worth.min() > 0.0:
+            break
+        members.pop(int(worth.argmin()))
+    return tuple(members)
+
+
+def _seen(bank: Bank, members: Sequence[Member]) -> list[Pattern]:
+    """Patterns that stand out of what base and members leave."""
+    channel = bank.channel
+    known, held = channel.known, channel.held
+    fixed = np.flatnonzero(~known.random)
+    random = np.flatnonzero(known.random)
+    base = bank.base
+    columns = [base[:, fixed] @ free_directions(known, fixed, held), base[:, random]]
+    sd = [np.full(columns[0].shape[1], np.inf), known.prior[random]]
+    for member in members:
+        columns.append(bank.fitted(member.columns))
+        sd.append(member.sd)
+    left = Left.of(bank.target, np.hstack(columns), np.concatenate(sd), bank.noise, bank.whitening)
+    size = channel.size / left.noise
+    found = looked_for(left, channel.variables, channel.kept, size)
+    if channel.time is not None:
+        stretch = stretches(left, channel.blocks, channel.kept, size)
+        found += [stretch] if stretch is not None else []
+    return bank.worthy(left, found)
+
+
+def _laws_of(settled: Settled) -> list[Member]:
+    """Laws of the best hypothesis, and those that do best in the place of each member."""
+    best, laws = settled.best, settled.bank.laws
+    found = [m for m in best.members if m.cause.name in laws]
+    for member in best.members:
+        others = best.without(member.cause.name)
+        scan = settled.comparison.scan(
+            others, [c for c in settled.causes if c.name in laws and c.name not in best.names]
+        )
+        order = np.argsort(-scan.log_factor)[:RIVALS]
+        enough = 0.5 * best.log_factor(member.cause.name)
+        found += [scan.best[k] for k in order if scan.log_factor[k] > max(enough, 0.0)]
+    return list({m.cause.name: m for m in found}.values())
+
+
+def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, member: Member) -> None:
+    """Lay out a law at its best values in the best hypothesis, or beside it in the place of what it competes with."""
+    target, law = bank.target, bank.laws[member.cause.name]
+    others = best.without(member.cause.name)
+    for _ in range(STEPS if law.grids else 1):
+        values = beside.comparison(target).estimates([member, *others]).values[: len(member.columns)]
+        width = len(member.variant.columns)
+        nonlinear = moved(law, member, values)
+        if not values[:width].any():
+            return
+        bank.refine(law.name, nonlinear, values[:width])
+        cause = next(cause for cause in bank.causes if cause.name == law.name)
+        member = replace(member, cause=cause, variant=cause.variants[0])
+
+
+def moved(law: Law, member: Member, values: NDArray[np.float64]) -> tuple[float, ...]:
+    """Nonlinear parameters of a law, moved along their tangents by the values of a member, within their grids."""
+    nonlinear = list(member.variant.nonlinear)
+    if len(member.variant.slack):
+        for k, grid in enumerate(law.grids):
+            nonlinear[k] = float(np.clip(nonlinear[k] + values[len(member.variant.columns) + k], grid[0], grid[-1]))
+    return tuple(nonlinear)
+
+
+STEPS = 3
+"""Times that the nonlinear parameters of a law are improved."""
+
+
+def _negative(settled: Settled) -> dict[str, str]:
+    """Laws of the best hypothesis whose values are negative beyond their uncertainty though they cannot be."""
+    members = settled.best.members
+    if not members:
+        return {}
+    estimates = settled.comparison.estimates(members)
+    found: dict[str, str] = {}
+    first = 0
+    for member in members:
+        law = settled.bank.laws.get(member.cause.name)
+        for k in range(len(member.variant.columns) if law is not None and law.positive else 0):
+            value = float(estimates.values[first + k])
+            sigma = float(np.sqrt(estimates.covariance[first + k, first + k]))
+            sigma = float(np.hypot(sigma, law.form_uncertainty * value)) if law else sigma
+            if law and law.positive[k] and value < -NEGATIVE_SIGMA * sigma:
+                found[law.name] = (
+                    f"It would have to be negative, {law.parameters[k]} {value:.3g} ± {sigma:.2g} {law.units[k]}, which it "
+                    "cannot be: something else that does the opposite is at work."
+                )
+        first += len(member.columns)
+    return found

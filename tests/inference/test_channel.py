@@ -1,0 +1,198 @@
+"""The channel finds what a simulated table holds, says how large it is, and claims nothing where there is nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.coloured import Coloured
+from dbbstation.inference.folds import held_out_error
+from dbbstation.inference.model_comparison import Cause, Member, ModelComparison, Variant
+from dbbstation.inference.read_off import Finding, read_off
+from dbbstation.inference.settle import settle
+from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.verdict import Verdict
+from tests.inference.tables import Table, direction, table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+EFFECTS: dict[str, Callable[[Table], NDArray[np.float64]]] = {
+    "hysteresis of q": lambda d: 0.15 * direction(d.q),
+    "twice per turn of angle": lambda d: 0.1 * np.cos(2.0 * np.radians(d.angle) + 0.5),
+    "once per turn of angle": lambda d: 0.1 * np.cos(np.radians(d.angle) - 1.0),
+    "product of q and load": lambda d: 0.15 * d.q * d.load / 150.0,
+    "linear in q": lambda d: 0.003 * d.q,
+    "lag of simulated": lambda d: -0.05 * np.gradient(d.simulated, d.t),
+    "linear in temperature": lambda d: 0.15 * (d.temperature - 20.0),
+    "drift with t": lambda d: 0.005 * d.t,
+}
+
+
+def channel(data: Table, laws: tuple[Law, ...] = (), blocks: int = 2) -> Channel:
+    rows = len(data.t)
+    return Channel(
+        residual=data.residual,
+        unit="mm",
+        blocks=tuple(slice(k * rows // blocks, (k + 1) * rows // blocks) for k in range(blocks)),
+        names=tuple(f"run {k + 1}" for k in range(blocks)),
+        variables=(
+            Variable("t", "s", Kind.TIME, data.t),
+            Variable("q", "mm", Kind.LENGTH, data.q),
+            Variable("angle", "deg", Kind.ANGLE, data.angle, 360.0),
+            Variable("load", "N", Kind.FORCE, data.load),
+            Variable("temperature", "degC", Kind.TEMPERATURE, data.temperature),
+        ),
+        base=Base.flat(("offset",), np.ones((rows, 1))),
+        laws=laws,
+        time=data.t,
+        simulated=Variable("simulated", "mm", Kind.LENGTH, data.simulated),
+    )
+
+
+def there(findings: tuple[Finding, ...]) -> dict[str, Finding]:
+    """Findings that are certain."""
+    return {finding.name: finding for finding in findings if finding.verdict is Verdict.IDENTIFIED}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_is_claimed_of_white_noise(seed: int) -> None:
+    settled = settle(channel(table(seed)))
+    assert not there(read_off(settled))
+    assert settled.noise.sigma == pytest.approx(0.1, rel=0.06)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_is_claimed_of_noise_whose_neighbours_resemble_each_other(seed: int) -> None:
+    settled = settle(channel(table(seed, correlation=0.9)))
+    assert not there(read_off(settled))
+    # A first-order process of 0.9 counts as one independent row in 19 [(1 + 0.9) / (1 - 0.9)].
+    assert settled.noise.correlation_samples == pytest.approx(19.0, rel=0.5)
+
+
+def test_whitening_makes_noise_white_that_is_as_it_says() -> None:
+    noise = Coloured(2.0, share=0.8, decay=0.9)
+    lags = np.arange(200)
+    covariance = 4.0 * noise.autocorrelation(np.abs(lags[:, None] - lags))
+    whitening = noise.whitening([slice(0, 120), slice(120, 200)])
+    assert whitening is not None
+    for block in (slice(0, 120), slice(120, 200)):
+        white = (whitening @ np.eye(200))[block, block]
+        found = white @ covariance[block, block] @ white.T / noise.innovation**2
+        assert np.abs(found - np.eye(len(found))).max() < 0.01
+
+
+def test_an_effect_is_found_in_correlated_noise_with_an_honest_size() -> None:
+    away = []
+    for seed in range(4):
+        found = there(read_off(settle(channel(table(seed, EFFECTS["linear in temperature"], correlation=0.9)))))
+        value = found["linear in temperature"].values["slope"]
+        away.append((value.value - 0.15) / value.uncertainty)
+    assert np.abs(away).max() < 3.6
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_a_pulse_is_found_without_being_told_when(correlation: float) -> None:
+    data = table(8, lambda d: 0.4 * ((d.t >= 20.0) & (d.t < 23.0)), correlation=correlation)
+    (found,) = there(read_off(settle(channel(data)))).values()
+    (rows,) = found.rows
+    # A row in or out of it costs little where its noise is a quarter of the pulse.
+    assert abs(rows[0] - 400) <= 2
+    assert abs(rows[1] - 459) <= 2
+    assert next(iter(found.values.values())).value == pytest.approx(0.4, abs=0.1)
+
+
+def test_several_pulses_are_found() -> None:
+    starts = (100, 333, 512, 800, 1300)
+
+    def pulses(d: Table) -> NDArray[np.float64]:
+        row = np.arange(len(d.t))
+        return 0.3 * np.sum([(row >= k) & (row < k + 40) for k in starts], axis=0)
+
+    found = there(read_off(settle(channel(table(9, pulses))))).values()
+    assert {finding.family for finding in found} == {"pulses"}
+    rows = sorted(stretch for finding in found for stretch in finding.rows)
+    assert len(rows) == len(starts)
+    assert np.abs(np.array([first for first, _ in rows]) - starts).max() <= 3
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_is_found_by_its_form_alone(name: str) -> None:
+    assert set(there(read_off(settle(channel(table(11, EFFECTS[name])))))) == {name}
+
+
+def test_sizes_lie_within_their_uncertainty() -> None:
+    truth = {"linear in temperature": 0.15, "drift with t": 0.005, "linear in q": 0.003, "lag of simulated": -0.05}
+    away = []
+    for name, true in truth.items():
+        for seed in range(3):
+            found = there(read_off(settle(channel(table(seed, EFFECTS[name])))))[name]
+            value = next(iter(found.values.values()))
+            away.append((value.value - true) / value.uncertainty)
+    # Twelve standard normal numbers: one beyond 3.6 once in 260 times, their root mean square beyond 1.7 once in 2,000.
+    assert np.abs(away).max() < 3.6
+    assert np.sqrt(np.mean(np.square(away))) < 1.7
+
+
+def test_a_wave_is_found_with_its_period() -> None:
+    found = there(read_off(settle(channel(table(3, lambda d: 0.1 * np.sin(2.0 * np.pi * d.q / 7.3))))))
+    (wave,) = [finding for finding in found.values() if finding.family == "wave"]
+    assert wave.variables == ("q",)
+    assert float(wave.name.split("period ")[1].split()[0]) == pytest.approx(7.3, rel=0.01)
+    assert float(np.hypot(*(v.value for v in wave.values.values()))) == pytest.approx(0.1, abs=0.02)
+
+
+def test_a_law_with_a_nonlinear_parameter_is_refined_between_the_points_of_its_grid() -> None:
+    data = table(5, lambda d: 0.3 * (1.0 - np.exp(-d.t / 17.0)))
+    law = Law(
+        "warm-up",
+        lambda point: (1.0 - np.exp(-data.t / point[0]))[:, None],
+        np.array([0.2]),
+        ("size", "time constant"),
+        ("mm", "s"),
+        ((5.0, 10.0, 20.0, 40.0),),
+    )
+    (found,) = there(read_off(settle(channel(data, (law,))))).values()
+    assert found.name == "warm-up"
+    constant = found.values["time constant"]
+    assert abs(constant.value - 17.0) < 4.0 * constant.uncertainty
+    assert constant.uncertainty < 3.0
+
+
+def test_a_law_that_would_have_to_be_negative_is_refused() -> None:
+    data = table(6, lambda d: -0.2 * d.load / 5.0)
+    law = Law("weight", lambda _: (data.load / 5.0)[:, None], np.array([0.2]), ("weight",), ("mm",), positive=(True,))
+    findings = {finding.name: finding for finding in read_off(settle(channel(data, (law,))))}
+    assert findings["weight"].verdict is Verdict.RULED_OUT
+    assert "negative" in findings["weight"].text
+
+
+def test_held_out_error_comes_down_to_the_noise() -> None:
+    data = channel(table(2, EFFECTS["hysteresis of q"]))
+    error = held_out_error(data, settle)
+    assert len(error.folds) == 10
+    assert error.before == pytest.approx(np.hypot(0.15, 0.1), rel=0.06)
+    assert error.after == pytest.approx(0.1, rel=0.08)
+
+
+def test_all_members_at_once_are_what_each_is_beside_the_others() -> None:
+    rng = np.random.default_rng(4)
+    columns = rng.standard_normal((200, 9)) @ rng.standard_normal((9, 9))
+    target = columns @ rng.standard_normal(9) + rng.standard_normal(200)
+    comparison = ModelComparison(columns.T @ columns, columns.T @ target)
+    members = [
+        Member(Cause(f"{k}", (variant,), -1.0), variant, scale)
+        for k, (variant, scale) in enumerate(
+            (Variant(np.arange(3 * k, 3 * k + 3), np.full(3, 0.5)), scale) for k, scale in enumerate((0.3, 1.0, 3.0))
+        )
+    ]
+    for k, (found, averaged, best) in enumerate(comparison.each_beside_others(members)):
+        scan = comparison.scan([m for m in members if m is not members[k]], [members[k].cause])
+        assert averaged == pytest.approx(scan.log_factor[0], rel=1e-9)
+        assert best == pytest.approx(scan.log_best[0], rel=1e-9)
+        assert found.scale == scan.best[0].scale

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("recording", type=click.Path(path_type=Path), metavar="RECORDING.csv")
+@click.argument("recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING.csv...")
 @click.option("--force-per-ampere", type=float, metavar="N/A", help="Force of the drive at 1 A, for motor_current_a.")
 @click.option("--sources", metavar="A,B,...", help="Causes to compare [default: all].")
 @click.option(
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="Overwrite these files.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def drive(
-    recording: Path,
+    recordings: tuple[Path, ...],
     *,
     force_per_ampere: float | None,
     sources: str | None,
@@ -41,11 +41,13 @@ def drive(
     r"""Identify one strut drive from position and force, and find the physics that mass and viscous friction leave out.
 
     The recording is a CSV file with the columns t_s, position_mm and force_n, or motor_current_a. Record strokes to and
-    fro at several speeds. Verdicts: identified, ambiguous, ruled-out, not-testable.
+    fro at several speeds. Several recordings of one drive are taken together. Verdicts: identified, ambiguous, ruled-out,
+    not-testable.
 
     \b
     Examples:
       dbbstation drive strut3.csv
+      dbbstation drive slow.csv fast.csv
       dbbstation drive strut3.csv --force-per-ampere 410 --figure strut3.svg
       dbbstation drive strut3.csv --sources coulomb-friction,friction-asymmetry --json
     """
@@ -61,10 +63,11 @@ def drive(
             refuse_existing(path, force=force)
     known = known_drive_sources()
     named = drive_sources_named([name.strip() for name in sources.split(",")] if sources else known)
-    file = read_drive(recording)
-    for warning in file.warnings:
+    files = [read_drive(path) for path in recordings]
+    for warning in (warning for file in files for warning in file.warnings):
         say(f"note: {warning}")
-    found = identify(file.recording(force_per_ampere), named, cutoff_hz, lambda text: say(f"... {text}"))
+    raw = [file.recording(force_per_ampere) for file in files]
+    found = identify(raw, named, cutoff_hz, lambda text: say(f"... {text}"))
     summary = drive_summary(found)
     if out is not None:
         write_text(out, compared_csv(found.table()), force=force)
@@ -109,6 +112,11 @@ def _print(summary: Mapping[str, Any]) -> None:
         _print_locations(summary["locations"])
     click.echo("\n" + summary["unexplained"]["text"])
     if summary["unexplained"]["significant"]:
+        for effect in summary["unexplained"]["effects"][:3]:
+            click.echo(
+                f"  {effect['text']}: {effect['rms_n']:.2g} N rms, from {effect['from']:.4g} to {effect['to']:.4g} {effect['unit']} "
+                f"(probability {_probability(effect['probability'])})"
+            )
         click.echo(f"It is {summary['unexplained']['rms_n']:.2g} N rms; largest:")
         _print_locations(summary["unexplained"]["locations"][:3])
     for sentence in summary["cannot_tell"]:
@@ -126,17 +134,43 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
     from dbbstation.cli.output import print_table
 
     rows = [
-        [s["name"], s["verdict"], f"{s['gain']:.0f}", f"{100 * s['concealed']:.0f} %", ", ".join(s["ambiguous_with"])]
+        [
+            s["name"],
+            s["verdict"],
+            _probability(s["probability"]),
+            f"{s['gain']:.0f}",
+            f"{100 * s['concealed']:.0f} %",
+            ", ".join(s["ambiguous_with"]),
+        ]
         for s in sources
     ]
-    print_table(["cause", "verdict", "log Bayes factor", "concealed (R²)", "not distinguished from"], rows)
+    print_table(
+        ["cause", "verdict", "probability", "log Bayes factor", "concealed (R²)", "not distinguished from"], rows
+    )
     for source in sources:
         if source["verdict"] in {"identified", "ambiguous"}:
             click.echo()
-            for name, number in source["parameters"].items():
-                click.echo(f"{source['name']}: {name} {_number(number)}")
+            _print_parts(source)
             click.echo(f"  {source['text']}")
 
 
+def _print_parts(source: Mapping[str, Any]) -> None:
+    """Numbers of a cause, or of each wave and pulse where it has several."""
+    if source["parameters"] and len(source["parts"]) <= 1:
+        for name, number in source["parameters"].items():
+            click.echo(f"{source['name']}: {name} {_number(number)}")
+        return
+    for part in source["parts"]:
+        when = f"from {part['t_s'][0]:.3f} to {part['t_s'][1]:.3f} s, " if part["t_s"] else ""
+        numbers = ", ".join(f"{name} {_number(number)}" for name, number in part["parameters"].items())
+        click.echo(f"{source['name']}: {when}{numbers}")
+
+
+def _probability(probability: float) -> str:
+    return "> 0.999" if probability > 0.999 else f"{probability:.3f}"  # noqa: PLR2004 - three digits are shown
+
+
 def _number(number: Mapping[str, Any]) -> str:
+    if number["uncertainty"] is None:
+        return f"{number['value']:#.4g} {number['unit']}"
     return f"{number['value']:#.4g} ± {number['uncertainty']:.2g} {number['unit']}"

@@ -144,7 +144,7 @@ class Bank:
         Args:
             white: take it for white, whatever it is.
         """
-        least = QUIETEST * self.channel.size
+        least = max(QUIETEST * self.channel.size, self.channel.least_noise)
         stretches = self.channel.stretches
         for _ in range(NOISE_ROUNDS):
             beside = self.beside()
@@ -266,6 +266,7 @@ class Bank:
             slack_sd=sd,
             slack_at=at,
             log_weight=weight,
+            positive=law.positive,
         )
         self._of_laws[name] = replace(self._of_laws[name], variants=(variant,))
 
@@ -282,7 +283,8 @@ class Bank:
         points = list(product(*law.grids))
         weight = -float(np.log(len(points)))
         return tuple(
-            Variant(self._add(law.columns(point)), law.plausible, point, log_weight=weight) for point in points
+            Variant(self._add(law.columns(point)), law.plausible, point, log_weight=weight, positive=law.positive)
+            for point in points
         )
 
     def _cause(self, pattern: Pattern, own: NDArray[np.int64], plausible: float) -> Cause:

@@ -111,7 +111,10 @@ class Channel:
         simulated: the simulated value as a variable, to ask whether it is late; None: it is not asked.
         kept: rows that are fitted, shape (n,); all if not given.
         apart: rows from one that is kept to the next one where none between them is held back.
-        static: patterns that need no look, where they are known already; None: they are made.
+        static: patterns that need no look, where they are known already or a client makes them itself; None: all kinds over all
+            variables.
+        least_noise: standard deviation of one row that is always there, whatever the rows seem to say: what the way they were made
+            leaves of a perfect object, in the unit of the residual.
     """
 
     residual: NDArray[np.float64]
@@ -127,6 +130,7 @@ class Channel:
     kept: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     apart: int = 1
     static: tuple[Pattern, ...] | None = None
+    least_noise: float = 0.0
 
     def __post_init__(self) -> None:
         if not len(self.kept):

@@ -13,7 +13,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import log_ndtr, logsumexp
 
 from dbbstation.inference.model_comparison import FLEXIBLE, SLACK_SHARES, Member, with_slack_of
 
@@ -262,19 +262,40 @@ class _Search:
             members = self._with_slack(members)
         members, more = self._as_close_as_it_is(members)
         evidence, factors = self._comparison.log_evidence(members), []
+        possible = self._possible(members)
+        more += sum(possible)
         each = self._comparison.each_beside_others(members) if many else []
         for k, member in enumerate(members):
             if many and _single(member):
-                factors.append(each[k][1])
+                factors.append(each[k][1] + possible[k])
                 more += each[k][1] - each[k][2]
                 continue
             others = [*members[:k], *members[k + 1 :]]
             scan = self._comparison.scan(others, [member.cause])
             averaged = float(scan.log_factor[0] - scan.log_best[0])
-            factors.append(evidence - self._comparison.log_evidence(others) + averaged)
+            factors.append(evidence - self._comparison.log_evidence(others) + averaged + possible[k])
             more += averaged
         odds = sum(member.cause.log_prior_odds for member in members)
         return Hypothesis(tuple(members), evidence + more + odds, tuple(factors))
+
+    def _possible(self, members: list[Member]) -> list[float]:
+        """What it makes of the evidence that amplitudes of each member are known not to be negative.
+
+        A prior that is cut off at zero has twice the density above it, and the likelihood counts there alone: the posterior
+        probability of being above zero over the prior one, which is a half.
+        """
+        found = [0.0] * len(members)
+        if not any(any(member.variant.positive) for member in members):
+            return found
+        estimates = self._comparison.estimates(members)
+        sigma = np.sqrt(np.diag(estimates.covariance))
+        first = 0
+        for k, member in enumerate(members):
+            for j, positive in enumerate(member.variant.positive):
+                if positive:
+                    found[k] += float(log_ndtr(estimates.values[first + j] / sigma[first + j]) + np.log(2.0))
+            first += len(member.columns)
+        return found
 
     def _as_close_as_it_is(self, members: list[Member]) -> tuple[list[Member], float]:
         """Members with the share of their slack that suits each best, and what averaging over the shares adds."""

@@ -58,6 +58,7 @@ class Variant:
         slack: columns of what the formula may be off by, shape (d,).
         slack_sd: standard deviations of their coefficients at the amplitudes `slack_at`, shape (d,).
         slack_at: root mean square of the amplitudes, in plausible ones, that the slack was made for.
+        positive: which amplitudes cannot be negative, shape (p,); empty where all can.
     """
 
     columns: NDArray[np.int64]
@@ -70,6 +71,7 @@ class Variant:
     slack: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     slack_sd: NDArray[np.float64] = field(default_factory=lambda: NO_SLACK)
     slack_at: float = 1.0
+    positive: tuple[bool, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

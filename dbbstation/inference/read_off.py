@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import expit
 
 from dbbstation.inference.model_comparison import SCALES
-from dbbstation.inference.settle import moved
+from dbbstation.inference.settle import impossible, moved
 from dbbstation.inference.verdict import Value, Verdict
 
 if TYPE_CHECKING:
@@ -186,20 +186,30 @@ class _Judge:
     ) -> tuple[Verdict, tuple[str, ...], str]:
         """Verdict, with whom it is ambiguous, and why."""
         if member is not None and probability >= SURE:
-            if sigmas >= OUT:
-                return Verdict.IDENTIFIED, (), ""
-            return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
-        for name, equal in self._classes.items():
-            if cause.name in equal and name != cause.name:
-                return Verdict.AMBIGUOUS, (name,), f"Nothing measured here tells it from {name}."
+            faint = f"Its effect is only {sigmas:.2g} standard deviations out."
+            return (Verdict.IDENTIFIED, (), "") if sigmas >= OUT else (Verdict.AMBIGUOUS, (), faint)
+        if member is None and (why := self._impossible_in_place(cause)):
+            return Verdict.RULED_OUT, (), why
+        if alike := [name for name, equal in self._classes.items() if cause.name in equal and name != cause.name]:
+            return Verdict.AMBIGUOUS, (alike[0],), f"Nothing measured here tells it from {alike[0]}."
         if probability >= EVEN or member is not None:
             others = self._ambiguity(cause.name)
             text = f"These rows cannot tell it from {', '.join(others)}." if others else "These rows do not decide it."
             return Verdict.AMBIGUOUS, others, text
-        for name, others in self._unsure.items():
-            if cause.name in others:
-                return Verdict.AMBIGUOUS, (name,), f"These rows cannot tell it from {name}."
+        if unsure := [name for name, others in self._unsure.items() if cause.name in others]:
+            return Verdict.AMBIGUOUS, (unsure[0],), f"These rows cannot tell it from {unsure[0]}."
         return self._absent(cause, probability)
+
+    def _impossible_in_place(self, cause: Cause) -> str:
+        """Why a law cannot stand in the place of what nothing measured tells from it; empty where it can."""
+        law = self._settled.bank.laws.get(cause.name)
+        if law is None or not any(law.positive):
+            return ""
+        alike = [name for name, equal in self._classes.items() if cause.name in equal]
+        shown = replace(self._beside[cause.name][1], scale=float(SCALES[-1]))
+        found = self._settled.comparison.estimates([shown, *self._best.without(*alike)])
+        width = len(shown.variant.columns)
+        return impossible(law, found.values[:width], np.diag(found.covariance)[:width])
 
     def _absent(self, cause: Cause, probability: float) -> tuple[Verdict, tuple[str, ...], str]:
         """The same of a cause that is rather not there."""

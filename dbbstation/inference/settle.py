@@ -33,6 +33,9 @@ MOST_EXPANDED = 8
 MOST_ROUNDS = 12
 """Times that hypotheses, noise and looks may settle against each other."""
 
+MOST_LOOKS = 15
+"""Looks at what is left, one beside what the other brought, at the most."""
+
 SEEDS = 3
 """Most probable hypotheses that are looked at again after each change."""
 
@@ -117,6 +120,7 @@ def settle(
     static: bool = True,
     most_expanded: int = MOST_EXPANDED,
     colours: bool = True,
+    most_looks: int = MOST_LOOKS,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns on a channel.
@@ -127,9 +131,10 @@ def settle(
         static: compare with the patterns that need no look, too.
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
         colours: where noise is not white, begin a second time as if it were; see below.
+        most_looks: looks at what is left, one beside what the other brought, at the most.
         progress: told what is being done.
     """
-    options = _Options(look=look, static=static, most_expanded=most_expanded)
+    options = _Options(look=look, static=static, most_expanded=most_expanded, most_looks=most_looks)
     found = _settled(_begun(channel, options), (), options, progress)
     if found.noise.is_white or not (look and colours):
         return found
@@ -137,7 +142,7 @@ def settle(
     # hides it: the other way round, first everything that stands out of white noise, may end at something more probable.
     bank = _begun(channel, options)
     bank.measure_noise(white=True)
-    members = _looked(bank, (), {}, progress, white=True)
+    members = _looked(bank, (), {}, progress, options.most_looks, white=True)
     bank.measure_noise()
     comparison = bank.beside().comparison(bank.target)
     members = grown(comparison, bank.causes, members)
@@ -153,6 +158,7 @@ class _Options:
     look: bool
     static: bool
     most_expanded: int
+    most_looks: int
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
@@ -182,14 +188,16 @@ def _settled(bank: Bank, best: tuple[Member, ...], options: _Options, progress: 
     laid_out: set[str] = set()
     refused: dict[str, str] = {}
     looked: set[frozenset[str]] = set()
+    # Laws come first, at their best values: what they leave is looked at, and not what they do.
+    looking = look and not channel.laws
     for number in range(MOST_ROUNDS):
         bank.measure_noise()
         lasting: tuple[Member, ...] = ()
-        if look and not number:
+        if looking and not looked:
             # Stretches of time can stand for whatever has a history. So effects that follow variables have a start of their own.
-            lasting = _looked(bank, _grown_in(bank), refused, progress, in_time=False)
-        if look:
-            best = _looked(bank, best, refused, progress)
+            lasting = _looked(bank, _grown_in(bank), refused, progress, options.most_looks, in_time=False)
+        if looking:
+            best = _looked(bank, best, refused, progress, options.most_looks)
         progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
@@ -207,9 +215,11 @@ def _settled(bank: Bank, best: tuple[Member, ...], options: _Options, progress: 
         if impossible := _negative(settled):
             refused |= impossible
             continue
-        if not look or posterior.best.names in looked:
+        if not look or (looking and posterior.best.names in looked):
             break
-        looked.add(posterior.best.names)
+        if looking:
+            looked.add(posterior.best.names)
+        looking = look
     return settled
 
 
@@ -218,6 +228,7 @@ def _looked(
     members: tuple[Member, ...],
     refused: Mapping[str, str],
     progress: Callable[[str], None],
+    most_looks: int,
     *,
     white: bool = False,
     in_time: bool = True,
@@ -229,10 +240,11 @@ def _looked(
         members: to begin with.
         refused: laws that cannot be what they would have to be.
         progress: told what is being done.
+        most_looks: looks at the most.
         white: take noise for white.
         in_time: look for steps and pulses in time, too.
     """
-    for number in range(MOST_LOOKS):
+    for number in range(most_looks):
         new = bank.add(_seen(bank, members, in_time=in_time))
         noise = bank.measure_noise(white=white)
         progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
@@ -243,10 +255,6 @@ def _looked(
         if not taken & set(new):
             break
     return members
-
-
-MOST_LOOKS = 15
-"""Looks at what is left, one beside what the other brought, at the most."""
 
 
 def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[Member] = ()) -> tuple[Member, ...]:
@@ -364,14 +372,27 @@ def _negative(settled: Settled) -> dict[str, str]:
     first = 0
     for member in members:
         law = settled.bank.laws.get(member.cause.name)
-        for k in range(len(member.variant.columns) if law is not None and law.positive else 0):
-            value = float(estimates.values[first + k])
-            sigma = float(np.sqrt(estimates.covariance[first + k, first + k]))
-            sigma = float(np.hypot(sigma, law.form_uncertainty * value)) if law else sigma
-            if law and law.positive[k] and value < -NEGATIVE_SIGMA * sigma:
-                found[law.name] = (
-                    f"It would have to be negative, {law.parameters[k]} {value:.3g} ± {sigma:.2g} {law.units[k]}, which it "
-                    "cannot be: something else that does the opposite is at work."
-                )
+        own = slice(first, first + len(member.variant.columns))
+        if law is not None and (why := impossible(law, estimates.values[own], np.diag(estimates.covariance)[own])):
+            found[law.name] = why
         first += len(member.columns)
     return found
+
+
+def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.float64]) -> str:
+    """Why amplitudes of a law cannot be: one is negative beyond its uncertainty though it cannot be; empty where they can.
+
+    Args:
+        law: whose they are.
+        values: shape (p,).
+        variances: of these, shape (p,).
+    """
+    for k, positive in enumerate(law.positive):
+        value = float(values[k])
+        sigma = float(np.hypot(np.sqrt(variances[k]), law.form_uncertainty * value))
+        if positive and value < -NEGATIVE_SIGMA * sigma:
+            return (
+                f"It would have to be negative, {law.parameters[k]} {value:.3g} ± {sigma:.2g} {law.units[k]}, which it "
+                "cannot be: something else that does the opposite is at work."
+            )
+    return ""

@@ -63,7 +63,7 @@ def _left(axes: Axes, diagnosis: DriveDiagnosis) -> None:
 def _friction(axes: Axes, diagnosis: DriveDiagnosis) -> None:
     table, curve = diagnosis.table(), diagnosis.curve
     base, after = diagnosis.before, diagnosis.after
-    mass = after["mass_kg"].value.value
+    mass = after["mass_kg"].value.value if np.isfinite(after["mass_kg"].value.value) else 0.0
     # Inertia taken off: what is left hangs on friction, load and noise.
     friction = table["force_n"] - mass * 1e-3 * table["acceleration_mm_s2"]
     step = max(len(friction) // MOST_POINTS, 1)

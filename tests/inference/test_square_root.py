@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.noise import noise_of
-from dbbstation.inference.race import race_on
 from dbbstation.inference.square_root import Columns, compress, joined, lost_directions, solve, spread
 
 NOISE = 0.3
@@ -95,8 +94,6 @@ def test_readings_of_another_instrument_count_with_their_own_noise(problem, rng)
     assert solution.stated_chi2 == pytest.approx(left @ left + prior)
     hat = sum(np.trace(j @ covariance[np.ix_(c, c)] @ j.T) for j, c in zip(jacobians, columns, strict=True))
     assert solution.freedom_used == pytest.approx(hat / NOISE**2)
-    race = race_on(blocks, Columns(known.prior, known.scale, known.random), np.zeros((0, 3)), 8, NOISE)
-    assert race.chi2 == pytest.approx(solution.chi2)
 
 
 def test_a_direction_that_no_run_sees_is_lost_and_held(rng):

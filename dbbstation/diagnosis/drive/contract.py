@@ -1,8 +1,8 @@
 """The contract of a cause of force: what it is given, what it declares, what it answers.
 
 The force that drives a moving mass is linear in amplitudes: mass times acceleration, viscous friction times speed, and
-columns of further causes. A cause has one or several forms; a form may hold one number that its columns are not
-proportional to (a Stribeck speed, a period), which is searched over.
+columns of further causes. A cause has one or several forms; a form may hold numbers that its columns are not proportional
+to (a Stribeck speed, a period), which begin on a grid and are then improved.
 """
 
 from __future__ import annotations
@@ -23,6 +23,42 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class Scale:
+    """Sizes of all recordings together: they make amplitudes comparable.
+
+    Attributes:
+        force_n: root mean square of the force in the band [N].
+        speed_m_s: greatest speed [m/s].
+        low_m: least position [m].
+        high_m: greatest position [m].
+        mean_m: mean position at the samples compared [m].
+        duration_s: of the longest recording [s].
+        cutoff_hz: of the band in which force and model are compared.
+        sample_s: from one recorded sample to the next, of the slowest recording [s].
+        reverses: some recording changes its direction of travel.
+        waves_per_m: waves over the position that what is left by everything smooth follows best, strongest first [1/m].
+        waves_tried: how many independent waves these were picked from.
+    """
+
+    force_n: float
+    speed_m_s: float
+    low_m: float
+    high_m: float
+    mean_m: float
+    duration_s: float
+    cutoff_hz: float
+    sample_s: float
+    reverses: bool
+    waves_per_m: tuple[float, ...] = ()
+    waves_tried: float = 1.0
+
+    @property
+    def travel_m(self) -> float:
+        """Between the ends of the travel [m]."""
+        return self.high_m - self.low_m
+
+
+@dataclass(frozen=True)
 class Parameter:
     """One number of a cause.
 
@@ -31,12 +67,14 @@ class Parameter:
         unit: as printed.
         plausible: usual size, one standard deviation, in that unit, for the recording at hand.
         meaning: one line with the sign.
+        positive: it cannot be negative.
     """
 
     name: str
     unit: str
     plausible: float
     meaning: str
+    positive: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,17 +83,19 @@ class Form:
 
     Attributes:
         amplitudes: what the force is proportional to, p of them.
-        columns: force per amplitude at every sample, shape (n, p), for a value of `shape`.
-        shape: number that the columns are not proportional to; None where there is none.
-        value: of the shape, where the search begins.
-        reach: the search may take the value this factor up or down.
+        columns: force per amplitude at every sample of a recording, shape (n, p), for values of `shapes`.
+        shapes: numbers that the columns are not proportional to.
+        grids: values of each of these to begin with, rising.
+        label: what tells it from other forms of the cause, which may be there beside it; empty where there is one only.
+        tried: independent forms that it was picked from by looking at the recording.
     """
 
     amplitudes: tuple[Parameter, ...]
-    columns: Callable[[Signals, float], NDArray[np.float64]]
-    shape: Parameter | None = None
-    value: float = 0.0
-    reach: float = 1.0
+    columns: Callable[[Signals, tuple[float, ...]], NDArray[np.float64]]
+    shapes: tuple[Parameter, ...] = ()
+    grids: tuple[tuple[float, ...], ...] = ()
+    label: str = ""
+    tried: float = 1.0
 
 
 class DriveSource(ABC):
@@ -65,21 +105,24 @@ class DriveSource(ABC):
     varies_with: ClassVar[str]
     """Variable that organises its misfit, as printed."""
     texts: ClassVar[Texts]
+    form_uncertainty: ClassVar[float]
+    """Share of the effect by which real drives depart from the formula, one standard deviation; its reason stands beside it."""
+    prior_probability: ClassVar[float] = 0.05
+    """That a drive has it so that it matters, before anything is measured."""
 
     @abstractmethod
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:
-        """Forms to compare on a recording, none where it cannot show the cause.
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
+        """Forms to compare, none where the recordings cannot show the cause.
 
         Args:
-            signals: the recording.
-            residual_n: what is left of the force by everything smooth, at the samples compared, shape (m,) [N]: a first
-                look for causes with a period.
+            scale: sizes of the recordings.
         """
 
-    def possible(self, values: Mapping[str, float]) -> bool:  # noqa: ARG002
+    def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         """Whether values can be this cause at all, whatever they explain.
 
         Args:
             values: all parameters of a model that contains the cause, by name.
+            scale: sizes of the recordings.
         """
         return True

@@ -9,8 +9,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.drive.design import Design
-    from dbbstation.diagnosis.findings import Value, Verdict
+    from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.diagnosis.drive.recordings import Recordings
+    from dbbstation.inference.verdict import Value, Verdict
 
 
 @dataclass(frozen=True)
@@ -33,24 +34,65 @@ class DriveFinding:
     Attributes:
         name: of the cause.
         verdict: what can be said.
+        probability: that it is there, or one that nothing recorded here tells from it.
         ambiguous_with: causes that would explain the recording about as well in its place.
-        gain: difference in log evidence that it brings.
+        gain: log Bayes factor of it beside the others.
         concealed: share of its signature's sum of squares that mass and viscous friction swallow.
         whole_n: root mean square of its signature [N].
         rest_n: of what the base leaves of it [N].
         parameters: as fitted; for a cause that was not, best amplitudes, whose uncertainty says how much could hide.
+        parts: where it is there more than once (waves, pulses, forms), each with its numbers.
         text: one or two sentences for people.
     """
 
     name: str
     verdict: Verdict
+    probability: float
     ambiguous_with: tuple[str, ...]
     gain: float
     concealed: float
     whole_n: float
     rest_n: float
     parameters: dict[str, Value]
+    parts: tuple[Part, ...]
     text: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """One wave, pulse or form of a cause.
+
+    Attributes:
+        label: which; empty where there is one only.
+        parameters: of it.
+        t_s: first and last time of a pulse [s]; None where it is none.
+    """
+
+    label: str
+    parameters: dict[str, Value]
+    t_s: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A force without a name.
+
+    Attributes:
+        text: kind and variable, such as `curve over speed`.
+        variable: that it follows.
+        probability: that it is there.
+        rms_n: of it beside mass and viscous friction [N].
+        low, high: range of the variable in which it is at least half as large as anywhere.
+        unit: of the variable.
+    """
+
+    text: str
+    variable: str
+    probability: float
+    rms_n: float
+    low: float
+    high: float
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -99,14 +141,14 @@ class Rest:
         rms_n: beyond noise [N].
         probability: of such a rest or a larger one by noise alone.
         variable: what organises it; None where nothing does clearly.
-        gain: log evidence of that description.
+        effects: without a name that the comparison found, largest first.
         text: one sentence for people.
     """
 
     rms_n: float
     probability: float
     variable: str | None
-    gain: float
+    effects: tuple[Effect, ...]
     text: str
 
 
@@ -130,7 +172,7 @@ class DriveDiagnosis:
     """Everything found.
 
     Attributes:
-        design: recording and columns.
+        explained: channel, comparison and fits.
         mismatch: the recording differs from the base model beyond noise.
         misfit_rms_n: of the base model beyond noise [N].
         probability: of such a misfit by chance.
@@ -140,6 +182,7 @@ class DriveDiagnosis:
         chosen: causes in the last model, those first that explain most beside the others.
         base_n: force of the base model at the samples compared, shape (m,) [N].
         model_n: of the last model [N].
+        whole_n: of the last model with the forces that have no name [N].
         held_back_s: start and end of the stretch that was held back [s].
         steps: from the base to the last model.
         locations: of the base model's misfit, largest share first.
@@ -150,7 +193,7 @@ class DriveDiagnosis:
         curve: friction against speed.
     """
 
-    design: Design
+    explained: Explained
     mismatch: bool
     misfit_rms_n: float
     probability: float
@@ -160,6 +203,7 @@ class DriveDiagnosis:
     chosen: tuple[str, ...]
     base_n: NDArray[np.float64]
     model_n: NDArray[np.float64]
+    whole_n: NDArray[np.float64]
     held_back_s: tuple[float, float]
     steps: tuple[Step, ...]
     locations: tuple[DriveLocation, ...]
@@ -169,15 +213,25 @@ class DriveDiagnosis:
     cannot_tell: tuple[str, ...]
     curve: Curve
 
+    @property
+    def recordings(self) -> Recordings:
+        """What was recorded."""
+        return self.explained.drive.recordings
+
+    @property
+    def force_n(self) -> NDArray[np.float64]:
+        """In the band, shape (m,) [N]."""
+        return self.recordings.force_n
+
     def table(self) -> dict[str, NDArray[np.float64]]:
         """What was compared, sample by sample in the band, by column name with its unit."""
-        signals = self.design.signals
+        recordings = self.recordings
         return {
-            "t_s": signals.t_s[signals.kept],
-            "position_mm": 1e3 * signals.position_m[signals.kept],
-            "speed_mm_s": 1e3 * self.design.columns[:, 1],
-            "acceleration_mm_s2": 1e3 * self.design.columns[:, 0],
-            "force_n": self.design.force_n,
+            "t_s": recordings.time_s,
+            "position_mm": 1e3 * recordings.at(lambda s: s.position_m),
+            "speed_mm_s": 1e3 * recordings.motion[:, 1],
+            "acceleration_mm_s2": 1e3 * recordings.motion[:, 0],
+            "force_n": self.force_n,
             "base_force_n": self.base_n,
             "model_force_n": self.model_n,
         }

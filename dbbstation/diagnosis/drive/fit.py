@@ -1,4 +1,4 @@
-"""Mass, viscous friction and chosen causes fitted together, numbers that the force is not proportional to included."""
+"""Mass, viscous friction and the members of a hypothesis fitted together: values, uncertainties, and the force they predict."""
 
 from __future__ import annotations
 
@@ -6,233 +6,223 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.special import log_ndtr
 
-from dbbstation.diagnosis.drive.design import BASE
-from dbbstation.diagnosis.findings import Value
-from dbbstation.inference.jackknife import jackknife_covariance
-from dbbstation.inference.square_root import compress
+from dbbstation.diagnosis.drive.channel import BASE_UNITS
+from dbbstation.inference.settle import moved
+from dbbstation.inference.verdict import Value
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Container, Sequence
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.drive.contract import Form
-    from dbbstation.diagnosis.drive.design import Design
-    from dbbstation.inference.race import Candidate, Variant
-
-ROUNDS = 2
-"""Times that every shape is searched anew beside the others."""
+    from dbbstation.diagnosis.drive.channel import DriveChannel
+    from dbbstation.inference.hypotheses import Hypothesis
+    from dbbstation.inference.model_comparison import Member
+    from dbbstation.inference.settle import Settled
 
 METHOD_SHARE = 5e-4
 """Standard uncertainty, of a value, that low-pass, differences and the moment of a reversal leave of a perfect recording;
 on simulated drives they make the mass too small by half of this."""
 
-DIFFERENCE = 1e-4
-"""Relative step of a shape for its derivative."""
+LIKELY = 0.01
+"""Probability of a hypothesis from which on it counts for the uncertainty of what all hypotheses have."""
 
-
-@dataclass(frozen=True, eq=False)
-class Term:
-    """A cause in the model.
-
-    Attributes:
-        name: of the cause.
-        form: chosen.
-        value: of the form's shape.
-    """
-
-    name: str
-    form: Form
-    value: float
-
-
-def term_of(design: Design, candidate: Candidate, variant: Variant) -> Term:
-    """Term of a candidate in one of its variants, whose shape says which form it is."""
-    form = design.forms[candidate.name][int(variant.shape[0])]
-    return Term(candidate.name, form, form.value)
+IMPOSSIBLE_SIGMA = 3.0
+"""Standard uncertainties below zero from which on a mass or a friction is impossible: one in 700 by chance."""
 
 
 @dataclass(frozen=True, eq=False)
 class DriveFit:
-    """A fitted model.
+    """A fitted model, base columns first, then amplitudes and slack of each member.
 
     Attributes:
-        terms: causes, in order.
-        columns: base, amplitudes of all terms, then one column per shape, shape (m, k).
-        values: of the columns; zero for shapes, about which the columns are taken, shape (k,).
+        drive: what was fitted.
+        members: of the hypothesis.
+        samples: all columns, shape (m, k).
+        values: shape (k,).
         covariance: shape (k, k).
-        force_n: of the model at all samples, shape (m,) [N].
-        square: sum of squares that is left of the fitted samples [N²].
     """
 
-    terms: tuple[Term, ...]
-    columns: NDArray[np.float64]
+    drive: DriveChannel
+    members: tuple[Member, ...]
+    samples: NDArray[np.float64]
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
-    force_n: NDArray[np.float64]
-    square: float
 
-    def amplitudes(self, name: str) -> slice:
-        """Columns of one cause's amplitudes."""
-        start = len(BASE)
-        for term in self.terms:
-            stop = start + len(term.form.amplitudes)
-            if term.name == name:
-                return slice(start, stop)
-            start = stop
+    @property
+    def base(self) -> dict[str, Value]:
+        """Base parameters by name."""
+        sigma = np.sqrt(np.diag(self.covariance))
+        return {
+            name: Value(float(self.values[k]), float(sigma[k]), BASE_UNITS[name])
+            for k, name in enumerate(self.drive.channel.base.names)
+        }
+
+    def columns_of(self, name: str) -> slice:
+        """Columns of a member's amplitudes."""
+        start = len(self.drive.channel.base.names)
+        for member in self.members:
+            if member.cause.name == name:
+                return slice(start, start + len(member.variant.columns))
+            start += len(member.columns)
         raise KeyError(name)
 
+    def member(self, name: str) -> Member:
+        """Member by the name of its cause."""
+        return next(member for member in self.members if member.cause.name == name)
+
     def parameters(self, name: str) -> dict[str, Value]:
-        """Amplitudes and shape of one cause with their uncertainties."""
-        term = next(term for term in self.terms if term.name == name)
-        sigma = np.sqrt(np.diag(self.covariance))
-        rows = self.amplitudes(name)
+        """Amplitudes and further numbers of one law."""
+        member, own = self.member(name), self.columns_of(name)
+        _, form = self.drive.of_law[name]
+        law = next(law for law in self.drive.channel.laws if law.name == name)
+        every = slice(own.start, own.start + len(member.columns))
+        sigma = np.sqrt(np.diag(self.covariance))[every]
+        values = self.values[every]
+        width = len(form.amplitudes)
         found = {
-            p.name: Value(float(self.values[k]), float(sigma[k]), p.unit)
-            for p, k in zip(term.form.amplitudes, range(rows.start, rows.stop), strict=True)
+            p.name: Value(float(values[k]), float(np.hypot(sigma[k], METHOD_SHARE * values[k])), p.unit)
+            for k, p in enumerate(form.amplitudes)
         }
-        if term.form.shape is not None:
-            shaped = [one.name for one in _shaped(self)]
-            column = self.columns.shape[1] - len(shaped) + shaped.index(name)
-            # The column is the derivative by the logarithm of the shape.
-            found[term.form.shape.name] = Value(term.value, term.value * float(sigma[column]), term.form.shape.unit)
+        shaped = moved(law, member, values)
+        for k, p in enumerate(form.shapes):
+            laid_out = len(member.variant.slack) > k
+            found[p.name] = Value(shaped[k], float(sigma[width + k]) if laid_out else float(law.grids[k][-1]), p.unit)
         return found
 
     def all_values(self) -> dict[str, float]:
-        """Values of all parameters of the model by name, base included."""
-        found = {name: value.value for name, value in base_values(self).items()}
-        for term in self.terms:
-            found |= {name: value.value for name, value in self.parameters(term.name).items()}
+        """Values of all parameters of base and laws by name."""
+        found = {name: value.value for name, value in self.base.items()}
+        for member in self.members:
+            if member.cause.name in self.drive.of_law:
+                found |= {name: value.value for name, value in self.parameters(member.cause.name).items()}
         return found
 
+    def force_n(self, names: Container[str] | None = None) -> NDArray[np.float64]:
+        """Force of the base and of members by name, all if None, at the samples compared, shape (m,) [N]."""
+        used = np.zeros(len(self.values), dtype=bool)
+        used[: len(self.drive.channel.base.names)] = True
+        for member in self.members:
+            if names is None or member.cause.name in names:
+                own = self.columns_of(member.cause.name)
+                used[own.start : own.start + len(member.columns)] = True
+        return np.asarray(self.samples[:, used] @ self.values[used], dtype=np.float64)
 
-def fit(design: Design, terms: Sequence[Term], rows: NDArray[np.bool_] | None = None) -> DriveFit:
-    """Fit base and causes together.
+    def weighted(self, weights: NDArray[np.float64], unit: str) -> Value:
+        """A sum of values, weights of shape (k,)."""
+        sigma = float(np.sqrt(max(float(weights @ self.covariance @ weights), 0.0)))
+        return Value(float(weights @ self.values), sigma, unit)
 
-    The standard uncertainty of every value is the larger of two: from the samples' noise as smooth things feel it, and
-    from how the value moves when stretches of the recording are left out in turn.
+    @property
+    def impossible(self) -> list[str]:
+        """Base parameters that are negative beyond their uncertainty, most impossible first."""
+        below = {name: -v.value / v.uncertainty for name, v in self.base.items() if v.uncertainty > 0.0}
+        return [n for n, s in sorted(below.items(), key=lambda item: -item[1]) if s > IMPOSSIBLE_SIGMA]
+
+
+def fit(
+    drive: DriveChannel, settled: Settled, members: Sequence[Member], rows: NDArray[np.bool_] | None = None
+) -> DriveFit:
+    """Fit base and members together under the priors of the members.
 
     Args:
-        design: the recording.
-        terms: causes with the values at which the search for their shapes begins.
+        drive: what is fitted.
+        settled: where the columns of the members are.
+        members: of a hypothesis.
         rows: samples to fit, shape (m,); all if None.
     """
-    rows = np.ones(len(design.force_n), dtype=bool) if rows is None else rows
-    terms = _searched(design, list(terms), rows)
-    amplitudes = _columns(design, terms)
-    found, *_ = np.linalg.lstsq(amplitudes[rows], design.force_n[rows], rcond=None)
-    values = np.asarray(found, dtype=np.float64)
-    derivatives = _by_shapes(design, terms, values[len(BASE) :])
-    columns = np.hstack([amplitudes, derivatives])
-    covariance = _covariance(design, columns, rows)
-    left = design.force_n[rows] - amplitudes[rows] @ values
-    return DriveFit(
-        terms=tuple(terms),
-        columns=columns,
-        values=np.concatenate([values, np.zeros(derivatives.shape[1])]),
-        covariance=covariance,
-        force_n=amplitudes @ values,
-        square=float(left @ left),
-    )
+    channel, bank = drive.channel, settled.bank
+    samples = np.hstack([channel.base.samples, *(bank.samples(member.columns) for member in members)])
+    rows = np.ones(len(samples), dtype=bool) if rows is None else rows
+    white = bank.whitened(np.column_stack([samples, channel.residual]))[rows]
+    values, covariance = _solved(white, _prior_sd(drive, members), settled.noise.innovation)
+    return DriveFit(drive, tuple(members), samples, values, covariance)
 
 
-def _columns(design: Design, terms: Sequence[Term]) -> NDArray[np.float64]:
-    """Base and amplitudes, shape (m, b + p)."""
-    return np.hstack([design.columns[:, : len(BASE)], *(_of_term(design, term) for term in terms)])
+def _prior_sd(drive: DriveChannel, members: Sequence[Member]) -> NDArray[np.float64]:
+    """Prior standard deviations of base and members, shape (k,)."""
+    return np.concatenate([np.full(len(drive.channel.base.names), np.inf), *(member.sd for member in members)])
 
 
-def _of_term(design: Design, term: Term) -> NDArray[np.float64]:
-    return design.signals.compared(term.form.columns(design.signals, term.value))
+def _solved(
+    rows: NDArray[np.float64], sd: NDArray[np.float64], noise: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values and their covariance, from rows of columns with the target last, under priors."""
+    norm = np.linalg.norm(rows[:, :-1], axis=0)
+    norm = np.where(norm > 0.0, norm, 1.0)  # a pulse elsewhere: its prior alone says what it is
+    stacked = np.vstack([rows[:, :-1] / norm, np.diag(noise / sd / norm)])
+    target = np.concatenate([rows[:, -1], np.zeros(len(sd))])
+    u, s, vt = np.linalg.svd(stacked, full_matrices=False)
+    s = np.maximum(s, RANK * s[0])
+    root = (vt.T / s) / norm[:, None]
+    return root @ (u.T @ target), noise**2 * (root @ root.T)
 
 
-def _searched(design: Design, terms: list[Term], rows: NDArray[np.bool_]) -> list[Term]:
-    """Terms with their shapes where they fit best, one after another beside the others."""
-    shaped = [k for k, term in enumerate(terms) if term.form.shape is not None]
-    begun = [term.value for term in terms]
-    force = design.force_n[rows]
-    for _ in range(ROUNDS if len(shaped) > 1 else 1):
-        for k in shaped:
-            others = _columns(design, terms[:k] + terms[k + 1 :])[rows]
-            q, _ = np.linalg.qr(others)
-            rest = force - q @ (q.T @ force)
+def with_method(drive: DriveChannel, settled: Settled, fitted: DriveFit) -> DriveFit:
+    """The same fit with uncertainties that are no smaller than how its values move when stretches are left out, or the band halved.
 
-            def left(log: float, k: int = k, q: NDArray[np.float64] = q, rest: NDArray[np.float64] = rest) -> float:
-                own = _of_term(design, replace(terms[k], value=float(np.exp(log))))[rows]
-                own = own - q @ (q.T @ own)
-                found, *_ = np.linalg.lstsq(own, rest, rcond=None)
-                return float(np.sum((rest - own @ found) ** 2))
-
-            reach = np.log(terms[k].form.reach)
-            middle = np.log(begun[k])
-            best = minimize_scalar(left, bounds=(middle - reach, middle + reach), method="bounded")
-            terms[k] = replace(terms[k], value=float(np.exp(best.x)))
-    return terms
-
-
-def _by_shapes(design: Design, terms: Sequence[Term], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivative of the force by the logarithm of every shape, shape (m, s)."""
-    found = [np.zeros((len(design.force_n), 0))]
-    start = 0
-    for term in terms:
-        own = amplitudes[start : start + len(term.form.amplitudes)]
-        start += len(own)
-        if term.form.shape is not None:
-            up, down = (
-                _of_term(design, replace(term, value=term.value * np.exp(step))) for step in (DIFFERENCE, -DIFFERENCE)
-            )
-            found.append(((up - down) @ own / (2.0 * DIFFERENCE))[:, None])
-    return np.hstack(found)
-
-
-def _covariance(design: Design, columns: NDArray[np.float64], rows: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Covariance by the blocks, none of its variances smaller than the noise alone would have it."""
-    norm = np.maximum(np.linalg.norm(columns[rows], axis=0), 1e-300)
-    _, s, vt = np.linalg.svd(columns[rows] / norm, full_matrices=False)
-    with np.errstate(over="ignore"):  # of a column of zeros nothing is known
-        by_noise = design.noise_n**2 * np.sum((vt.T / np.maximum(s, 1e-12 * s[0])) ** 2, axis=1) / norm**2
-    numbers = np.arange(columns.shape[1])
-    groups = design.groups
-    blocks = [
-        compress(numbers, columns[inside], design.force_n[inside])
-        for inside in (rows & (groups == group) for group in range(int(groups[-1]) + 1))
-        if inside.any()
-    ]
-    by_blocks = jackknife_covariance(blocks, columns.shape[1])
-    wider = np.sqrt(np.maximum(by_noise / np.maximum(np.diag(by_blocks), 1e-300), 1.0))
-    return np.asarray(by_blocks * np.outer(wider, wider))
-
-
-def with_method(fitted: DriveFit, other: DriveFit | None) -> DriveFit:
-    """The same fit with what filters, differences and the choice of the band do to its values in their uncertainty.
-
-    Args:
-        fitted: the model.
-        other: the same model fitted in another band, None where there is none; a value may lie anywhere between the
-            two, and as far on the other side.
+    What no formula says stays the same over a stretch: noise alone would call the values surer than they are. [Efron and Stein,
+    The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq. 1.5]
     """
-    moved, unsure = np.zeros_like(fitted.values), np.zeros_like(fitted.values)
-    if other is not None:
-        unsure = np.diag(other.covariance)
-        moved = other.values - fitted.values
-        shaped = _shaped(fitted)
-        for k, (one, two) in enumerate(zip(shaped, _shaped(other), strict=True), start=len(moved) - len(shaped)):
-            moved[k] = np.log(two.value / one.value)
-    # A value that the other band hardly sees moves by chance there, which is no fault of this one.
-    more = np.maximum(moved**2 - unsure, 0.0) / 3.0 + (METHOD_SHARE * fitted.values) ** 2
-    wider = np.sqrt(1.0 + more / np.maximum(np.diag(fitted.covariance), 1e-300))
+    stretch = np.arange(len(fitted.samples)) * STRETCHES // len(fitted.samples)
+    every = np.array([fit(drive, settled, fitted.members, stretch != k).values for k in range(STRETCHES)])
+    moved = (STRETCHES - 1.0) / STRETCHES * np.sum((every - every.mean(axis=0)) ** 2, axis=0)
+    # Where a stretch alone shows a pulse, leaving it out says nothing.
+    everywhere = np.array([np.any(fitted.samples[stretch != k] != 0.0, axis=0) for k in range(STRETCHES)]).all(axis=0)
+    variance = np.maximum(np.diag(fitted.covariance), 1e-300)
+    wider = np.sqrt(np.where(everywhere, np.maximum(moved / variance, 1.0), 1.0))
+    # A value may lie anywhere between those of the two bands, and as far on the other side.
+    slow = _in_half_the_band(settled, fitted)
+    wider = np.sqrt(
+        wider**2 + np.maximum((slow.values - fitted.values) ** 2 - np.diag(slow.covariance), 0.0) / 3.0 / variance
+    )
     return replace(fitted, covariance=fitted.covariance * np.outer(wider, wider))
 
 
-def _shaped(fitted: DriveFit) -> list[Term]:
-    return [term for term in fitted.terms if term.form.shape is not None]
+def _in_half_the_band(settled: Settled, fitted: DriveFit) -> DriveFit:
+    """The same members fitted to means of neighbouring samples, which have half the band."""
+    even = len(fitted.samples) // 2 * 2
+    rows = np.column_stack([fitted.samples, fitted.drive.channel.residual])[:even]
+    halved = rows.reshape(-1, 2, rows.shape[1]).mean(axis=1)
+    noise = settled.noise.effective / float(np.sqrt(2.0))
+    values, covariance = _solved(halved, _prior_sd(fitted.drive, fitted.members), noise)
+    return replace(fitted, values=values, covariance=covariance)
 
 
-def base_values(fitted: DriveFit) -> dict[str, Value]:
-    """Base parameters by name."""
-    sigma = np.sqrt(np.diag(fitted.covariance))
-    return {name: Value(float(fitted.values[k]), float(sigma[k]), BASE_UNITS[k]) for k, name in enumerate(BASE)}
+STRETCHES = 10
+"""Stretches that are left out in turn."""
+
+RANK = 1e-9
+"""Singular value, relative, below which a direction is not seen at all."""
 
 
-BASE_UNITS = ("kg", "N·s/m")
+def log_possible(fitted: DriveFit) -> float:
+    """Log probability that mass and friction of a fit are not negative: what a prior that knows it makes of its evidence."""
+    return float(sum(log_ndtr(v.value / max(v.uncertainty, 1e-300)) for v in fitted.base.values()))
+
+
+def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[str, Value]:
+    """Base parameters with what other likely hypotheses make of them in their uncertainty.
+
+    Args:
+        drive: what was fitted.
+        settled: the comparison.
+        best: fit of its best hypothesis.
+    """
+    posterior = settled.posterior
+    likely: list[tuple[float, Hypothesis]] = [
+        (posterior.probability_of(h.names.__eq__), h) for h in posterior.hypotheses[:MOST]
+    ]
+    fits = [(p, fit(drive, settled, h.members).base) for p, h in likely if p > LIKELY and h is not settled.best]
+    found = {}
+    for name, value in best.base.items():
+        between = sum(p * (base[name].value - value.value) ** 2 for p, base in fits)
+        sigma = float(np.sqrt(value.uncertainty**2 + between + (METHOD_SHARE * value.value) ** 2))
+        found[name] = Value(value.value, sigma, value.unit)
+    return found
+
+
+MOST = 12
+"""Hypotheses, most probable first, that may count for an uncertainty."""

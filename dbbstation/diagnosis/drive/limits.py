@@ -1,4 +1,4 @@
-"""What a recording cannot show, whatever the model: no acceleration, one speed, no reversal."""
+"""What recordings cannot show, whatever the model: no acceleration, one speed, no reversal."""
 
 from __future__ import annotations
 
@@ -7,21 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.design import BASE
+from dbbstation.diagnosis.drive.channel import MASS, VISCOUS
 from dbbstation.diagnosis.drive.sources.coulomb_friction import COULOMB_SHARE
+from dbbstation.inference.read_off import OUT
 
 if TYPE_CHECKING:
-    from dbbstation.diagnosis.drive.design import Design
-    from dbbstation.diagnosis.drive.fit import DriveFit
+    from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.inference.verdict import Value
 
 ACCELERATES = 5.0
 """Root mean square of the acceleration, over its noise, from which the mass can be told."""
 
-TESTABLE_SIGMA = 5.0
-"""An amplitude of the usual size must stand so far out of its standard deviation for a cause to be testable."""
-
 VAGUE = 0.3
-"""Relative standard uncertainty above which a mass is not known."""
+"""Relative standard uncertainty above which a value is not known."""
 
 
 @dataclass(frozen=True)
@@ -39,42 +37,54 @@ class Limits:
     reverses: bool
 
 
-def limits_of(design: Design) -> Limits:
-    """Look at what the drive did."""
-    signals = design.signals
-    acceleration = design.columns[:, 0]
-    sign = signals.compared(signals.direction)
-    base = design.columns[:, : len(BASE)]
-    beside, *_ = np.linalg.lstsq(base, sign, rcond=None)
-    seen = COULOMB_SHARE * signals.scale.force_n * np.linalg.norm(sign - base @ beside) / design.noise_n
+def limits_of(explained: Explained) -> Limits:
+    """Look at what the drive did.
+
+    Coulomb friction counts as told from viscous friction where it shows beside mass, viscous friction and a delay between
+    the channels: in ramps alone a delay of a sample looks like either.
+    """
+    recordings, bank = explained.drive.recordings, explained.settled.bank
+    acceleration = recordings.motion[:, 0]
+    sign = recordings.compared(lambda s: s.direction)
+    late = recordings.compared(lambda s: np.gradient(s.force_n, 1.0 / s.rate_hz))
+    columns = bank.whitened(np.column_stack([recordings.motion, late, sign]))
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300) * np.linalg.norm(columns[:, -1])
+    beside, *_ = np.linalg.lstsq(columns[:, :-1], columns[:, -1], rcond=None)
+    rest = float(np.linalg.norm(columns[:, -1] - columns[:, :-1] @ beside))
+    seen = COULOMB_SHARE * recordings.scale.force_n * rest / explained.settled.noise.innovation
+    noise = float(np.sqrt(np.mean([one.acceleration_noise_m_s2**2 for one in recordings.signals])))
     return Limits(
-        accelerates=float(np.sqrt(np.mean(acceleration**2))) > ACCELERATES * signals.acceleration_noise_m_s2,
-        several_speeds=bool(seen >= TESTABLE_SIGMA),
-        reverses=bool(len(signals.reversals)),
+        accelerates=float(np.sqrt(np.mean(acceleration**2))) > ACCELERATES * noise,
+        several_speeds=bool(seen >= OUT),
+        reverses=recordings.scale.reverses,
     )
 
 
-def mass_is_known(limits: Limits, fitted: DriveFit) -> bool:
-    """Whether the recording tells the mass."""
-    if not limits.accelerates:
-        return False
-    return bool(np.sqrt(fitted.covariance[0, 0]) < VAGUE * fitted.values[0])
+def mass_is_known(limits: Limits, mass: Value | None) -> bool:
+    """Whether the recordings tell the mass."""
+    return mass is not None and limits.accelerates and mass.uncertainty < VAGUE * mass.value
 
 
-def told(limits: Limits, design: Design, before: DriveFit, after: DriveFit) -> tuple[str, ...]:
+def told(limits: Limits, explained: Explained, known: dict[str, bool]) -> tuple[str, ...]:
     """Sentences for people: what cannot be told, what can be said still, and what to record."""
-    sentences = []
-    if not mass_is_known(limits, after):
+    sentences = list(explained.dropped.values())
+    if not known[MASS] and MASS not in explained.dropped:
         sentences.append(
             "The mass cannot be told: the drive hardly accelerates here, or the force does not answer to it. Record "
             "starts, stops and reversals."
         )
     if not limits.several_speeds:
-        speed = float(np.median(np.abs(design.columns[:, 1])))
-        force, sigma = before.values[1] * speed, np.sqrt(before.covariance[1, 1]) * speed
+        before = explained.before
+        speed = float(np.median(np.abs(explained.drive.recordings.motion[:, 1])))
+        force = before.base[VISCOUS]
         sentences.append(
             "Viscous and Coulomb friction cannot be told apart at one speed. What is known is their sum at "
-            f"{1e3 * speed:.4g} mm/s, {force:.4g} ± {sigma:.2g} N. Record at several speeds."
+            f"{1e3 * speed:.4g} mm/s, {force.value * speed:.4g} ± {force.uncertainty * speed:.2g} N. Record at several speeds."
+        )
+    elif not known[VISCOUS] and VISCOUS not in explained.dropped:
+        sentences.append(
+            "The viscous friction cannot be told well here: what friction does at these speeds has several explanations, or it is "
+            "small. Record at more speeds, and faster ones."
         )
     if not limits.reverses:
         sentences.append(

@@ -11,7 +11,8 @@ from dbbstation.diagnosis.drive.findings import DriveLocation
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.drive.design import Design
+    from dbbstation.diagnosis.drive.recordings import Recordings
+    from dbbstation.inference.coloured import Coloured
 
 MOST_LOCATIONS = 12
 COUNTS_SIGMA = 4.0
@@ -24,30 +25,28 @@ SLOW = 0.1
 """Share of the greatest speed below which a stretch lies at a reversal or stop."""
 
 
-def locate(design: Design, residual_n: NDArray[np.float64]) -> tuple[DriveLocation, ...]:
+def locate(recordings: Recordings, residual_n: NDArray[np.float64], noise: Coloured) -> tuple[DriveLocation, ...]:
     """Stretches in which a residual, shape (m,) [N], stands out of the noise, largest share first."""
-    signals = design.signals
-    at = signals.kept
     smooth = np.convolve(residual_n, np.full(SMOOTHED, 1.0 / SMOOTHED), mode="same")
-    together = min(design.noise.correlation_samples, float(SMOOTHED))
-    threshold = COUNTS_SIGMA * design.noise.sigma * np.sqrt(together / SMOOTHED)
-    total = float(smooth @ smooth)
+    together = min(noise.correlation_samples, float(SMOOTHED))
+    threshold = COUNTS_SIGMA * noise.sigma * np.sqrt(together / SMOOTHED)
+    total = max(float(smooth @ smooth), 1e-300)
     found: list[DriveLocation] = []
-    for rows in _stretches(np.abs(smooth) > threshold, signals.direction[at]):
-        slowest = float(np.abs(signals.speed_m_s[at[rows[0]] : at[rows[-1]] + 1]).min())
-        found.append(
-            DriveLocation(
-                t_s=(float(signals.t_s[at[rows[0]]]), float(signals.t_s[at[rows[-1]]])),
-                position_mm=(
-                    1e3 * float(signals.position_m[at[rows[0]]]),
-                    1e3 * float(signals.position_m[at[rows[-1]]]),
-                ),
-                direction=int(signals.direction[at[rows[0]]]),
-                at_reversal=slowest < SLOW * signals.scale.speed_m_s,
-                share=float(smooth[rows] @ smooth[rows]) / total,
-                peak_n=float(smooth[rows][np.argmax(np.abs(smooth[rows]))]),
+    for signals, block in zip(recordings.signals, recordings.blocks, strict=True):
+        own, at = smooth[block], signals.kept
+        standing = SLOW * float(np.abs(signals.speed_m_s[at]).max())
+        for rows in _stretches(np.abs(own) > threshold, signals.direction[at]):
+            first, last = int(at[rows[0]]), int(at[rows[-1]])
+            found.append(
+                DriveLocation(
+                    t_s=(float(signals.t_s[first]), float(signals.t_s[last])),
+                    position_mm=(1e3 * float(signals.position_m[first]), 1e3 * float(signals.position_m[last])),
+                    direction=int(signals.direction[first]),
+                    at_reversal=float(np.abs(signals.speed_m_s[first : last + 1]).min()) < standing,
+                    share=float(own[rows] @ own[rows]) / total,
+                    peak_n=float(own[rows][np.argmax(np.abs(own[rows]))]),
+                )
             )
-        )
     found.sort(key=lambda location: -location.share)
     return tuple(found[:MOST_LOCATIONS])
 

@@ -50,25 +50,14 @@ small by the square of this, a thousandth."""
 MOVING_SHARE = 0.005
 """Speed, of the greatest, below which the drive counts as standing: friction has no known value there."""
 
+REACH = 2
+"""Samples of the comparison beside a standstill that are left out: the main lobe of the filters."""
+
+SLOW_HZ = 5.0
+"""Band that strokes of a second need, for friction if not for the mass: slow recordings get up to it."""
+
 FEWEST = 60
 """Samples in the band that an identification needs."""
-
-
-@dataclass(frozen=True, eq=False)
-class Scale:
-    """Sizes that make amplitudes comparable.
-
-    Attributes:
-        force_n: root mean square of the force [N].
-        speed_m_s: greatest speed [m/s].
-        travel_m: between the ends of the travel [m].
-        duration_s: of the recording [s].
-    """
-
-    force_n: float
-    speed_m_s: float
-    travel_m: float
-    duration_s: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +98,8 @@ class Signals:
 
     @cached_property
     def direction(self) -> NDArray[np.float64]:
-        """Sign of the speed, shape (n,)."""
-        return np.sign(self.speed_m_s)
+        """Sign of the speed, shape (n,); zero where the drive stands: what ringing filters make of rest has no direction."""
+        return np.where(np.abs(self.speed_m_s) > self.standing_m_s, np.sign(self.speed_m_s), 0.0)
 
     @cached_property
     def reversals(self) -> NDArray[np.int64]:
@@ -127,13 +116,6 @@ class Signals:
             return np.full(len(self.t_s), np.inf)
         travel = np.abs(self.position_m - self.position_m[self.reversals[np.maximum(last, 0)]])
         return np.where(last >= 0, travel, np.inf)
-
-    @cached_property
-    def scale(self) -> Scale:
-        """Sizes of this recording."""
-        force = float(np.sqrt(np.mean(self.compared(self.force_n) ** 2)))
-        speed = float(np.abs(self.speed_m_s[self.kept]).max())
-        return Scale(force, speed, float(np.ptp(self.position_m)), float(self.t_s[-1] - self.t_s[0]))
 
     @property
     def standing_m_s(self) -> float:
@@ -154,8 +136,6 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     """
     even = evenly_sampled(recording)
     notes = list(even.notes)
-    stuck, told = stuck_samples(even.force_n, even.t_s, recording.name)
-    notes += told
     rate, position = even.rate_hz, 1e-3 * even.position_mm
     if not np.ptp(position) > 0.0:
         raise CalibrationError(
@@ -182,8 +162,10 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     # A standing drive spoils samples as far as the filter of the comparison reaches, a stuck force, whose error knows no
     # bounds, as far as it rings.
     standing = np.abs(speed) <= MOVING_SHARE * np.abs(speed).max()
+    stuck, told = stuck_samples(even.force_n, even.t_s, ~standing, recording.name)
+    notes += [*told, *_rests(standing, even.force_n, rate, step)]
     standing[1:] |= speed[1:] * speed[:-1] < 0.0  # a quick reversal passes through standstill between two samples
-    usable = ~(_widened(standing, step) | _widened(stuck, edge))
+    usable = ~(_widened(standing, REACH * step) | _widened(stuck, edge))
     kept = np.arange(edge, len(position) - edge, step)
     kept = kept[usable[kept]]
     if len(kept) < FEWEST:
@@ -205,6 +187,25 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
         kept=kept,
         notes=tuple(notes),
     )
+
+
+def _rests(standing: NDArray[np.bool_], force_n: NDArray[np.float64], rate_hz: float, step: int) -> list[str]:
+    """One sentence where the drive rests for longer than the filters reach."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(np.int64)))
+    long = [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a > RESTS * step]
+    if not long:
+        return []
+    seconds = sum(rows.stop - rows.start for rows in long) / rate_hz
+    force = float(np.mean(np.concatenate([force_n[rows] for rows in long])))
+    text = (
+        f"the drive rests in {len(long)} stretches, {seconds:.3g} s in all, with a mean force of {force:.3g} N; friction holds "
+        "whatever it can there, so that models of motion are compared on the rest of the recording"
+    )
+    return [text]
+
+
+RESTS = 10
+"""Samples of the comparison from which on a standstill is a rest and no reversal."""
 
 
 def derivatives(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -251,7 +252,9 @@ def _chosen_cutoff(position_m: NDArray[np.float64], rate_hz: float, floor: float
     )
     noise = _acceleration_noise(floor, tried)
     good = np.flatnonzero(noise <= NOISE_SHARE**2 * np.maximum(signal - noise, 0.0))
-    if len(good):
-        return float(tried[good[-1]])
-    seconds = len(position_m) / rate_hz
-    return float(min(widest, max(200.0 / (PER_CUTOFF * seconds), 5.0)))
+    moving = np.abs(np.gradient(position_m))
+    seconds = np.count_nonzero(moving > MOVING_SHARE * moving.max()) / rate_hz
+    needed = (2.0 * FEWEST / PER_CUTOFF + 2.0 * EDGE_PERIODS) / max(seconds, 1.0 / rate_hz)
+    chosen = float(tried[good[-1]]) if len(good) else min(widest, max(needed, SLOW_HZ))
+    # A slow recording would leave too few samples in a band that its differences follow to a hundredth.
+    return float(min(max(chosen, min(needed, SLOW_HZ)), rate_hz / (2.5 * POSITION_BAND)))

@@ -22,9 +22,17 @@ MOST_STUCK = 0.3
 
 
 def stuck_samples(
-    force_n: NDArray[np.float64], t_s: NDArray[np.float64], name: str
+    force_n: NDArray[np.float64], t_s: NDArray[np.float64], moving: NDArray[np.bool_], name: str
 ) -> tuple[NDArray[np.bool_], list[str]]:
     """Samples in which the force channel did not follow, shape (n,), and sentences about them.
+
+    A force that stays the same while the drive rests is no fault of the channel: the motor may be off.
+
+    Args:
+        force_n: shape (n,) [N].
+        t_s: shape (n,) [s].
+        moving: samples in which the drive moves, shape (n,).
+        name: of the recording, for messages.
 
     Raises:
         CalibrationError: the force does not change at all, or is stuck for most of the recording.
@@ -38,9 +46,11 @@ def stuck_samples(
     changes = np.flatnonzero(np.diff(force_n) != 0.0) + 1
     starts, stops = np.r_[0, changes], np.r_[changes, len(force_n)]
     lengths, values = stops - starts, force_n[starts]
+    passed = np.concatenate([[0], np.cumsum(moving)])
+    while_moving = passed[stops] - passed[starts] > MOVES * lengths
     extreme = (values == force_n.max()) | (values == force_n.min())
-    saturated = extreme & (lengths >= TOGETHER)
-    dead = (lengths >= DEAD_SHARE * len(force_n)) & ~saturated
+    saturated = extreme & (lengths >= TOGETHER) & while_moving
+    dead = (lengths >= DEAD_SHARE * len(force_n)) & ~saturated & while_moving
     notes = []
     for rows, what in ((saturated, "saturated: it stands at its extreme"), (dead, "dead: it does not change")):
         for at in np.flatnonzero(rows)[:_MOST_NOTES]:
@@ -49,13 +59,17 @@ def stuck_samples(
         if np.count_nonzero(rows) > _MOST_NOTES:
             notes.append(f"and {np.count_nonzero(rows) - _MOST_NOTES} more such stretches")
     stuck = np.repeat(saturated | dead, lengths)
-    if stuck.mean() > MOST_STUCK:
+    share = float(np.mean(stuck[moving])) if moving.any() else 0.0
+    if share > MOST_STUCK:
         raise CalibrationError(
-            f"the force channel is stuck in {100 * stuck.mean():.0f} % of the samples",
+            f"the force channel is stuck in {100 * share:.0f} % of the samples in which the drive moves",
             where=name,
             remedy="check the range and the wire of the channel, then record again; " + notes[0],
         )
     return stuck, notes
 
+
+MOVES = 0.5
+"""Share of a row of equal samples in which the drive must move for the row to be a fault of the channel."""
 
 _MOST_NOTES = 3

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.judge import SIGNIFICANT
+from dbbstation.inference.left_over import SIGNIFICANT
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,24 +19,23 @@ if TYPE_CHECKING:
         Number,
         Step,
     )
-    from dbbstation.diagnosis.findings import Value
+    from dbbstation.inference.verdict import Value
 
 
 def drive_summary(diagnosis: DriveDiagnosis) -> dict[str, Any]:
     """Everything a diagnosis of a drive says."""
-    design, rest = diagnosis.design, diagnosis.rest
-    signals = design.signals
-    named = [f for f in diagnosis.findings if f.name in diagnosis.chosen]
-    variable = next((design.sources[f.name].varies_with for f in named), rest.variable or "")
+    recordings, rest = diagnosis.recordings, diagnosis.rest
+    noise, sources = diagnosis.explained.settled.noise, diagnosis.explained.drive.sources
+    variable = sources[diagnosis.chosen[0]].varies_with if diagnosis.chosen else rest.variable or ""
     return {
         "mismatch": diagnosis.mismatch,
         "probability": diagnosis.probability,
-        "noise_n": design.noise.sigma,
-        "noise_correlation_samples": design.noise.correlation_samples,
+        "noise_n": noise.sigma,
+        "noise_correlation_samples": noise.correlation_samples,
         "misfit_rms_n": diagnosis.misfit_rms_n,
         "residual_rms_n": {
-            "before": float(np.sqrt(np.mean((design.force_n - diagnosis.base_n) ** 2))),
-            "after": float(np.sqrt(np.mean((design.force_n - diagnosis.model_n) ** 2))),
+            "before": float(np.sqrt(np.mean((diagnosis.force_n - diagnosis.base_n) ** 2))),
+            "after": float(np.sqrt(np.mean((diagnosis.force_n - diagnosis.model_n) ** 2))),
         },
         "held_back": {
             "t_s": list(diagnosis.held_back_s),
@@ -57,7 +56,7 @@ def drive_summary(diagnosis: DriveDiagnosis) -> dict[str, Any]:
                 "unit": before.value.unit,
             }
             for name, before in diagnosis.before.items()
-            if diagnosis.chosen and before.identifiable
+            if diagnosis.chosen and before.identifiable and diagnosis.after[name].identifiable
         ],
         "friction": {side: _values(values) for side, values in diagnosis.friction.items()},
         "locations": [_location(location, variable) for location in diagnosis.locations],
@@ -68,21 +67,39 @@ def drive_summary(diagnosis: DriveDiagnosis) -> dict[str, Any]:
             "significant": rest.probability < SIGNIFICANT,
             "variable": rest.variable,
             "text": rest.text,
+            "effects": [
+                {
+                    "text": effect.text,
+                    "variable": effect.variable,
+                    "probability": effect.probability,
+                    "rms_n": effect.rms_n,
+                    "from": effect.low,
+                    "to": effect.high,
+                    "unit": effect.unit,
+                }
+                for effect in rest.effects
+            ],
             "locations": [_location(location, rest.variable or "") for location in diagnosis.rest_locations],
         },
         "cannot_tell": list(diagnosis.cannot_tell),
         "signals": {
-            "samples": len(signals.t_s),
-            "samples_compared": len(signals.kept),
-            "rate_hz": signals.rate_hz,
-            "cutoff_hz": signals.cutoff_hz,
-            "t_s": [float(signals.t_s[0]), float(signals.t_s[-1])],
-            "reversals": len(signals.reversals),
-            "greatest_speed_mm_s": 1e3 * signals.scale.speed_m_s,
-            "force_rms_n": signals.scale.force_n,
+            "recordings": len(recordings.signals),
+            "samples": sum(len(one.t_s) for one in recordings.signals),
+            "samples_compared": len(recordings.force_n),
+            "rate_hz": recordings.signals[0].rate_hz,
+            "cutoff_hz": recordings.scale.cutoff_hz,
+            "shortest_wave_mm": _finite(diagnosis.explained.drive.shortest_wave_mm),
+            "t_s": [float(recordings.signals[0].t_s[0]), float(recordings.signals[-1].t_s[-1])],
+            "reversals": sum(len(one.reversals) for one in recordings.signals),
+            "greatest_speed_mm_s": 1e3 * recordings.scale.speed_m_s,
+            "force_rms_n": recordings.scale.force_n,
         },
-        "notes": list(signals.notes),
+        "notes": recordings.notes,
     }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _number(number: Number) -> dict[str, Any]:
@@ -96,7 +113,9 @@ def _number(number: Number) -> dict[str, Any]:
 
 
 def _values(values: Mapping[str, Value]) -> dict[str, Any]:
-    return {name: {"value": v.value, "uncertainty": v.uncertainty, "unit": v.unit} for name, v in values.items()}
+    return {
+        name: {"value": v.value, "uncertainty": _finite(v.uncertainty), "unit": v.unit} for name, v in values.items()
+    }
 
 
 def _step(step: Step) -> dict[str, Any]:
@@ -136,7 +155,16 @@ def _source(finding: DriveFinding) -> dict[str, Any]:
         "concealed": finding.concealed,
         "signature_rms_n": finding.whole_n,
         "unconcealed_rms_n": finding.rest_n,
+        "probability": finding.probability,
         "gain": finding.gain,
         "parameters": _values(finding.parameters),
+        "parts": [
+            {
+                "label": part.label,
+                "t_s": None if part.t_s is None else list(part.t_s),
+                "parameters": _values(part.parameters),
+            }
+            for part in finding.parts
+        ],
         "text": finding.text,
     }

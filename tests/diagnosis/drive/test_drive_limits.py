@@ -27,7 +27,7 @@ def good():
 
 def answered(t, position, force, cutoff_hz=None):
     recording = DriveRecording("simulated", t, position, force)
-    return drive_summary(identify(recording, list(known_drive_sources().values()), cutoff_hz))
+    return drive_summary(identify([recording], list(known_drive_sources().values()), cutoff_hz))
 
 
 def verdicts(summary):
@@ -94,7 +94,7 @@ def test_saturated_samples_are_left_out_and_told():
 
 def test_a_force_with_the_wrong_sign_is_refused():
     t, position, force = good()
-    with pytest.raises(CalibrationError, match=r"wrong sign: mass_kg comes out at -80.* turn the sign"):
+    with pytest.raises(CalibrationError, match=r"wrong sign: it acts against the motion.* turn the sign"):
         answered(t, position, -force)
 
 

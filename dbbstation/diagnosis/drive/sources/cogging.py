@@ -6,24 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.signals import Signals
-
-PERIODS_IN_TRAVEL = 3.0
-"""Longest period that is looked for, as a share of the travel: what repeats less often is no wave."""
-
-STEP = 0.25
-"""Of the waves that are looked for, in periods over the travel."""
-
-MOST_WAVES = 4000
-STRONGEST = 3
-"""Waves that are kept as forms."""
-
-_AT_ONCE = 200
 
 
 class Cogging(DriveSource):
@@ -31,6 +19,7 @@ class Cogging(DriveSource):
 
     name = "cogging"
     varies_with = "position wave"
+    form_uncertainty = 0.05  # magnets and slots differ from pole to pole
     texts = Texts(
         what="The motor's torque ripples with the angle (magnets, commutation), or the screw does once per turn or per "
         "ball that passes.",
@@ -44,38 +33,21 @@ class Cogging(DriveSource):
         "magnet motor drives, IEEE Trans. Ind. Electron. 43 (1996) 309",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:
-        """Cosine and sine at the periods that the residual follows best."""
-        size = 0.1 * signals.scale.force_n
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
+        """Cosine and sine at each of the periods that a first look found; a drive may have several."""
+        size = 0.1 * scale.force_n
         cosine = Parameter("cosine_n", "N", size, "amplitude of the cosine, position zero is where it is greatest")
         sine = Parameter("sine_n", "N", size, "amplitude of the sine")
-        travel = signals.scale.travel_m
-        period = Parameter("period_mm", "mm", 1e3 * travel / 10.0, "travel of one wave")
-        return tuple(
-            Form((cosine, sine), _columns, period, 1e3 / wave, 1.0 + STEP / (wave * travel))
-            for wave in _strongest(signals, residual_n)
-        )
+        found = []
+        for wave in scale.waves_per_m:
+            period = Parameter("period_mm", "mm", 1e3 / wave, "travel of one wave")
+            # A wave that is off by a quarter over the travel fits no more; three points hold the best one between them.
+            grid = tuple(1e3 / (wave + step / scale.travel_m) for step in (0.15, 0.0, -0.15))
+            label = f"{1e3 / wave:.3g} mm"
+            found.append(Form((cosine, sine), _columns, (period,), (grid,), label, scale.waves_tried))
+        return tuple(found)
 
 
-def _columns(signals: Signals, period_mm: float) -> NDArray[np.float64]:
-    angle = 2.0 * np.pi * 1e3 * signals.position_m / period_mm
+def _columns(signals: Signals, period_mm: tuple[float, ...]) -> NDArray[np.float64]:
+    angle = 2.0 * np.pi * 1e3 * signals.position_m / period_mm[0]
     return np.column_stack([np.cos(angle), np.sin(angle)])
-
-
-def _strongest(signals: Signals, residual_n: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Waves that a residual follows best [1/m]; shorter ones than half the filter's reach at full speed are unseen."""
-    travel, position = signals.scale.travel_m, signals.position_m[signals.kept]
-    speed = float(np.median(np.abs(signals.speed_m_s[signals.kept])))
-    highest = 0.5 * signals.cutoff_hz / speed * travel
-    periods = np.arange(PERIODS_IN_TRAVEL, highest, STEP)[:MOST_WAVES]
-    if len(periods) < _AT_ONCE // 50:
-        return np.zeros(0)
-    waves = periods / travel
-    power = np.concatenate(
-        [
-            np.abs(np.exp(2j * np.pi * np.outer(waves[k : k + _AT_ONCE], position)) @ residual_n)
-            for k in range(0, len(waves), _AT_ONCE)
-        ]
-    )
-    peaks = np.flatnonzero((power >= np.roll(power, 1)) & (power >= np.roll(power, -1)))
-    return waves[peaks[np.argsort(-power[peaks])][:STRONGEST]]

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.diagnosis.drive.signals import Signals
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 
 class ConstantLoad(DriveSource):
@@ -19,6 +12,7 @@ class ConstantLoad(DriveSource):
 
     name = "constant-load"
     varies_with = "speed"
+    form_uncertainty = 0.0  # a constant is exact
     texts = Texts(
         what="A constant force adds to the drive's: the share of the platform's weight along a strut, a spring that is "
         "long against the travel, or a wrong zero of the force or current channel.",
@@ -30,7 +24,7 @@ class ConstantLoad(DriveSource):
         origin="statics; offset of the drive in Janot, Vandanjon and Gautier, IEEE TCST 22 (2014)",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
         """One amplitude."""
-        size = Parameter("load_n", "N", 0.3 * signals.scale.force_n, "force that the drive must add at every position")
+        size = Parameter("load_n", "N", 0.3 * scale.force_n, "force that the drive must add at every position")
         return (Form((size,), lambda s, _: np.ones((len(s.t_s), 1))),)

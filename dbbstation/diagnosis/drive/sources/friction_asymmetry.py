@@ -6,14 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from dbbstation.diagnosis.drive.signals import Signals
 
 
 class FrictionAsymmetry(DriveSource):
@@ -25,6 +21,7 @@ class FrictionAsymmetry(DriveSource):
 
     name = "friction-asymmetry"
     varies_with = "speed"
+    form_uncertainty = 0.05  # as Coulomb friction
     texts = Texts(
         what="Friction is greater in one direction of travel than in the other, in its Coulomb part, its viscous part "
         "or both.",
@@ -39,11 +36,10 @@ class FrictionAsymmetry(DriveSource):
         "friction in Janot, Gautier and Brunot, EMPS benchmark (2019)",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
-        """Coulomb part, viscous part, both."""
-        if not len(signals.reversals):
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
+        """Coulomb part and viscous part; a drive may have both."""
+        if not scale.reverses:
             return ()
-        scale = signals.scale
         dry = Parameter("coulomb_asymmetry_n", "N", 0.2 * scale.force_n, "half of forwards minus backwards")
         wet = Parameter(
             "viscous_asymmetry_n_s_m",
@@ -52,11 +48,10 @@ class FrictionAsymmetry(DriveSource):
             "half of forwards minus backwards",
         )
         return (
-            Form((dry,), lambda s, _: np.abs(s.direction)[:, None]),
-            Form((wet,), lambda s, _: np.abs(s.speed_m_s)[:, None]),
-            Form((dry, wet), lambda s, _: np.column_stack([np.abs(s.direction), np.abs(s.speed_m_s)])),
+            Form((dry,), lambda s, _: np.abs(s.direction)[:, None], label="Coulomb"),
+            Form((wet,), lambda s, _: np.abs(s.speed_m_s)[:, None], label="viscous"),
         )
 
-    def possible(self, values: Mapping[str, float]) -> bool:
+    def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
         """Friction takes energy out in both directions: beyond Coulomb friction it would be a load."""
         return abs(values.get("coulomb_asymmetry_n", 0.0)) <= max(values.get("coulomb_n", 0.0), 0.0)

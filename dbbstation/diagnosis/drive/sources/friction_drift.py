@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.signals import Signals
 
-SHARES = (0.1, 0.3, 1.0, 10.0)
+SHARES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 5.0)
 """Time constants that are tried, of the recording's length; the last is as good as a straight line."""
 
 
@@ -22,6 +22,7 @@ class FrictionDrift(DriveSource):
 
     name = "friction-drift"
     varies_with = "time by direction"
+    form_uncertainty = 0.2  # one time constant stands for oil, seals and screw, which warm each in its own time
     texts = Texts(
         what="Friction changes during the recording: lubricant warms and thins, seals and bearings run in.",
         shows="The force at the same place, speed and direction is not the same later on; forwards and backwards it "
@@ -34,20 +35,18 @@ class FrictionDrift(DriveSource):
         "051013: Coulomb and viscous friction over temperature",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
         """Coulomb or viscous part at several time constants."""
-        scale = signals.scale
         dry = Parameter("coulomb_change_n", "N", 0.2 * scale.force_n, "change of Coulomb friction in the end")
         wet = Parameter(
             "viscous_change_n_s_m", "N·s/m", 0.2 * scale.force_n / scale.speed_m_s, "change of viscous friction"
         )
         tau = Parameter("time_constant_s", "s", 0.3 * scale.duration_s, "after which 63 % of the change are done")
-        forms = []
-        for share in SHARES:
-            value, reach = share * scale.duration_s, 1.8
-            forms.append(Form((dry,), lambda s, t: (s.direction * _growth(s, t))[:, None], tau, value, reach))
-            forms.append(Form((wet,), lambda s, t: (s.speed_m_s * _growth(s, t))[:, None], tau, value, reach))
-        return tuple(forms)
+        grid = (tuple(share * scale.duration_s for share in SHARES),)
+        return (
+            Form((dry,), lambda s, t: (s.direction * _growth(s, t[0]))[:, None], (tau,), grid, "Coulomb"),
+            Form((wet,), lambda s, t: (s.speed_m_s * _growth(s, t[0]))[:, None], (tau,), grid, "viscous"),
+        )
 
 
 def _growth(signals: Signals, time_constant_s: float) -> NDArray[np.float64]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.signals import Signals
@@ -19,6 +18,7 @@ class PositionFriction(DriveSource):
 
     name = "position-friction"
     varies_with = "position by direction"
+    form_uncertainty = 0.2  # a screw is worn and a guide bent by no parabola
     texts = Texts(
         what="Friction changes along the travel: the screw's pitch diameter, the alignment of the guide or the "
         "tension of a cover is not the same everywhere.",
@@ -30,19 +30,17 @@ class PositionFriction(DriveSource):
         origin="Armstrong-Hélouvry, Control of Machines with Friction (1991), ch. 4: position-dependent friction",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
-        """Linear, and linear with square."""
-        size = 0.2 * signals.scale.force_n
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
+        """Slope and bow."""
+        size = 0.2 * scale.force_n
         slope = Parameter("slope_n", "N", size, "friction at the upper end of the travel less that in the middle")
         bow = Parameter("bow_n", "N", size, "friction at both ends of the travel less that in the middle")
+        middle, half = 0.5 * (scale.low_m + scale.high_m), 0.5 * scale.travel_m
+
+        def place(signals: Signals) -> NDArray[np.float64]:
+            return (signals.position_m - middle) / half
+
         return (
-            Form((slope,), lambda s, _: _columns(s)[:, :1]),
-            Form((bow,), lambda s, _: _columns(s)[:, 1:]),
-            Form((slope, bow), lambda s, _: _columns(s)),
+            Form((slope,), lambda s, _: (s.direction * place(s))[:, None], label="slope"),
+            Form((bow,), lambda s, _: (s.direction * place(s) ** 2)[:, None], label="bow"),
         )
-
-
-def _columns(signals: Signals) -> NDArray[np.float64]:
-    low, high = signals.position_m.min(), signals.position_m.max()
-    place = (2.0 * signals.position_m - low - high) / (high - low)
-    return signals.direction[:, None] * np.column_stack([place, place**2])

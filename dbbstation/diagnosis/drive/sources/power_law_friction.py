@@ -6,20 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.signals import Signals
 
-POWERS = (1.5, 2.0, 3.0)
+POWERS = (1.5, 2.0, 2.5, 3.0)
 """Powers that are tried. Below 1, a few speeds cannot tell a power from Coulomb with viscous friction: that is left to
 unnamed shapes."""
-
-REACH = 1.2
 
 
 class PowerLawFriction(DriveSource):
@@ -27,6 +23,7 @@ class PowerLawFriction(DriveSource):
 
     name = "power-law-friction"
     varies_with = "speed"
+    form_uncertainty = 0.1  # churning and windage follow powers roughly
     texts = Texts(
         what="Friction grows faster than the speed: oil is churned, air or coolant is displaced, a cover flutters.",
         shows="Force against constant speed bends away from the axis of speed, for both directions alike.",
@@ -37,18 +34,15 @@ class PowerLawFriction(DriveSource):
         "European Journal of Control 4 (1998) 176, sec. 2",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
         """One amplitude at several powers."""
-        scale = signals.scale
-        size = Parameter("at_greatest_speed_n", "N", 0.2 * scale.force_n, "friction at the greatest speed")
+        size = Parameter(
+            "at_greatest_speed_n", "N", 0.2 * scale.force_n, "friction at the greatest speed", positive=True
+        )
         power = Parameter("power", "1", 1.0, "exponent of the speed")
         top = scale.speed_m_s
 
-        def columns(one: Signals, exponent: float) -> NDArray[np.float64]:
-            return (one.direction * (np.abs(one.speed_m_s) / top) ** exponent)[:, None]
+        def columns(one: Signals, exponent: tuple[float, ...]) -> NDArray[np.float64]:
+            return (one.direction * (np.abs(one.speed_m_s) / top) ** exponent[0])[:, None]
 
-        return tuple(Form((size,), columns, power, value, REACH) for value in POWERS)
-
-    def possible(self, values: Mapping[str, float]) -> bool:
-        """Friction takes energy out, and grows."""
-        return values["at_greatest_speed_n"] > 0.0
+        return (Form((size,), columns, (power,), (POWERS,)),)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.drive.signals import Signals
 
-SHARES = (0.0005, 0.002, 0.008, 0.03)
+SHARES = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016, 0.03, 0.06)
 """Lengths of the build-up that are tried, of the travel."""
+
+MOST_OF_COULOMB = 1.5
+"""Times the Coulomb friction up to which it can be: 2.5 standard deviations of what its formula is off by."""
 
 
 class Presliding(DriveSource):
@@ -28,6 +31,7 @@ class Presliding(DriveSource):
 
     name = "presliding"
     varies_with = "travel since reversal"
+    form_uncertainty = 0.2  # contacts build up their friction by no exact exponential
     texts = Texts(
         what="Contacts, balls and seals yield elastically before they slide: after a reversal friction turns round "
         "over a short travel, not at once.",
@@ -41,19 +45,20 @@ class Presliding(DriveSource):
         "Canudas de Wit, Automatica 30 (1994) 1083",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
         """One amplitude at several lengths."""
-        if not len(signals.reversals):
+        if not scale.reverses:
             return ()
-        scale = signals.scale
-        size = Parameter("presliding_n", "N", 0.2 * scale.force_n, "friction still to turn round at reversal")
+        size = Parameter(
+            "presliding_n", "N", 0.2 * scale.force_n, "friction still to turn round at reversal", positive=True
+        )
         length = Parameter("length_mm", "mm", 1e3 * 0.01 * scale.travel_m, "travel after which 37 % are left of it")
-        return tuple(Form((size,), _columns, length, 1e3 * share * scale.travel_m, 2.0) for share in SHARES)
+        return (Form((size,), _columns, (length,), (tuple(1e3 * share * scale.travel_m for share in SHARES),)),)
 
-    def possible(self, values: Mapping[str, float]) -> bool:
-        """Friction follows the reversal late, not early."""
-        return values["presliding_n"] > 0.0
+    def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
+        """What turns round after a reversal is the Coulomb friction, as closely as either is known."""
+        return values["presliding_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
 
 
-def _columns(signals: Signals, length_mm: float) -> NDArray[np.float64]:
-    return (-2.0 * signals.direction * np.exp(-1e3 * signals.since_reversal_m / length_mm))[:, None]
+def _columns(signals: Signals, length_mm: tuple[float, ...]) -> NDArray[np.float64]:
+    return (-2.0 * signals.direction * np.exp(-1e3 * signals.since_reversal_m / length_mm[0]))[:, None]

@@ -2,16 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from dbbstation.diagnosis.drive.signals import Signals
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 
 class Stiffness(DriveSource):
@@ -19,6 +10,7 @@ class Stiffness(DriveSource):
 
     name = "stiffness"
     varies_with = "position"
+    form_uncertainty = 0.05  # springs, hoses and cable chains are straight to some 5 %
     texts = Texts(
         what="A spring acts along the drive: a bellows, a cable chain, a hose, a weight balance, or a weight whose "
         "share along the strut changes with its length.",
@@ -29,14 +21,13 @@ class Stiffness(DriveSource):
         origin="Hooke; stiffness of inverse dynamic models in Gautier and Khalil, IEEE TRA 6 (1990) 368",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
         """One amplitude."""
-        scale = signals.scale
         size = Parameter(
             "stiffness_n_mm",
             "N/mm",
             1e-3 * 0.6 * scale.force_n / scale.travel_m,
             "force per travel, positive: a spring",
         )
-        middle = float(np.mean(signals.position_m[signals.kept]))
+        middle = scale.mean_m
         return (Form((size,), lambda s, _: 1e3 * (s.position_m - middle)[:, None]),)

@@ -6,16 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.signals import Signals
 
-SHARES = (0.02, 0.05, 0.1, 0.2)
+SHARES = (0.02, 0.04, 0.07, 0.1, 0.14, 0.2, 0.28)
 """Stribeck speeds that are tried, of the greatest speed: above a fifth the curve is no longer one of low speed."""
 
 
@@ -24,6 +22,7 @@ class StribeckFriction(DriveSource):
 
     name = "stribeck-friction"
     varies_with = "speed"
+    form_uncertainty = 0.1  # exponentials, Gaussians and rational functions of the speed are all in use for it
     texts = Texts(
         what="Near standstill friction is greater than at speed, because no film of lubricant carries yet.",
         shows="Force peaks where the drive starts and reverses; at very low speed the drive stutters.",
@@ -35,17 +34,12 @@ class StribeckFriction(DriveSource):
         "Wit, Automatica 30 (1994) 1083, sec. 2",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
         """One amplitude at several Stribeck speeds."""
-        scale = signals.scale
-        size = Parameter("static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction")
+        size = Parameter("static_excess_n", "N", 0.2 * scale.force_n, "static beyond Coulomb friction", positive=True)
         speed = Parameter("stribeck_speed_m_s", "m/s", 0.1 * scale.speed_m_s, "at which 37 % of it are left")
-        return tuple(Form((size,), _columns, speed, share * scale.speed_m_s, 1.6) for share in SHARES)
-
-    def possible(self, values: Mapping[str, float]) -> bool:
-        """Static friction is above Coulomb friction, or it is another curve."""
-        return values["static_excess_n"] > 0.0
+        return (Form((size,), _columns, (speed,), (tuple(share * scale.speed_m_s for share in SHARES),)),)
 
 
-def _columns(signals: Signals, speed_m_s: float) -> NDArray[np.float64]:
-    return (signals.direction * np.exp(-np.abs(signals.speed_m_s) / speed_m_s))[:, None]
+def _columns(signals: Signals, speed_m_s: tuple[float, ...]) -> NDArray[np.float64]:
+    return (signals.direction * np.exp(-np.abs(signals.speed_m_s) / speed_m_s[0]))[:, None]

@@ -6,12 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Texts
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.signals import Signals
+
+MOST_SAMPLES = 5.0
+"""Samples that channels of one logger, with their filters, may be apart."""
 
 
 class TimeSkew(DriveSource):
@@ -19,6 +24,7 @@ class TimeSkew(DriveSource):
 
     name = "time-skew"
     varies_with = "rate of force"
+    form_uncertainty = 0.1  # a filter delays a little more at one frequency than at another
     texts = Texts(
         what="The force channel is late or early against the position: filters, bus cycles, the current loop.",
         shows="Peaks where the force changes quickly, at every start, stop and reversal, of one sign where it rises and "
@@ -30,12 +36,16 @@ class TimeSkew(DriveSource):
         origin="Taylor's series to first order; delays in identification: Ljung, System Identification (1999), sec. 14",
     )
 
-    def forms(self, signals: Signals, residual_n: NDArray[np.float64]) -> tuple[Form, ...]:  # noqa: ARG002
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
         """One amplitude."""
-        size = Parameter("delay_ms", "ms", 1e3 * 0.05 / signals.cutoff_hz, "of the force; negative: it is early")
+        size = Parameter("delay_ms", "ms", 1e3 * scale.sample_s, "of the force; negative: it is early")
         return (Form((size,), _columns),)
 
+    def possible(self, values: Mapping[str, float], scale: Scale) -> bool:
+        """Channels of one logger are apart by a few of its samples; a longer delay is something else."""
+        return abs(values.get("delay_ms", 0.0)) <= MOST_SAMPLES * 1e3 * scale.sample_s
 
-def _columns(signals: Signals, _: float) -> NDArray[np.float64]:
+
+def _columns(signals: Signals, _: tuple[float, ...]) -> NDArray[np.float64]:
     # The low-pass of the comparison bounds what the difference makes of noise.
     return -1e-3 * np.gradient(signals.force_n, 1.0 / signals.rate_hz)[:, None]

@@ -1,0 +1,283 @@
+"""Recordings of a drive as a channel of the comparison: force in the band, mass and viscous friction, causes, curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.recordings import with_waves
+from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.curves import Spline
+from dbbstation.inference.model_form import modulated
+from dbbstation.inference.patterns import CURVES, Family, Pattern
+from dbbstation.inference.variables import Kind, Variable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.contract import DriveSource, Form, Scale
+    from dbbstation.diagnosis.drive.recordings import Recordings
+    from dbbstation.diagnosis.drive.signals import Signals
+
+MASS, VISCOUS = "mass_kg", "viscous_n_s_m"
+BASE_UNITS = {MASS: "kg", VISCOUS: "N·s/m"}
+"""Parameters of the base model, F = M a + F_v v, and their units."""
+
+METHOD_SHARE = 0.002
+"""Of the force's root mean square: low-pass and differences leave so much of a simulated drive that follows its model exactly, most
+of it beside stops. It is noise that every recording has."""
+
+NEAREST_SHARE = 1e-4
+"""Travel since a reversal, of the whole travel, below which it is all one."""
+
+PERIODS_IN_TRAVEL = 3.0
+"""Longest wave that is looked for, as a share of the travel: what repeats less often is a curve."""
+
+WAVE_STEP = 0.25
+"""Of the waves that are looked for, in periods over the travel."""
+
+TIGHT, LOOPS = 28, 14
+"""Functions of a curve over the position, and by direction of travel: tight spots and loops of friction turn sharper than others."""
+
+MOST_WAVES = 4000
+STRONGEST = 6
+"""Waves that the comparison looks at."""
+
+SAME = 1e-6
+"""Singular value, relative, below which columns say the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveChannel:
+    """A channel and what its laws are of.
+
+    Attributes:
+        recordings: that it was made of.
+        channel: for the comparison.
+        scale: sizes, with the waves that a first look found.
+        sources: that were compared, by name.
+        of_law: source and form of each law, by the law's name.
+        shortest_wave_mm: shortest wave over the position that was looked for; infinite where none was.
+    """
+
+    recordings: Recordings
+    channel: Channel
+    scale: Scale
+    sources: dict[str, DriveSource]
+    of_law: dict[str, tuple[DriveSource, Form]]
+    shortest_wave_mm: float
+
+    def laws_of(self, source: str) -> list[str]:
+        """Names of the laws of a source."""
+        return [name for name, (own, _) in self.of_law.items() if own.name == source]
+
+
+def drive_channel(
+    recordings: Recordings,
+    sources: Sequence[DriveSource],
+    base: Sequence[str] = (MASS, VISCOUS),
+    refused: Collection[str] = (),
+) -> DriveChannel:
+    """Make the channel of recordings.
+
+    Args:
+        recordings: of one drive.
+        sources: causes to compare.
+        base: parameters that are fitted anew with every hypothesis.
+        refused: names of laws that cannot be what these recordings show.
+    """
+    variables = _variables(recordings)
+    motion = recordings.motion[:, [(MASS, VISCOUS).index(name) for name in base]]
+    simple = [form for source in sources for form in source.forms(recordings.scale) if not form.shapes]
+    straight = np.hstack([motion, *(recordings.compared(lambda s, f=form: f.columns(s, ())) for form in simple)])  # type: ignore[misc]
+    curves = tuple(_beyond(straight, _curves(recordings)))
+    scale, shortest = _first_look(recordings, np.hstack([straight, *(p.samples for p in curves)]))
+    of_law: dict[str, tuple[DriveSource, Form]] = {}
+    laws = []
+    for source in sources:
+        for form in source.forms(scale):
+            name = f"{source.name} {form.label}".strip()
+            if name not in refused:
+                of_law[name] = (source, form)
+                laws.append(_law(name, source, form, recordings, variables))
+    channel = Channel(
+        residual=recordings.force_n,
+        unit="N",
+        blocks=recordings.blocks,
+        names=recordings.names,
+        variables=(),
+        base=Base.flat(tuple(base), motion),
+        laws=tuple(laws),
+        time=recordings.time_s,
+        least_noise=METHOD_SHARE * scale.force_n,
+        static=curves,
+    )
+    return DriveChannel(recordings, channel, scale, {s.name: s for s in sources}, of_law, shortest)
+
+
+def _beyond(straight: NDArray[np.float64], patterns: Iterator[Pattern]) -> Iterator[Pattern]:
+    """Curves less what base and causes of one number do: these are not displaced by a curve that contains them."""
+    axes = _axes(straight)
+    for pattern in patterns:
+        samples = pattern.samples - axes @ (axes.T @ pattern.samples)
+        norms = np.linalg.norm(samples, axis=0)
+        if norms.max(initial=0.0) > SAME * np.linalg.norm(pattern.samples):
+            yield replace(pattern, samples=samples[:, norms > SAME * norms.max()])
+
+
+def _axes(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Orthonormal columns of what columns can do, some of which may say the same."""
+    u, s, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
+    return np.asarray(u[:, s > SAME * s[0]], dtype=np.float64)
+
+
+def _variables(recordings: Recordings) -> dict[str, Variable]:
+    """What a force may follow, by name."""
+    at = recordings.at
+    found = [
+        Variable("time", "s", Kind.TIME, recordings.time_s),
+        Variable("position", "mm", Kind.LENGTH, 1e3 * at(lambda s: s.position_m)),
+        Variable("speed", "mm/s", Kind.SPEED, 1e3 * at(lambda s: s.speed_m_s)),
+        Variable("acceleration", "mm/s²", Kind.SPEED, 1e3 * at(lambda s: s.acceleration_m_s2)),
+    ]
+    return {variable.name: variable for variable in found if np.ptp(variable.values) > 0.0}
+
+
+def _law(name: str, source: DriveSource, form: Form, recordings: Recordings, variables: dict[str, Variable]) -> Law:
+    @cache
+    def columns(values: tuple[float, ...]) -> NDArray[np.float64]:
+        return recordings.compared(lambda signals: form.columns(signals, values))
+
+    odds = np.log(source.prior_probability / (1.0 - source.prior_probability)) - np.log(form.tried)
+    parameters = (*form.amplitudes, *form.shapes)
+    along = "time" if source.varies_with.startswith("time") else "position"
+    return Law(
+        name=name,
+        columns=columns,
+        plausible=np.array([p.plausible for p in form.amplitudes]),
+        parameters=tuple(p.name for p in parameters),
+        units=tuple(p.unit for p in parameters),
+        grids=form.grids,
+        positive=tuple(p.positive for p in form.amplitudes),
+        form_uncertainty=source.form_uncertainty,
+        discrepancy=partial(_departure, along=variables[along].values),
+        log_odds=float(odds),
+    )
+
+
+def _departure(effect: NDArray[np.float64], along: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What a formula may be off by, per row: its effect times smooth functions of a variable, and a sample early or late.
+
+    The last two stand for the moment of a reversal, which a drive that sticks for a while blurs, shape (m, q).
+    """
+    late = np.gradient(effect)
+    return np.column_stack([modulated([effect[:, None]], [along[:, None]], None), late, np.gradient(late)])
+
+
+def _curves(recordings: Recordings) -> Iterator[Pattern]:
+    """Forces without a name: any smooth curve over a variable, and the same by direction of travel."""
+    scale = recordings.scale
+    starts = dict(zip((id(s) for s in recordings.signals), _starts(recordings), strict=True))
+    nearest = NEAREST_SHARE * scale.travel_m
+
+    def time(signals: Signals) -> NDArray[np.float64]:
+        return signals.t_s + starts[id(signals)]
+
+    def since(signals: Signals) -> NDArray[np.float64]:
+        return np.log(np.clip(signals.since_reversal_m, nearest, scale.travel_m))
+
+    def way(signals: Signals) -> NDArray[np.float64]:
+        return signals.direction
+
+    def after_reversal(signals: Signals) -> NDArray[np.float64]:
+        return signals.direction * np.isfinite(signals.since_reversal_m)
+
+    every: list[
+        tuple[str, str, Kind, Callable[[Signals], NDArray[np.float64]], Callable[[Signals], NDArray[np.float64]] | None]
+    ] = [
+        ("speed", "mm/s", Kind.SPEED, lambda s: 1e3 * s.speed_m_s, None),
+        ("acceleration", "mm/s²", Kind.SPEED, lambda s: 1e3 * s.acceleration_m_s2, None),
+        ("position", "mm", Kind.LENGTH, lambda s: 1e3 * s.position_m, None),
+        ("position", "mm", Kind.LENGTH, lambda s: 1e3 * s.position_m, way),
+        ("time", "s", Kind.TIME, time, None),
+        ("time", "s", Kind.TIME, time, way),
+    ]
+    if scale.reverses:
+        every.append(("log travel since reversal", "", Kind.ANY, since, after_reversal))
+    for name, unit, kind, values, factor in every:
+        functions = LOOPS if factor is not None else TIGHT if name == "position" else CURVES
+        variable = Variable(name, unit, kind, recordings.at(values))
+        if variable.extent <= 0.0:
+            continue
+        spline = Spline(variable.low, variable.high, functions)
+
+        samples = recordings.compared(partial(_curve, spline=spline, values=values, factor=factor))
+        norms = np.linalg.norm(samples, axis=0)
+        samples = samples[:, norms > SAME * norms.max()]
+        yield Pattern(Family.CURVE if factor is None else Family.BY_DIRECTION, (variable,), samples, spline)
+
+
+def _curve(
+    signals: Signals,
+    spline: Spline,
+    values: Callable[[Signals], NDArray[np.float64]],
+    factor: Callable[[Signals], NDArray[np.float64]] | None,
+) -> NDArray[np.float64]:
+    """Functions of a curve at every sample of a recording, shape (n, p)."""
+    found = spline.columns(values(signals))
+    return found if factor is None else found * factor(signals)[:, None]
+
+
+def _starts(recordings: Recordings) -> list[float]:
+    """What is added to the time of each recording, so that they follow each other [s]."""
+    return [
+        float(recordings.time_s[rows.start] - one.t_s[one.kept[0]])
+        for rows, one in zip(recordings.blocks, recordings.signals, strict=True)
+    ]
+
+
+def _first_look(recordings: Recordings, smooth: NDArray[np.float64]) -> tuple[Scale, float]:
+    """Sizes with the waves over the position that are strongest in what smooth things leave, and the shortest looked for [mm].
+
+    At the usual speed the shortest wave passes in one period of the cut-off. Waves are taken one beside the other.
+    """
+    scale = recordings.scale
+    speed = float(np.median(np.abs(recordings.at(lambda s: s.speed_m_s))))
+    highest = min(recordings.scale.cutoff_hz / speed * scale.travel_m, MOST_WAVES * WAVE_STEP)
+    periods = np.arange(PERIODS_IN_TRAVEL, highest, WAVE_STEP)
+    if len(periods) < 1.0 / WAVE_STEP:
+        return scale, np.inf
+    axes = _axes(smooth)
+    left = recordings.force_n - axes @ (axes.T @ recordings.force_n)
+    position = recordings.at(lambda s: s.position_m)
+    waves = periods / scale.travel_m
+    found: list[float] = []
+    for _ in range(STRONGEST):
+        power = _power(waves, position, left)
+        best = float(waves[int(power.argmax())])
+        near = best + np.linspace(-1.0, 1.0, 21) * WAVE_STEP / scale.travel_m
+        best = float(near[int(_power(near, position, left).argmax())])
+        angle = 2.0 * np.pi * best * position
+        pair = np.column_stack([np.cos(angle), np.sin(angle)])
+        left = left - pair @ np.linalg.lstsq(pair, left, rcond=None)[0]
+        if all(abs(best - other) * scale.travel_m > 2.0 * WAVE_STEP for other in found):
+            found.append(best)
+    return with_waves(scale, tuple(found), len(waves) * WAVE_STEP), 1e3 / float(waves[-1])
+
+
+_AT_ONCE = 200
+
+
+def _power(waves: NDArray[np.float64], position: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How strongly a residual follows waves over a position."""
+    return np.concatenate(
+        [
+            np.abs(np.exp(2j * np.pi * np.outer(waves[k : k + _AT_ONCE], position)) @ left)
+            for k in range(0, len(waves), _AT_ONCE)
+        ]
+    )

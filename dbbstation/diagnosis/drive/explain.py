@@ -1,0 +1,122 @@
+"""Naming: which set of causes explains the recordings, with nothing among them that cannot be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from dbbstation.diagnosis.drive.channel import MASS, VISCOUS, drive_channel
+from dbbstation.diagnosis.drive.fit import DriveFit, fit, log_possible, with_method
+from dbbstation.inference.hypotheses import LIKELY, Posterior
+from dbbstation.inference.settle import settle
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from dbbstation.diagnosis.drive.channel import DriveChannel
+    from dbbstation.diagnosis.drive.contract import DriveSource
+    from dbbstation.diagnosis.drive.recordings import Recordings
+    from dbbstation.inference.settle import Settled
+
+MOST_ROUNDS = 6
+"""Times that something impossible is refused and all is compared again."""
+
+MOST_EXPANDED = 4
+"""Hypotheses whose neighbours are looked at in a search, at the most: causes of a drive are few, and their rivals are looked at
+by the challenge of the most probable hypothesis too."""
+
+MOST_LOOKS = 2
+"""Looks for pulses in each round, at the most; each takes dozens. Where more are left, it is the law that is wrong."""
+
+LOOKED_AT = 60
+"""Hypotheses, most probable first, that are asked whether they can be."""
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What the comparison came to.
+
+    Attributes:
+        drive: channel and its laws.
+        settled: the comparison.
+        before: fit of mass and viscous friction alone.
+        after: fit of the most probable hypothesis.
+        refused: laws that cannot be what the recordings show, and why.
+        dropped: base parameters that would be negative, and what that points to.
+    """
+
+    drive: DriveChannel
+    settled: Settled
+    before: DriveFit
+    after: DriveFit
+    refused: Mapping[str, str] = field(default_factory=dict)
+    dropped: Mapping[str, str] = field(default_factory=dict)
+
+
+def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Callable[[str], None]) -> Explained:
+    """Compare sets of causes; refuse what cannot be, and compare again."""
+    refused: dict[str, str] = {}
+    dropped: dict[str, str] = {}
+    for number in range(MOST_ROUNDS):
+        base = [name for name in (MASS, VISCOUS) if name not in dropped]
+        drive = drive_channel(recordings, sources, base, refused)
+        settled = _possible_first(
+            drive, settle(drive.channel, most_expanded=MOST_EXPANDED, most_looks=MOST_LOOKS, progress=progress)
+        )
+        after = fit(drive, settled, settled.best.members)
+        if number == 0:
+            first = fit(drive, settled, ())
+        last = number == MOST_ROUNDS - 1
+        impossible = _impossible(drive, after)
+        if impossible and not last:
+            refused |= impossible
+            continue
+        if after.impossible and not last and len(base) > 1:
+            name = after.impossible[0]
+            value = after.base[name]
+            dropped[name] = (
+                f"{name} would come out at {value.value:.3g} ± {value.uncertainty:.2g} {value.unit}, which cannot be, and is left "
+                f"out: {POINTS_TO[name]}"
+            )
+            continue
+        break
+    after = with_method(drive, settled, after)
+    return Explained(drive, settled, first, after, {**refused, **settled.refused}, dropped)
+
+
+POINTS_TO = {
+    MASS: "what the force does with the acceleration here is no inertia. It points to play or elastic parts between drive and "
+    "load, or to a delay between the channels.",
+    VISCOUS: "the friction falls with growing speed here. It points to Stribeck friction, or to a load that changes while "
+    "the drive moves. Record at several speeds.",
+}
+"""What a negative base parameter points to."""
+
+
+def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
+    """The comparison with hypotheses weighed by whether their mass and friction can be."""
+    posterior = settled.posterior
+    weights = dict(posterior.weights)
+    hypotheses = list(posterior.hypotheses)
+    top = -float("inf")
+    for number, hypothesis in enumerate(posterior.hypotheses[:LOOKED_AT]):
+        if hypothesis.log_posterior < top - LIKELY:
+            break  # none of those that follow can be probable
+        less = log_possible(fit(drive, settled, hypothesis.members))
+        hypotheses[number] = replace(hypothesis, log_posterior=hypothesis.log_posterior + less)
+        weights[hypothesis.names] = hypotheses[number].log_posterior
+        top = max(top, hypotheses[number].log_posterior)
+    found = Posterior(tuple(sorted(hypotheses, key=lambda h: -h.log_posterior)), weights)
+    return replace(settled, posterior=found)
+
+
+def _impossible(drive: DriveChannel, fitted: DriveFit) -> dict[str, str]:
+    """Laws of a fit whose values cannot be, by what their sources say."""
+    values = fitted.all_values()
+    found = {}
+    for member in fitted.members:
+        name = member.cause.name
+        if name in drive.of_law and not drive.of_law[name][0].possible(values, drive.scale):
+            shown = ", ".join(f"{k} {v.value:.3g} {v.unit}" for k, v in fitted.parameters(name).items())
+            found[name] = f"It would have to be {shown}, which it cannot be beside the rest: something else is at work."
+    return found

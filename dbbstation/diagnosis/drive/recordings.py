@@ -1,0 +1,158 @@
+"""Recordings of one drive, prepared and put together: one after the other, in one band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.contract import Scale
+from dbbstation.diagnosis.drive.signals import derivatives, signals_of
+from dbbstation.errors import CalibrationError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.signals import Signals
+    from dbbstation.trace.drive_recording import DriveRecording
+
+DISSIPATES_SIGMA = 5.0
+"""Standard deviations below zero from which on it is no chance that a drive would take power out of its friction."""
+
+AGAINST = 0.3
+"""Correlation with the speed, less than nothing, from which on a wrong sign shows: a tenth of the force's square. Less is what a
+delay of one channel does to a drive that has hardly any friction."""
+
+POWER_STRETCHES = 16
+"""Stretches of all samples that the scatter of the power is read from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """One drive, recorded once or several times.
+
+    Attributes:
+        names: of the recordings.
+        signals: of each.
+    """
+
+    names: tuple[str, ...]
+    signals: tuple[Signals, ...]
+
+    def compared(self, columns: Callable[[Signals], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Columns of every recording in the band, at the samples compared, one recording after the other, (m,) or (m, p)."""
+        return np.concatenate([one.compared(columns(one)) for one in self.signals])
+
+    def at(self, values: Callable[[Signals], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Values of every recording at the samples compared, as they are, shape (m,)."""
+        return np.concatenate([values(one)[one.kept] for one in self.signals])
+
+    @cached_property
+    def blocks(self) -> tuple[slice, ...]:
+        """Rows of each recording."""
+        ends = np.cumsum([0, *(len(one.kept) for one in self.signals)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    @cached_property
+    def force_n(self) -> NDArray[np.float64]:
+        """In the band, shape (m,) [N]."""
+        return self.compared(lambda s: s.force_n)
+
+    @cached_property
+    def motion(self) -> NDArray[np.float64]:
+        """Acceleration [m/s²] and speed [m/s] in the band, shape (m, 2).
+
+        Of the position as measured: these columns are linear in it and have not passed its filter yet.
+        """
+        return self.compared(lambda s: np.column_stack(derivatives(s.measured_m, s.rate_hz)[::-1]))
+
+    @cached_property
+    def time_s(self) -> NDArray[np.float64]:
+        """Time, later recordings behind earlier ones, shape (m,) [s]."""
+        found, end = [], 0.0
+        for one in self.signals:
+            found.append(one.t_s[one.kept] - one.t_s[0] + end if len(self.signals) > 1 else one.t_s[one.kept])
+            end += float(one.t_s[-1] - one.t_s[0]) + 1.0
+        return np.concatenate(found)
+
+    @cached_property
+    def scale(self) -> Scale:
+        """Sizes."""
+        return Scale(
+            force_n=float(np.sqrt(np.mean(self.force_n**2))),
+            speed_m_s=float(np.abs(self.at(lambda s: s.speed_m_s)).max()),
+            low_m=min(float(s.position_m.min()) for s in self.signals),
+            high_m=max(float(s.position_m.max()) for s in self.signals),
+            mean_m=float(np.mean(self.at(lambda s: s.position_m))),
+            duration_s=max(float(s.t_s[-1] - s.t_s[0]) for s in self.signals),
+            cutoff_hz=self.signals[0].cutoff_hz,
+            sample_s=1.0 / min(s.rate_hz for s in self.signals),
+            reverses=any(len(s.reversals) > 0 for s in self.signals),
+        )
+
+    @property
+    def samples_apart_s(self) -> float:
+        """Time from one sample that is compared to the next [s]."""
+        one = self.signals[0]
+        return float(np.median(np.diff(one.kept))) / one.rate_hz
+
+    @property
+    def notes(self) -> list[str]:
+        """What was done to each recording."""
+        if len(self.signals) == 1:
+            return list(self.signals[0].notes)
+        return [f"{name}: {note}" for name, one in zip(self.names, self.signals, strict=True) for note in one.notes]
+
+
+def recordings_of(recordings: Sequence[DriveRecording], cutoff_hz: float | None = None) -> Recordings:
+    """Prepare recordings of one drive, all in the band of the one that allows least.
+
+    Raises:
+        CalibrationError: as `signals_of`; or force and motion do not agree.
+    """
+    signals = tuple(signals_of(recording, cutoff_hz) for recording in recordings)
+    lowest = min(one.cutoff_hz for one in signals)
+    signals = tuple(
+        one if one.cutoff_hz == lowest else signals_of(recording, lowest)
+        for one, recording in zip(signals, recordings, strict=True)
+    )
+    for recording, one in zip(recordings, signals, strict=True):
+        _refuse_wrong_sign(Recordings((recording.name,), (one,)))
+    return Recordings(tuple(recording.name for recording in recordings), signals)
+
+
+def _refuse_wrong_sign(one: Recordings) -> None:
+    """Refuse a force that points against what it drives.
+
+    A drive puts power into friction. Inertia, a constant load and a spring give back what they take, and what goes with
+    them is left out of the force first; whatever friction is like, force and speed then agree on average.
+
+    Raises:
+        CalibrationError: the drive would gain power beyond doubt, in both directions of travel.
+    """
+    force, speed = one.force_n, one.motion[:, 1]
+    if not one.scale.reverses:
+        return
+    conservative = np.column_stack([np.ones(len(force)), one.motion[:, 0], one.at(lambda s: s.position_m)])
+    conservative /= np.maximum(np.linalg.norm(conservative, axis=0), 1e-300)
+    left = force - conservative @ np.linalg.lstsq(conservative, force, rcond=None)[0]
+    powers = [float(np.mean(part)) for part in np.array_split(left * speed, POWER_STRETCHES)]
+    mean, sigma = float(np.mean(powers)), float(np.std(powers)) / np.sqrt(len(powers))
+    agreement = float(left @ speed) / max(float(np.linalg.norm(left) * np.linalg.norm(speed)), 1e-300)
+    if mean < -DISSIPATES_SIGMA * sigma and agreement < -AGAINST:
+        raise CalibrationError(
+            f"the force has the wrong sign: it acts against the motion (correlation with the speed {agreement:.2f}), so that "
+            f"the drive would gain {-mean:.3g} W from its friction",
+            where=one.names[0],
+            remedy="force and current must be positive towards greater positions; turn the sign of one channel",
+        )
+
+
+def with_waves(scale: Scale, waves_per_m: tuple[float, ...], tried: float) -> Scale:
+    """The same sizes with waves that a first look found."""
+    return replace(scale, waves_per_m=waves_per_m, waves_tried=tried)

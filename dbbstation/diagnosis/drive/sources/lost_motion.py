@@ -1,0 +1,68 @@
+"""Cause: play between the drive and what it moves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.contract import DriveSource, Form, Parameter, Scale, Texts
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.signals import Signals
+
+GAPS = (0.002, 0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.24)
+"""Plays that are tried, of the travel."""
+
+RISES = (0.25, 1.0, 2.0)
+"""Ways over which the load is taken up again, of the play."""
+
+MOST_OF_COULOMB = 1.5
+"""Times the Coulomb friction up to which it can be: 2.5 standard deviations of what its formula is off by."""
+
+
+class LostMotion(DriveSource):
+    """After a reversal the drive moves alone until play is taken up: F = -F_l sign(v) r(d).
+
+    The share r of the load that is not yet taken up is 1 over a travel g since the reversal and falls to 0 over a further
+    w. Beside Coulomb friction of the same size F_l this is friction that acts behind the play only.
+    """
+
+    name = "lost-motion"
+    varies_with = "travel since reversal"
+    form_uncertainty = 0.2  # contacts close gradually, and play is seldom the same at both ends of a travel
+    texts = Texts(
+        what="Between drive and load there is play or an elastic lash: after a reversal the drive moves over it before "
+        "the load, or its friction, is felt.",
+        shows="After every reversal the force stays near zero over the same travel before it rises to its new level.",
+        confirm="Reverse slowly and read force over position: a flat stretch near zero force of the same length at both "
+        "ends; measure the load itself with a dial gauge.",
+        cure="Preload nut and couplings; replace worn joints; backlash compensation in the control.",
+        equation="F = -F_l sign(v) r(d), r = 1 for d < g, then falling to 0 over w, d the travel since the reversal",
+        origin="Nordin and Gutman, Controlling mechanical systems with backlash, Automatica 38 (2002) 1633, sec. 2",
+    )
+
+    def forms(self, scale: Scale) -> tuple[Form, ...]:
+        """One amplitude, the play, and the way over which the load comes back."""
+        if not scale.reverses:
+            return ()
+        size = Parameter("lost_n", "N", 0.5 * scale.force_n, "force that is missing within the play", positive=True)
+        gap = Parameter("gap_mm", "mm", 1e3 * 0.03 * scale.travel_m, "play")
+        rise = Parameter("rise_per_gap", "1", 1.0, "way over which the load comes back, over the play")
+        gaps = tuple(1e3 * share * scale.travel_m for share in GAPS)
+        return (Form((size,), _columns, (gap, rise), (gaps, RISES)),)
+
+    def possible(self, values: Mapping[str, float], scale: Scale) -> bool:  # noqa: ARG002
+        """Within the play the force falls to zero and not below: what is missing there is the Coulomb friction."""
+        return values["lost_n"] <= MOST_OF_COULOMB * max(values.get("coulomb_n", 0.0), 0.0)
+
+
+def _columns(signals: Signals, shape: tuple[float, ...]) -> NDArray[np.float64]:
+    gap_mm, rise = shape
+    since = 1e3 * signals.since_reversal_m
+    missing = np.clip((gap_mm * (1.0 + rise) - since) / (gap_mm * rise), 0.0, 1.0)
+    return np.asarray(-(signals.direction * missing)[:, None], dtype=np.float64)

@@ -1,0 +1,300 @@
+"""Verdicts on the causes of force, read off the probabilities of the comparison, and what has no name."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.channel import METHOD_SHARE
+from dbbstation.diagnosis.drive.findings import DriveFinding, Effect, Part
+from dbbstation.inference.patterns import Family
+from dbbstation.inference.read_off import OUT, read_off
+from dbbstation.inference.verdict import Value, Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.contract import DriveSource
+    from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.inference.read_off import Finding
+
+ORDER = (Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT)
+CLAIMS = frozenset({Verdict.IDENTIFIED, Verdict.AMBIGUOUS})
+COULOMB, COGGING, TRANSIENT = "coulomb-friction", "cogging", "transient-force"
+"""Causes of which more is said than what their laws say: what one speed tells, waves over the position, stretches of time."""
+
+
+class Verdicts:
+    """Everything that is said of causes, named and unnamed.
+
+    Args:
+        explained: what the comparison came to.
+        several_speeds: the recordings tell Coulomb friction from viscous friction.
+    """
+
+    def __init__(self, explained: Explained, *, several_speeds: bool) -> None:
+        self._explained, self._drive, self._several = explained, explained.drive, several_speeds
+        self._raw = read_off(explained.settled)
+        self._source_of = {f.name: self._source(f) for f in self._raw}
+        self._least_n = METHOD_SHARE * self._drive.scale.force_n
+        self._of = {name: [f for f in self._raw if self._source_of[f.name] == name] for name in self._drive.sources}
+
+    def findings(self) -> tuple[DriveFinding, ...]:
+        """One per source, best first."""
+        found = [self._finding(source) for source in self._drive.sources.values()]
+        return tuple(sorted(found, key=lambda f: (ORDER.index(f.verdict), -f.gain)))
+
+    @property
+    def named(self) -> list[str]:
+        """Members of the best hypothesis that belong to a source, largest first."""
+        best = self._explained.settled.best
+        faint = {f.name for f in self._raw if f.rms < self._least_n}
+        names = [m.cause.name for m in best.members if self._source_of.get(m.cause.name) and m.cause.name not in faint]
+        return sorted(names, key=lambda name: -best.log_factor(name))
+
+    def source_of(self, name: str) -> str:
+        """Source that a member belongs to; empty where it has no name."""
+        return self._source_of.get(name, "")
+
+    def effects(self) -> tuple[Effect, ...]:
+        """Forces without a name that are there, largest first."""
+        found = []
+        for one in self._raw:
+            if self._source_of[one.name] or one.verdict is not Verdict.IDENTIFIED or not one.spans:
+                continue
+            span = one.spans[0]
+            variable = f"{span.variable} by direction" if one.family is Family.BY_DIRECTION else span.variable
+            found.append(Effect(one.name, variable, one.probability, one.rms, span.low, span.high, span.unit))
+        return tuple(sorted(found, key=lambda e: -e.rms_n))
+
+    def _source(self, finding: Finding) -> str:
+        """Name of the source that a finding belongs to; empty where it has none."""
+        if finding.name in self._drive.of_law:
+            return self._drive.of_law[finding.name][0].name
+        if finding.family is Family.PULSES:
+            return TRANSIENT if TRANSIENT in self._drive.sources else ""
+        if finding.family is Family.WAVE and finding.variables == ("position",):
+            return COGGING if COGGING in self._drive.sources else ""
+        return ""
+
+    def _finding(self, source: DriveSource) -> DriveFinding:
+        own = self._of[source.name]
+        there = [f for f in own if f.verdict in CLAIMS and f.name in self.named]
+        alike = self._alike(source, there or own)
+        if there and source.name == COULOMB and not self._several:
+            alike = (*alike, "viscous friction")
+        if there:
+            verdict = Verdict.AMBIGUOUS if alike else min((f.verdict for f in there), key=ORDER.index)
+            text = self._text(source, verdict, alike, there)
+        else:
+            verdict, text = self._absent(source, own)
+            # A force without a name that could stand for it is no reason to expect it.
+            alike = tuple(name for name in alike if name in self._drive.sources)
+            if alike:
+                verdict, text = (
+                    Verdict.AMBIGUOUS,
+                    f"This recording cannot tell it from {', '.join(alike)}. {source.texts.confirm}",
+                )
+        best = max(there or own, key=lambda f: f.log_factor, default=None)
+        pulses = [f for f in there if f.family is Family.PULSES]
+        parts = tuple(part for f in there if f not in pulses for part in self._parts(f))
+        parts += tuple(self._pulses(pulses)) if pulses else ()
+        parameters = self._values(best) if best is not None else {}
+        if len(there) > 1 and best is not None and best.family is None:
+            parameters = {k: v for f in reversed(there) for k, v in self._values(f).items()}
+        return DriveFinding(
+            name=source.name,
+            verdict=verdict,
+            probability=self._probability([f.name for f in own], own),
+            ambiguous_with=alike,
+            gain=best.log_factor if best is not None else 0.0,
+            concealed=best.confounded if best is not None else 0.0,
+            whole_n=best.whole_rms if best is not None else 0.0,
+            rest_n=best.rms if best is not None else 0.0,
+            parameters=parameters,
+            parts=parts,
+            text=text,
+        )
+
+    def _is_member(self, finding: Finding) -> bool:
+        return finding.name in self._explained.settled.best.names
+
+    def _probability(self, names: Sequence[str], own: Sequence[Finding]) -> float:
+        """That any form of a source is there, or one of its class."""
+        alone = self._explained.settled.posterior.probability(names) if names else 0.0
+        return max([alone, *(f.probability for f in own)]) if own else alone
+
+    def _alike(self, source: DriveSource, findings: Sequence[Finding]) -> tuple[str, ...]:
+        """Other sources that would do as well in its place, with values that can be."""
+        names = set()
+        for finding in findings:
+            for other in {*finding.equivalent, *finding.ambiguous_with} - {finding.name}:
+                theirs = self._source_of.get(other, "")
+                if theirs != source.name and self._could_be(finding.name, other):
+                    names.add(theirs or f"a force that follows {other.split(' over ')[-1].split(',')[0]}")
+        return tuple(sorted(names))
+
+    def _could_be(self, one: str, other: str) -> bool:
+        """Whether a law could stand in the place of another with the size that this has."""
+        laws = self._drive.of_law
+        inside, outside = (one, other) if one in self._explained.settled.best.names else (other, one)
+        if outside not in laws or inside not in laws or inside not in self._explained.settled.best.names:
+            return True
+        after = self._explained.after
+        amplitude = float(after.values[after.columns_of(inside).start])
+        source, form = laws[outside]
+        parameter = form.amplitudes[0]
+        size = amplitude if not parameter.positive else abs(amplitude)
+        return source.possible(after.all_values() | {parameter.name: size}, self._drive.scale)
+
+    def _text(self, source: DriveSource, verdict: Verdict, alike: Sequence[str], there: Sequence[Finding]) -> str:
+        if verdict is Verdict.IDENTIFIED:
+            return f"{source.texts.what} {source.texts.confirm}"
+        if alike:
+            return f"This recording cannot tell it from {', '.join(alike)}. {source.texts.confirm}"
+        return f"{there[0].text or 'This recording does not decide it.'} {source.texts.confirm}"
+
+    def _absent(self, source: DriveSource, own: Sequence[Finding]) -> tuple[Verdict, str]:
+        """Verdict on what is not in the model, and why."""
+        scale = self._drive.scale
+        if faint := [f for f in own if self._is_member(f)]:
+            return Verdict.NOT_TESTABLE, (
+                f"What it would explain, {faint[0].rms:.2g} N rms, is less than filters and differences leave of a perfect drive."
+            )
+        looked_for = {COGGING: lambda: self._no_cogging(own), TRANSIENT: self._no_transient}
+        if source.name in looked_for:
+            return looked_for[source.name]()
+        if not own and not scale.reverses and not source.forms(scale):
+            return Verdict.NOT_TESTABLE, "The drive never reverses here, and only a reversal would show it."
+        for finding in own:
+            if finding.verdict is Verdict.NOT_TESTABLE:
+                return Verdict.NOT_TESTABLE, finding.text
+        refused = [f.text for f in own if f.text and f.probability == 0.0 and not f.values]
+        refused += [why for name, why in self._explained.refused.items() if name.split(" ")[0] == source.name]
+        if not refused and own and self._probability([f.name for f in own], own) > source.prior_probability:
+            return Verdict.NOT_TESTABLE, "This recording leaves it open: it neither shows nor excludes it."
+        not_needed = "It would have been seen at its plausible size and was not needed."
+        return Verdict.RULED_OUT, refused[0] if refused else not_needed
+
+    def _no_cogging(self, own: Sequence[Finding]) -> tuple[Verdict, str]:
+        """No wave was found: within the band there is none, and beyond it there may be."""
+        scale, shortest = self._drive.scale, self._drive.shortest_wave_mm
+        if not np.isfinite(shortest):
+            return Verdict.NOT_TESTABLE, f"Within {scale.cutoff_hz:.3g} Hz no wave fits three times into the travel."
+        hidden = self._beyond_band_n()
+        if hidden >= 0.1 * scale.force_n / np.sqrt(2.0):
+            return Verdict.NOT_TESTABLE, (
+                f"Waves down to {shortest:.3g} mm are looked for ({scale.cutoff_hz:.3g} Hz at the usual speed, the band of the "
+                f"comparison), and none is there. Above {scale.cutoff_hz:.3g} Hz the force moves by {hidden:.2g} N rms, which "
+                "may be shorter ones: travel more slowly, or sample faster and give a higher --cutoff-hz."
+            )
+        if any(f.verdict is Verdict.NOT_TESTABLE for f in own):
+            return Verdict.NOT_TESTABLE, next(f.text for f in own if f.verdict is Verdict.NOT_TESTABLE)
+        return Verdict.RULED_OUT, (
+            f"Waves down to {shortest:.3g} mm ({scale.cutoff_hz:.3g} Hz at the usual speed) would have been seen, and above that "
+            f"the force moves by {hidden:.2g} N rms only."
+        )
+
+    def _beyond_band_n(self) -> float:
+        """Root mean square of the force beyond the band, at the samples compared [N]."""
+        recordings = self._drive.recordings
+        return float(np.sqrt(np.mean((recordings.at(lambda s: s.force_n) - recordings.force_n) ** 2)))
+
+    def _no_transient(self) -> tuple[Verdict, str]:
+        """No stretch of time stands out; the shortest that would have been seen is said."""
+        settled, scale = self._explained.settled, self._drive.scale
+        apart = self._drive.recordings.samples_apart_s
+        size = 0.3 * scale.force_n
+        rows = max(3, int(np.ceil((OUT * settled.noise.effective / size) ** 2)))
+        if rows > len(self._drive.channel.residual) // 8:
+            return (
+                Verdict.NOT_TESTABLE,
+                "The noise would hide a force of a plausible size that lasts an eighth of the recording.",
+            )
+        return (
+            Verdict.RULED_OUT,
+            f"A force of {size:.2g} N for {rows * apart:.2g} s would have been seen; a shorter one is not in the band.",
+        )
+
+    def _values(self, finding: Finding) -> dict[str, Value]:
+        if finding.name in self._drive.of_law and self._is_member(finding):
+            return self._explained.after.parameters(finding.name)
+        return finding.values if finding.family is None else {}
+
+    def _parts(self, finding: Finding) -> list[Part]:
+        """Every wave or form by itself."""
+        if finding.name in self._drive.of_law:
+            return [Part(self._drive.of_law[finding.name][1].label, self._values(finding))]
+        return [Part(finding.name, dict(finding.values))]
+
+    def _pulses(self, findings: Sequence[Finding]) -> list[Part]:
+        """Stretches of time in which the force differs from the level that it has most of the time.
+
+        Stretches that were found may overlap; what they are together has levels, of which neighbours that do not differ by
+        `APART` standard uncertainties are one.
+        """
+        after, recordings = self._explained.after, self._drive.recordings
+        columns = np.concatenate([np.arange(o.start, o.stop) for o in (after.columns_of(f.name) for f in findings)])
+        inside = after.samples[:, columns]
+        values, covariance = after.values[columns], after.covariance[np.ix_(columns, columns)]
+        edges = np.concatenate([[0], np.flatnonzero(np.any(np.diff(inside, axis=0) != 0.0, axis=1)) + 1, [len(inside)]])
+        levels = [(int(a), int(b), inside[a]) for a, b in pairwise(edges)]
+
+        def differ(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+            less = one - other
+            return abs(float(less @ values)) > APART * float(np.sqrt(max(less @ covariance @ less, 1e-300)))
+
+        joined: list[tuple[int, int, NDArray[np.float64]]] = []
+        for first, last, level in levels:
+            if joined and not differ(level, joined[-1][2]):
+                before = joined.pop()
+                share = (last - first) / (last - before[0])
+                first, level = before[0], share * level + (1.0 - share) * before[2]  # noqa: PLW2901 - one level of both
+            joined.append((first, last, level))
+        joined = _without_edges(joined, values)
+        order = sorted(joined, key=lambda one: float(one[2] @ values))
+        counts = np.cumsum([last - first for first, last, _ in order])
+        usual = order[int(np.searchsorted(counts, 0.5 * counts[-1]))][2]
+        times, apart = recordings.time_s, recordings.samples_apart_s
+        found = []
+        for first, last, level in joined:
+            if not differ(level, usual):
+                continue
+            less = level - usual
+            size = Value(float(less @ values), float(np.sqrt(less @ covariance @ less)), "N")
+            ends = (float(times[first]), float(times[last - 1]))
+            found.append(Part("", {"force_n": size, "duration_s": Value(ends[1] - ends[0] + apart, apart, "s")}, ends))
+        return found
+
+
+def _without_edges(
+    levels: Sequence[tuple[int, int, NDArray[np.float64]]], values: NDArray[np.float64]
+) -> list[tuple[int, int, NDArray[np.float64]]]:
+    """Levels in time without those of one sample between two others: the edge of a pulse within the band, which is round.
+
+    An edge goes to the level beside it that it is nearer to; a single sample with the same level on both sides is a pulse.
+    """
+    sizes = [float(level @ values) for *_, level in levels]
+    found: list[tuple[int, int, NDArray[np.float64]]] = []
+    waiting = None
+    for k, (first, last, level) in enumerate(levels):
+        begin = first if waiting is None else waiting
+        waiting = None
+        between = 0 < k < len(levels) - 1 and min(sizes[k - 1], sizes[k + 1]) < sizes[k] < max(
+            sizes[k - 1], sizes[k + 1]
+        )
+        if last - first > 1 or not between:
+            found.append((begin, last, level))
+        elif abs(sizes[k] - sizes[k - 1]) < abs(sizes[k + 1] - sizes[k]):
+            found[-1] = (found[-1][0], last, found[-1][2])
+        else:
+            waiting = first
+    return found
+
+
+APART = 4.0
+"""Standard uncertainties by which levels of a force in time must differ to be two: one in 15,000 by chance."""

@@ -146,18 +146,19 @@ def test_an_interrupt_leaves_no_half_result(run, monkeypatch, tmp_path, fifteen)
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs a named pipe to know when the program waits")
-def test_ctrl_c(tmp_path, model):
-    poses = tmp_path / "poses.csv"
-    os.mkfifo(poses)
-    command = [*PROGRAM, "predict", "--model", str(model), "--poses", str(poses), "--out", str(tmp_path / "out.csv")]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    with poses.open("w"):  # opens when the program has begun to read
+def test_ctrl_c(tmp_path, fifteen):
+    """Sent as soon as the log says that the session was read: the fit still lies ahead."""
+    command = [*PROGRAM, "calibrate", str(fifteen), "--out", str(tmp_path / "model.yaml"), "--verbose"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        while "session.yaml" not in (line := process.stderr.readline()):
+            assert line, "the program ended before it read the session"
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, out) == (FAILED, "")
-    assert err.strip() == "interrupted; what was written before stays"
-    assert not (tmp_path / "out.csv").exists()
+    assert "interrupted; what was written before stays" in err
+    assert "Traceback" not in err
+    assert not (tmp_path / "model.yaml").exists()
 
 
 def test_as_a_module_and_as_a_script():

@@ -45,6 +45,8 @@ def processes(count: int) -> Iterator[ProcessPoolExecutor]:
         try:
             yield pool
         except BaseException:
+            # The thread that hands out work finds its processes gone; that is what was asked for and no news to anybody.
+            threading.excepthook = lambda _: None
             for child in multiprocessing.active_children():
                 child.terminate()
             pool.shutdown(wait=False, cancel_futures=True)

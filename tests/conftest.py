@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import threading
 from pathlib import Path
 
 # As the command line does, before NumPy looks: several workers with threads each wait for one another most of the time.
@@ -17,6 +19,12 @@ import pytest
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.machine.geometry import Machine
+
+
+def pytest_sessionstart() -> None:
+    """Let interrupts through: a shell starts programs in the background with them ignored, and programs under test inherit that."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

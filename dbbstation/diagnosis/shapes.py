@@ -296,13 +296,13 @@ def _pulled_towards(motion: Motion, machine: Machine) -> NDArray[np.float64]:
     count = len(motion)
     hoses, still = _hoses(frames, machine), np.zeros((count, 3))
     arm = frames.rotation @ machine.hexapod.platform_joints_mm.mean(axis=0)
-    down = Load(np.tile([0.0, 0.0, -1.0], (count, 1)), np.cross(arm, [0.0, 0.0, -1.0]))
+    down = strut_tensions(struts, Load(np.tile([0.0, 0.0, -1.0], (count, 1)), np.cross(arm, [0.0, 0.0, -1.0])))
     found = []
     for way in range(len(WAYS_DEG)):
         pull = hoses[:, way] / np.linalg.norm(hoses[:, way], axis=1, keepdims=True)
         moments = [np.cross(LEVER_MM * frames.rotation[:, :, axis], pull) for axis in range(3)]
-        loads = [Load(pull, np.cross(arm, pull)), *(Load(still, moment) for moment in moments), down]
-        found += [strut_tensions(struts, load) for load in loads]
+        loads = [Load(pull, np.cross(arm, pull)), *(Load(still, moment) for moment in moments)]
+        found += [*(strut_tensions(struts, load) for load in loads), down]
     return np.stack(found, axis=2)
 
 

@@ -52,6 +52,7 @@ def drive(
       dbbstation drive strut3.csv --sources coulomb-friction,friction-asymmetry --json
     """
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.diagnosis.drive.identify import identify
     from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
@@ -70,7 +71,8 @@ def drive(
     for warning in (warning for file in files for warning in file.warnings):
         say(f"note: {warning}")
     raw = [file.recording(force_per_ampere) for file in files]
-    found = identify(raw, named, cutoff_hz, lambda text: say(f"... {text}"))
+    with stage_bar("identification", STAGES) as progress:
+        found = identify(raw, named, cutoff_hz, progress)
     summary = drive_summary(found)
     if out is not None:
         write_table(out, compared_csv(found.table()), provenance(), force=force)
@@ -86,6 +88,10 @@ def drive(
         print_json(summary)
     else:
         _print(summary)
+
+
+STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-back stretch": 90}
+"""Stages of an identification, and the share of its time that has passed by then [%]."""
 
 
 def _print(summary: Mapping[str, Any]) -> None:

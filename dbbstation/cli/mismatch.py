@@ -81,6 +81,7 @@ def mismatch(
       dbbstation mismatch arm.csv --measured z_mm --simulated fk_mm --variables q1=deg,q2=deg,temperature --json
     """
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.diagnosis.table.mismatch import find_mismatch
     from dbbstation.diagnosis.table.summary import mismatch_summary
@@ -100,9 +101,8 @@ def mismatch(
     sources, lacking = load_sources(source_files, tabulated.table)
     for name, why in lacking.items():
         say(f"note: {name} cannot be asked: {why}")
-    found = find_mismatch(
-        tabulated.table, sources, hold_out=not no_held_out, lacking=lacking, progress=lambda text: say(f"... {text}")
-    )
+    with stage_bar("comparison", STAGES_WHOLE if no_held_out else STAGES) as progress:
+        found = find_mismatch(tabulated.table, sources, hold_out=not no_held_out, lacking=lacking, progress=progress)
     summary = mismatch_summary(found)
     if out is not None:
         write_table(out, _corrected(tabulated, found), provenance(), force=force)
@@ -117,6 +117,10 @@ def mismatch(
     else:
         _print(summary)
 
+
+STAGES = {"look": 0, "sets of causes": 8, "held-out part": 15}
+STAGES_WHOLE = {"look": 0, "sets of causes": 50}
+"""Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
 
 CORRECTED, LEFT = "corrected", "left"
 """Columns that `--out` adds."""

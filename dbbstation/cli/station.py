@@ -110,7 +110,7 @@ def station(
             place = stack.enter_context(
                 virtual_place(machine, plan.to_domain(), protocol, time_scale=time_scale, seed=_DEMO_SEED)
             )
-            job, port, helper = replace(job, clock=place.clock), place.port, place.helper
+            job, port, helper = replace(job, clock=place.clock, time_scale=time_scale), place.port, place.helper
         return _run(job, opener(job, protocol, str(port), baud=baud, helper=helper, time_scale=time_scale))
 
 

@@ -102,7 +102,7 @@ class Bench:
 def switched_on(plan: InlinePlan, folder: Path) -> Iterator[Bench]:
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     with virtual_place(machine, plan.to_domain(), ENCODER, time_scale=TIME_SCALE) as place:
-        yield Bench(place, Job(machine, plan, folder, clock=place.clock))
+        yield Bench(place, Job(machine, plan, folder, clock=place.clock, time_scale=TIME_SCALE))
 
 
 async def until(pilot: Pilot[None], condition: Callable[[], bool]) -> None:

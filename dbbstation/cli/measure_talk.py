@@ -217,8 +217,6 @@ def _lines(event: events.Event, centre: str) -> list[str]:
             return [] if run is None else [f"  {run.label}: interrupted, kept as far as it came"]
         case events.CommandRefused():
             return [f"  {event.why}"]
-        case events.RunRestored():
-            return [f"  {event.run.label}: recorded before, it waits for its verdict"]
         case (
             events.RunStarted()
             | events.RunCompleted()
@@ -226,6 +224,7 @@ def _lines(event: events.Event, centre: str) -> list[str]:
             | events.RunRejected()
             | events.RunLate()
             | events.FeedInMissed()
+            | events.RunRestored()
         ):
             return [f"  {event.run.label}: {_of_run(event, centre)}"]
     return []
@@ -237,12 +236,15 @@ def _of_run(
     | events.RunAccepted
     | events.RunRejected
     | events.RunLate
-    | events.FeedInMissed,
+    | events.FeedInMissed
+    | events.RunRestored,
     centre: str,
 ) -> str:
     match event:
         case events.RunStarted():
             return "recording"
+        case events.RunRestored():
+            return "recorded before, it waits for its verdict"
         case events.RunAccepted():
             return "accepted"
         case events.RunRejected():

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from dbbstation.instrument.protocol import Protocol
+    from dbbstation.service.runner import Opener, OpenStation
     from dbbstation.station.assembly import Job
     from dbbstation.station.events import Observer
     from dbbstation.tui.app import StationApp
-    from dbbstation.tui.runner import Opener, OpenStation
 
 _DEMO = {"plan": "protocols/plans/ten-minute-check.yaml", "machine": "fixtures/machines/reference.yaml"}
 _DEMO_INSTRUMENT = "streaming-encoder"
@@ -163,8 +163,8 @@ def opener(
     """
     from dbbstation.cli.measure_talk import Log
     from dbbstation.instrument.driver import Instrument
+    from dbbstation.service.runner import OpenStation
     from dbbstation.station.assembly import assemble
-    from dbbstation.tui.runner import OpenStation
 
     @contextmanager
     def opened() -> Iterator[OpenStation]:
@@ -188,8 +188,8 @@ def _run(job: Job, open_station: Opener) -> int:
         StationError: the fault that ended the sequence, where nothing was done about it.
         click.Abort: a signal ended it.
     """
+    from dbbstation.service.runner import Runner
     from dbbstation.tui.app import Shown, StationApp
-    from dbbstation.tui.runner import Runner
 
     runner = Runner(open_station)
     app = StationApp(Shown(job.plan.plan.name, job.plan.jig.bores), runner)

@@ -54,6 +54,10 @@ class Port(Protocol):
         """Send the bytes."""
 
 
+class LineClosedError(InstrumentError):
+    """The system closed the line while it was in use: an adapter was pulled out, a server hung up."""
+
+
 class Link:
     """An open line to an instrument.
 
@@ -74,7 +78,7 @@ class Link:
         """Return the bytes that have arrived, after waiting a moment for the first; empty where none came.
 
         Raises:
-            InstrumentError: the line is closed.
+            LineClosedError: the line is closed.
         """
         try:
             raw = self._port.read(1)
@@ -104,7 +108,7 @@ class Link:
         """Send bytes.
 
         Raises:
-            InstrumentError: the line is closed.
+            LineClosedError: the line is closed.
         """
         if self._log is not None:
             self._log.note(">", raw)
@@ -125,8 +129,8 @@ class Link:
                 with suppress(*_ERRORS):
                     close()
 
-    def _gone(self, error: Exception) -> InstrumentError:
-        return InstrumentError(
+    def _gone(self, error: Exception) -> LineClosedError:
+        return LineClosedError(
             "the line was closed while it was in use",
             where=self.name,
             remedy=f"plug the instrument in again and check its cable and power; the system says: {_first_words(error)}",

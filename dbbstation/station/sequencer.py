@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Command, Reject, Repeat, Skip, Start
 from dbbstation.station.detector import EdgeDetector, Patience
@@ -196,6 +197,9 @@ class Sequencer:
             self._move(Cause.FED_OUT)
         elif self.state is State.LEAVING and self._record.left(sample.t_s):
             self._move(Cause.CIRCLE_FOUND if self._complete() else Cause.CIRCLE_MISSING)
+        elif reading.status != "ok" and sample.phi_deg is not None and 0.0 <= sample.phi_deg <= FULL_TURN_DEG:
+            self._complete(problem=_length_gone(reading, sample.phi_deg))
+            self._move(Cause.LENGTH_GONE)
         else:
             self._check_patience(reading)
         self._tell_progress()
@@ -286,6 +290,13 @@ class Sequencer:
         self._flush()
         out, self._out = self._out, []
         return out
+
+
+def _length_gone(reading: Reading, phi_deg: float) -> str:
+    """Say what the instrument told in the middle of the turn: what is missing there, no fit brings back."""
+    said = f" ({reading.said})" if reading.said else ""
+    what = f"the instrument reports {reading.status}{said} at {phi_deg:.0f}° of the turn"
+    return f"{what}; {reading.remedy or 'check bar and instrument'}, then repeat the run"
 
 
 def _remedy(circle: Circle) -> str:

@@ -27,7 +27,7 @@ def test_everything_on_the_line_is_written_down_and_replayed(tmp_path: Path) -> 
         Instrument(ND, port, log=log) as instrument,
     ):
         live = list(instrument.readings(2))
-    assert logged_instrument(file) == "heidenhain-nd281b"
+    assert logged_instrument(file) == ("heidenhain-nd281b", "")
     chunks = list(read_byte_log(file))
     assert [chunk.raw for chunk in chunks[:2]] == [b"\x02", b"+  150.0003    \r\n"]
     assert [chunk.direction for chunk in chunks[:2]] == [">", "<"]
@@ -57,7 +57,7 @@ def test_a_line_cut_off_by_a_crash_costs_that_line_alone(tmp_path: Path) -> None
     file = tmp_path / "bytes.txt"
     file.write_text("# dbb-byte-log/1\n0.1 < 41 42\n0.2 < 43 4", encoding="utf-8")
     assert list(read_byte_log(file)) == [Chunk(0.1, "<", b"AB")]
-    assert logged_instrument(file) == ""
+    assert logged_instrument(file) == ("", "")
 
 
 def test_replay_counts_gaps_and_shows_what_is_left(tmp_path: Path) -> None:

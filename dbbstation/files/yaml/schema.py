@@ -50,6 +50,7 @@ SINCE: dict[str, dict[str, int]] = {
     "dbb-plan": {"largest_loss_percent": 2},
     "dbb-session": {"stroke_mm": 2},
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},
+    "dbb-settings": {"profile": 2},
     "dbb-machine": _OF_MACHINES,
     "dbb-model": {**_OF_MACHINES, "provenance": 3},
 }

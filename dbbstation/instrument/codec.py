@@ -112,6 +112,7 @@ class Decoder:
         self._joining = joining
         self._in_step = not joining
         self._pending = b""
+        self._heads = [_head(frame) for frame in protocol.frames]
         self._bare = tuple(b"".join(_fixed(frame)) for frame in protocol.frames if frame.bare)
 
     @property
@@ -173,7 +174,7 @@ class Decoder:
                 found = found if isinstance(self._frame_at(follower), Piece) else None
             if found is None:
                 self._in_step = False
-                skipped += 1
+                skipped = self._next_head(here + 1, len(self._pending) - longest + 1) - start
                 continue
             if skipped:
                 heard.append(_skipped(self._pending[start:here], wrong, joining=self._joining))
@@ -185,6 +186,13 @@ class Decoder:
             start += skipped
         self._pending = self._pending[start:]
         return heard
+
+    def _next_head(self, after: int, end: int) -> int:
+        """Return the next place at which a frame can begin, at most `end`: every place where frames begin with anything."""
+        if not all(self._heads):
+            return after
+        places = [self._pending.find(head, after, end + len(head) - 1) for head in self._heads]
+        return min((place for place in places if place >= 0), default=max(after, end))
 
     def _frame_at(self, start: int) -> Piece | NotUnderstood | None:
         """Return the frame that begins there; what is wrong with it where only its checksum or a number is."""
@@ -199,6 +207,11 @@ class Decoder:
                     continue
                 return Piece(reading, match[0], len(self._pending) - match.end())
         return wrong
+
+
+def _head(frame: Frame) -> bytes:
+    first = frame.parts[0]
+    return first.value if isinstance(first, Literally) else b""
 
 
 def _fixed(frame: Frame) -> Iterator[bytes]:

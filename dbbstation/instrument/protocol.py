@@ -54,11 +54,16 @@ class Line(Schema):
         return self.bits_per_character / (baud or self.baud)
 
     @property
+    def bits_text(self) -> str:
+        """What a character is made of, for example `7 data bits, even parity, 2 stop bits`."""
+        stop = f"{self.stop_bits} stop bit" + ("s" if self.stop_bits > 1 else "")
+        return f"{self.data_bits} data bits, {self.parity} parity, {stop}"
+
+    @property
     def text(self) -> str:
         """The settings as people say them, for example `9600 baud, 7 data bits, even parity, 2 stop bits`."""
-        stop = f"{self.stop_bits} stop bit" + ("s" if self.stop_bits > 1 else "")
         flow = "" if self.flow == "none" else f", flow control {self.flow}"
-        return f"{self.baud} baud, {self.data_bits} data bits, {self.parity} parity, {stop}{flow}"
+        return f"{self.baud} baud, {self.bits_text}{flow}"
 
 
 class Step(Schema):

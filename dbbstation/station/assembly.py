@@ -41,6 +41,7 @@ class Job:
         programs: what commands each test and direction; empty: plain nominal circles.
         patience: how long is waited for the machine.
         clock: machine time, that of the instrument's readings [s].
+        rate_hz: readings per second that the instrument brings; None: not known.
     """
 
     machine: Machine
@@ -50,6 +51,7 @@ class Job:
     programs: Mapping[tuple[str, Direction], RunProgram] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
     clock: Callable[[], float] = time.monotonic
+    rate_hz: float | None = None
 
     def check(self, plan_file: str) -> None:
         """Dry-run the plan; to be done before an instrument is opened.
@@ -104,7 +106,7 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     }
     schedule = Schedule(plan, writer.next_repeat, writer.runs)
     names = {key: program.name for key, program in job.programs.items()}
-    station = Station(Sequencer(plan, schedule, programs=names, patience=job.patience), source)
+    station = Station(Sequencer(plan, schedule, programs=names, patience=job.patience, rate_hz=job.rate_hz), source)
     storage = Storage(writer, time_of_day(job.clock, last_end(writer.session)), kept)
     station.subscribe(storage)
     station.regularly(storage.sync_if_due)

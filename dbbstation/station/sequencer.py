@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.sampling import sampling
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Command, Reject, Repeat, Skip, Start
 from dbbstation.station.detector import EdgeDetector, Patience
@@ -42,6 +43,7 @@ class Sequencer:
         schedule: what is left of it.
         programs: name of the NC program that commands a test and direction; the plan's nominal circle where absent.
         patience: how long is waited for the machine.
+        rate_hz: readings per second that the instrument brings; None: not known.
     """
 
     def __init__(
@@ -51,12 +53,14 @@ class Sequencer:
         *,
         programs: Mapping[tuple[str, Direction], str] | None = None,
         patience: Patience | None = None,
+        rate_hz: float | None = None,
     ) -> None:
         self.state = State.BETWEEN
         self.plan = plan
         self.schedule = schedule
         self._programs = programs or {}
         self._patience = patience or Patience()
+        self._rate_hz = rate_hz
         self._out: list[Event] = []
         self._samples: list[Sample] = []
         self._run: RunId | None = None
@@ -120,6 +124,7 @@ class Sequencer:
         test = self.plan.tests[run.test]
         program = self._programs.get((run.test, run.direction), "")
         circle = test.run(run.direction)
+        seen = None if self._rate_hz is None else sampling(circle, self._rate_hz)
         announced = events.RunAnnounced(
             run=run,
             ball=test.ball,
@@ -128,7 +133,8 @@ class Sequencer:
             program=program,
             number=following.number,
             count=len(self.schedule.tasks),
-            instructions=instructions(test.ball, circle, put_up=following.put_up, program=program),
+            instructions=instructions(test.ball, circle, put_up=following.put_up, program=program, sampling=seen),
+            sampling=seen,
         )
         self._out.append(announced)
         self._move(Cause.RUN_LEFT)

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -30,7 +30,7 @@ def plan(plan_file: Path) -> Plan:
     return read_plan(plan_file)
 
 
-def made(plan: Plan, **more: Patience) -> Sequencer:
+def made(plan: Plan, **more: Any) -> Sequencer:
     taken: dict[tuple[str, Direction], int] = {}
 
     def next_repeat(test: str, direction: Direction) -> int:
@@ -257,3 +257,16 @@ def test_a_ball_under_the_spindle_is_put_up_where_the_machine_stands() -> None:
         "Bar of 150 mm, level; circle about X 100.000 Y 100.000 Z -1150.000",
         "Start the NC program d-cw.ngc at 1000 mm/min",
     )
+
+
+def test_the_set_up_says_what_the_instrument_is_too_slow_for(plan: Plan) -> None:
+    """Two points per undulation; fewer than 36 on a turn are no circle."""
+    circle = plan.tests["a"].circle
+    turn_s = 360.0 / circle.turning_deg_s
+    for points, said in ((1000, ""), (50, "50 points per turn: undulations above 25"), (20, "which is no circle")):
+        sequencer = made(plan, rate_hz=points / turn_s)
+        announced = next(event for event in sequencer.begin() if isinstance(event, events.RunAnnounced))
+        assert announced.sampling is not None
+        assert announced.sampling.points_per_turn == pytest.approx(points)
+        assert said in announced.instructions[-1]
+        assert ("points per turn" in announced.instructions[-1]) == bool(said)

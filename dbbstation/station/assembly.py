@@ -43,6 +43,7 @@ class Job:
         patience: how long is waited for the machine.
         clock: machine time, that of the instrument's readings [s].
         time_scale: how much faster than real time that goes; other than 1 for a virtual machine only.
+        rate_hz: readings per second that the instrument brings; None: not known.
     """
 
     machine: Machine
@@ -53,6 +54,7 @@ class Job:
     patience: Patience = field(default_factory=Patience)
     clock: Callable[[], float] = time.monotonic
     time_scale: float = 1.0
+    rate_hz: float | None = None
 
     def check(self, plan_file: str) -> None:
         """Dry-run the plan; to be done before an instrument is opened.
@@ -107,8 +109,15 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     }
     schedule = Schedule(plan, writer.next_repeat, writer.runs)
     names = {key: program.name for key, program in job.programs.items()}
-    waiting = unjudged(writer.session)
-    station = Station(Sequencer(plan, schedule, programs=names, patience=job.patience, waiting=waiting), source)
+    sequencer = Sequencer(
+        plan,
+        schedule,
+        programs=names,
+        patience=job.patience,
+        waiting=unjudged(writer.session),
+        rate_hz=job.rate_hz,
+    )
+    station = Station(sequencer, source)
     # Real runs bear the computer's time, so that they fit what thermometers log.
     now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
     storage = Storage(writer, now, kept)

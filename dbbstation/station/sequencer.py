@@ -6,6 +6,8 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.sampling import sampling
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Command, GoTo, Judge, Pause, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.detector import CircleWatch, EdgeDetector, Patience
@@ -57,6 +59,7 @@ class Sequencer:
         programs: name of the NC program that commands a test and direction; the plan's nominal circle where absent.
         patience: how long is waited for the machine.
         waiting: runs that were recorded before and have no verdict, oldest first; they are judged before anything is measured.
+        rate_hz: readings per second that the instrument brings; None: not known.
     """
 
     def __init__(
@@ -67,12 +70,14 @@ class Sequencer:
         programs: Mapping[tuple[str, Direction], str] | None = None,
         patience: Patience | None = None,
         waiting: Sequence[Waiting] = (),
+        rate_hz: float | None = None,
     ) -> None:
         self.state = State.BETWEEN
         self.plan = plan
         self.schedule = schedule
         self._programs = programs or {}
         self._patience = patience or Patience()
+        self._rate_hz = rate_hz
         self._out: list[Event] = []
         self._samples: list[Sample] = []
         self._run: RunId | None = None
@@ -155,6 +160,7 @@ class Sequencer:
         test = self.plan.tests[run.test]
         program = self._programs.get((run.test, run.direction), "")
         circle = test.run(run.direction)
+        seen = None if self._rate_hz is None else sampling(circle, self._rate_hz)
         announced = events.RunAnnounced(
             run=run,
             ball=test.ball,
@@ -163,7 +169,8 @@ class Sequencer:
             program=program,
             number=number,
             count=len(self.schedule.tasks),
-            instructions=instructions(test.ball, circle, put_up=put_up, program=program),
+            instructions=instructions(test.ball, circle, put_up=put_up, program=program, sampling=seen),
+            sampling=seen,
         )
         self._out.append(announced)
 
@@ -259,6 +266,9 @@ class Sequencer:
             self._move(Cause.FED_OUT)
         elif self.state is State.LEAVING and self._record.left(sample.t_s):
             self._move(Cause.CIRCLE_FOUND if self._complete() else Cause.CIRCLE_MISSING)
+        elif reading.status != "ok" and sample.phi_deg is not None and 0.0 <= sample.phi_deg <= FULL_TURN_DEG:
+            self._complete(problem=_length_gone(reading, sample.phi_deg))
+            self._move(Cause.LENGTH_GONE)
         else:
             self._check_patience(reading)
         self._tell_progress()
@@ -365,6 +375,13 @@ class Sequencer:
         self._flush()
         out, self._out = self._out, []
         return out
+
+
+def _length_gone(reading: Reading, phi_deg: float) -> str:
+    """Say what the instrument told in the middle of the turn: what is missing there, no fit brings back."""
+    said = f" ({reading.said})" if reading.said else ""
+    what = f"the instrument reports {reading.status}{said} at {phi_deg:.0f}° of the turn"
+    return f"{what}; {reading.remedy or 'check bar and instrument'}, then repeat the run"
 
 
 def _remedy(circle: Circle) -> str:

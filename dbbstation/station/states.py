@@ -50,6 +50,7 @@ class Cause(StrEnum):
     FED_OUT = "the bar fed out"
     CIRCLE_FOUND = "the recording holds the circle"
     CIRCLE_MISSING = "the recording does not hold the circle"
+    LENGTH_GONE = "the instrument has no length on the circle"
     LATE = "what was waited for did not come in time"
     FAILED = "instrument or storage failed"
 
@@ -78,7 +79,9 @@ TRANSITIONS: Mapping[State, Mapping[Cause, State]] = MappingProxyType(
         | _OTHER_RUN
         | _ALWAYS,
         State.DWELLING: {Cause.FED_IN: State.TURNING, Cause.LATE: State.FLAWED} | _GIVEN_UP | _ALWAYS,
-        State.TURNING: {Cause.FED_OUT: State.LEAVING, Cause.LATE: State.FLAWED} | _GIVEN_UP | _ALWAYS,
+        State.TURNING: {Cause.FED_OUT: State.LEAVING, Cause.LENGTH_GONE: State.FLAWED, Cause.LATE: State.FLAWED}
+        | _GIVEN_UP
+        | _ALWAYS,
         State.LEAVING: {Cause.CIRCLE_FOUND: State.COMPLETE, Cause.CIRCLE_MISSING: State.FLAWED} | _GIVEN_UP | _ALWAYS,
         State.COMPLETE: {Cause.ACCEPT: State.BETWEEN} | _GIVEN_UP | _ALWAYS,
         State.FLAWED: _GIVEN_UP | _ALWAYS,

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -21,6 +21,7 @@ from tests.station.readings import kinds, run_readings, still
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from dbbstation.instrument.reading import Status
     from dbbstation.plan.plan import Plan
 
 
@@ -29,7 +30,7 @@ def plan(plan_file: Path) -> Plan:
     return read_plan(plan_file)
 
 
-def made(plan: Plan, **more: Patience) -> Sequencer:
+def made(plan: Plan, **more: Any) -> Sequencer:
     taken: dict[tuple[str, Direction], int] = {}
 
     def next_repeat(test: str, direction: Direction) -> int:
@@ -184,17 +185,37 @@ def test_a_machine_that_stops_in_the_run_ends_it(plan: Plan, length_mm: float, w
     assert f"no {what} seen" in completed.problem
 
 
-def test_readings_without_a_number_are_kept_and_not_used(plan: Plan) -> None:
+@pytest.mark.parametrize("status", ["fault", "overrange"])
+def test_readings_without_a_length_are_kept_in_the_dwells_and_not_used(plan: Plan, status: Status) -> None:
     sequencer = made(plan)
     sequencer.begin()
     run = run_readings(plan.tests["a"].circle)
-    for k in (500, 501, 502, 503):
-        run[k] = replace(run[k], length_mm=None, status="fault", said="signal lost")
+    for k in (5, 6, len(run) - 12, len(run) - 11):
+        run[k] = replace(run[k], length_mm=None, status=status, said="signal lost")
     told = sequencer.command(Start()) + sequencer.readings(run)
     assert sequencer.state is State.COMPLETE
     samples = [sample for event in told if isinstance(event, events.SamplesRecorded) for sample in event.samples]
-    assert [sample.status for sample in samples].count("fault") == 4
+    assert [sample.status for sample in samples].count(status) == 4
     assert all(sample.length_mm is not None for sample in samples)
+
+
+@pytest.mark.parametrize("status", ["fault", "overrange"])
+def test_a_reading_without_a_length_on_the_turn_ends_the_run_with_a_message(plan: Plan, status: Status) -> None:
+    """What is missing there no fit brings back, and the machine need not go on to its end for it."""
+    sequencer = made(plan)
+    sequencer.begin()
+    run = run_readings(plan.tests["a"].circle)
+    run[700] = replace(run[700], status=status, said="signal lost", remedy="seat the bar")
+    told = sequencer.command(Start()) + sequencer.readings(run)
+    assert sequencer.state is State.FLAWED
+    samples = [sample for event in told if isinstance(event, events.SamplesRecorded) for sample in event.samples]
+    assert samples[-1].status == status  # it stands in the file, and nothing behind it
+    completed = next(event for event in told if isinstance(event, events.RunCompleted))
+    phi_deg = samples[-1].phi_deg
+    assert phi_deg is not None
+    what = f"the instrument reports {status} (signal lost) at {phi_deg:.0f}° of the turn; seat the bar, then repeat the run"
+    assert completed.problem == what
+    assert kinds(sequencer.command(Repeat())) == ["RunRejected", "RunAnnounced"]
 
 
 def test_one_misread_line_is_no_movement(plan: Plan) -> None:
@@ -321,3 +342,16 @@ def test_nothing_is_waited_for_in_a_pause(plan: Plan) -> None:
     assert sequencer.state is State.PAUSED
     assert kinds(sequencer.command(Resume())) == ["RunAnnounced"]
     assert sequencer.state is State.ANNOUNCED
+
+
+def test_the_set_up_says_what_the_instrument_is_too_slow_for(plan: Plan) -> None:
+    """Two points per undulation; fewer than 36 on a turn are no circle."""
+    circle = plan.tests["a"].circle
+    turn_s = 360.0 / circle.turning_deg_s
+    for points, said in ((1000, ""), (50, "50 points per turn: undulations above 25"), (20, "which is no circle")):
+        sequencer = made(plan, rate_hz=points / turn_s)
+        announced = next(event for event in sequencer.begin() if isinstance(event, events.RunAnnounced))
+        assert announced.sampling is not None
+        assert announced.sampling.points_per_turn == pytest.approx(points)
+        assert said in announced.instructions[-1]
+        assert ("points per turn" in announced.instructions[-1]) == bool(said)

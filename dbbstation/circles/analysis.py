@@ -103,7 +103,7 @@ def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter =
     path = path_of(raw, chosen) if chosen else plain
     measured = figures(raw)
     residual_um = 1e3 * plain.least_squares.deviation_mm
-    noise = noise_of(residual_um, raw.length_mm)
+    noise = noise_of(_without_drift(raw, residual_um), raw.phi_deg, raw.length_mm)
     sigma = noise.sigma_um
     steps = (step_at(raw, residual_um, theta_deg, sigma) for theta_deg in AXES_DEG)
     radius_error_um = 1e3 * (plain.least_squares.radius_mm - plain.radius_mm)
@@ -127,6 +127,12 @@ def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter =
         lost=0 if recording is None else lost_samples(recording.t_s),
         residual_um=residual_um,
     )
+
+
+def _without_drift(raw: RawCircle, residual_um: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Deviations of a turn whose end meets its beginning: a step there would stand in every line of the spectrum."""
+    apart = closure_of(raw, residual_um, 0.0)
+    return residual_um if apart is None else residual_um - apart.height_um * raw.phi_deg / FULL_TURN_DEG
 
 
 def _extremes(deviation_um: NDArray[np.float64]) -> Deviations:

@@ -7,24 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.harmonics import bands, coefficients, noise_spectrum
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-BAND_UPR = (50, 250)
-"""Undulations per revolution between which noise is read: a hexapod's form, screws included, lies below, and what is left
-there of reversals is a few of two hundred lines, which a median does not see."""
-
-SAMPLES_PER_UNDULATION = 2.5
-"""Samples of the shortest undulation that is looked at: fewer would show others in its place."""
-
-FEWEST_LINES = 8
-"""Lines of the spectrum below which its median says nothing."""
-
-_MEDIAN = float(np.log(2.0))
-"""Median of a line's power over its mean: power is exponentially distributed."""
-
-_HANN_LINES = 2.0 / 3.0
-"""Independent lines per line under a Hann window."""
+FEWEST_SAMPLES = 100
+"""Samples of a turn below which its spectrum holds no noise apart from its form."""
 
 
 @dataclass(frozen=True)
@@ -50,28 +39,29 @@ class CircleNoise:
         return float(np.hypot(np.nan_to_num(self.slow_um), self.resolution_um / np.sqrt(12.0)))
 
 
-def noise_of(deviation_um: NDArray[np.float64], reading_mm: NDArray[np.float64]) -> CircleNoise:
+def noise_of(
+    deviation_um: NDArray[np.float64], phi_deg: NDArray[np.float64], reading_mm: NDArray[np.float64]
+) -> CircleNoise:
     """Return the noise of a circle.
 
-    The level of the lines between 50 and 250 undulations per revolution is taken to hold below them too. Noise that remembers
-    for longer than a degree or two is louder there and is underestimated.
+    The spectrum above 30 undulations per revolution, a floor and a first-order process, is continued below: readings resemble
+    their neighbours, and slow figures then feel more noise than single readings have (`dbbstation.inference.harmonics`).
 
     Args:
-        deviation_um: radial deviations from the circle in time order, about equally spaced, shape (n,) [µm].
+        deviation_um: radial deviations from the circle in time order, what drifted over the turn taken off, shape (n,) [µm].
+        phi_deg: progress along the turn, about equally spaced, shape (n,) [deg].
         reading_mm: the readings that they come from, for the step in which they come, shape (n,) [mm].
     """
-    count = len(deviation_um)
-    window = np.hanning(count)
-    lines = np.abs(np.fft.rfft(window * (deviation_um - deviation_um.mean()))) ** 2 / np.sum(window**2)
-    last = min(BAND_UPR[1], int(count / SAMPLES_PER_UNDULATION))
-    band = lines[BAND_UPR[0] : last + 1]
     resolution_um = 1e3 * _step_mm(reading_mm)
-    if len(band) < FEWEST_LINES:
-        return CircleNoise(float("nan"), float("nan"), resolution_um, 0.0)
-    slow = float(np.sqrt(np.median(band) / _MEDIAN))
-    reading = float(np.sqrt(np.mean(lines[BAND_UPR[0] :])))
-    # A median knows a mean as well as half as many lines: its variance is 1 / (n ln²2) against 1 / n.
-    return CircleNoise(slow, reading, resolution_um, 2.0 * len(band) * _HANN_LINES * _MEDIAN**2)
+    if len(deviation_um) < FEWEST_SAMPLES:
+        return CircleNoise(float("nan"), float("nan"), resolution_um, 1.0)
+    low, high = bands(len(deviation_um))
+    square = coefficients(deviation_um, np.radians(phi_deg), high)[1:] ** 2
+    spectrum = noise_spectrum((square[:high] + square[high:])[low:], low, 2.0)
+    lines = np.abs(np.fft.rfft(deviation_um)[low + 1 :]) ** 2 / len(deviation_um)
+    return CircleNoise(
+        float(np.sqrt(spectrum.power[0])), float(np.sqrt(np.mean(lines))), resolution_um, spectrum.freedom
+    )
 
 
 def _step_mm(reading_mm: NDArray[np.float64]) -> float:

@@ -7,16 +7,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.quality.finding import Finding, Name, Verdict, found, untold
-from dbbstation.quality.knowledge import HIGHEST_HARMONIC, Others, Seen, apart_um
-from dbbstation.quality.limits import length_quantile, quantile, ratio_quantile, scale_of
+from dbbstation.quality.knowledge import HIGHEST_HARMONIC, Others, Seen, across, apart_um
+from dbbstation.quality.limits import length_limit, length_quantile, quantile, ratio_quantile
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
 
 FEWEST_OTHERS = 3
 """Other pairs that must be there for their differences to say what is usual."""
+
+SCATTERING = 3
+"""Dimensions in which runs of one circle scatter at the least: where the ball came to stand in X and Y, and how long the bar is.
+The other four numbers scatter less; were they counted in full, a limit would be taken for better known than it is."""
 
 
 def direction(one: Seen, others: Others) -> Finding:
@@ -24,34 +27,37 @@ def direction(one: Seen, others: Others) -> Finding:
 
     A bar does not see which way the machine turns: feed-in and feed-out look alike, and either overlap passes its places twice.
     A circle that was run the wrong way shows its form mirrored about the axis through the start of the turn. So it can be told
-    where centre or form lie off that axis and something says on which side: the expected centre, the other direction or a
-    repeat.
+    where the circle lies off that axis and something says on which side: the expected centre, the other direction or a
+    repeat. Lag and friction of drives change sign with the direction too, and would look like a mirror image; but they come
+    back after half a turn, where both the speed and the direction of the bar are reversed: they have even undulations only
+    [linear in the speed, or in its sign]. Odd ones, the centre above all, are compared.
     """
-    against = others.opposite or others.earlier
     by_place = _by_place(one)
     if by_place is not None:
         return by_place
+    against = others.opposite or others.earlier
     if against is None:
-        return untold(
-            Name.DIRECTION,
-            "cannot be seen: no other run of this test, and the expected centre does not lie off the axis through the start",
-        )
-    mine, theirs = _across(one), _across(against)
-    apart, mirrored = np.linalg.norm(mine - theirs), np.linalg.norm(mine + theirs)
-    ratio = float(apart / max(mirrored, np.finfo(float).tiny))
-    limit = float(np.sqrt(ratio_quantile(HIGHEST_HARMONIC, HIGHEST_HARMONIC)))
+        why = "no other run of this test, and the expected centre does not lie off the axis through the start"
+        return untold(Name.DIRECTION, f"cannot be seen: {why}", "µm")
+    mine, theirs = across(one), across(against)
+    apart, mirrored = float(np.linalg.norm(mine - theirs)), float(np.linalg.norm(mine + theirs))
     told = f"off the axis through the start it is {apart:.1f} µm from run {against.run.label}, {mirrored:.1f} µm from its mirror image"
-    if ratio > limit:
+    if len(others.across_um) < FEWEST_OTHERS:
+        # What both may differ by is not known: it is taken from the smaller of the two, with Fisher's limit.
+        limit = mirrored * float(np.sqrt(ratio_quantile(len(mine), len(mine))))
+        least = apart * float(np.sqrt(ratio_quantile(len(mine), len(mine))))
+    else:
+        by_noise = length_quantile(len(mine)) * float(np.hypot(one.u_um, against.u_um))
+        limit = least = max(by_noise, length_limit(others.across_um, len(mine)))
+    if apart > limit >= mirrored:
         why = f"{told}: one of both was run the wrong way round; run both again"
-        return Finding(Name.DIRECTION, ratio, limit, "", Verdict.WRONG, why)
-    if ratio * limit > 1.0:
-        return Finding(Name.DIRECTION, ratio, limit, "", Verdict.CANNOT_TELL, f"{told}: too alike to tell")
-    return Finding(Name.DIRECTION, ratio, limit, "", Verdict.GOOD, told)
-
-
-def _across(one: Seen) -> NDArray[np.float64]:
-    """Coefficients of what changes sign when the circle is mirrored about the axis through its start, shape (3,) [µm]."""
-    return one.coefficients_um[HIGHEST_HARMONIC + 1 :]
+        return Finding(Name.DIRECTION, apart, limit, "µm", Verdict.WRONG, why)
+    if mirrored > least >= apart:
+        return Finding(Name.DIRECTION, apart, limit, "µm", Verdict.GOOD, told)
+    why = (
+        "too alike to tell" if max(apart, mirrored) <= max(limit, least) else "neither of them; something else differs"
+    )
+    return Finding(Name.DIRECTION, apart, limit, "µm", Verdict.CANNOT_TELL, f"{told}: {why}")
 
 
 def _by_place(one: Seen) -> Finding | None:
@@ -106,7 +112,7 @@ def _beside(
             return found(name, value, by_noise, "µm", told, told)
         why = f"{told}, {by_noise:.1f} µm by noise: a fault of one of both or {else_}; fewer than {FEWEST_OTHERS} other pairs"
         return untold(name, why, "µm", value)
-    size, freedom = scale_of([apart for apart, _ in usual])
-    limit = max(by_noise, quantile(freedom) * size)
-    wrong = f"{told}, {0.6745 * size:.1f} µm usual in this session: something moved between both; run both again"
+    lengths = [apart for apart, _ in usual]
+    limit = max(by_noise, length_limit(lengths, SCATTERING))
+    wrong = f"{told}, {np.median(lengths):.1f} µm usual in this session: something moved between both; run both again"
     return found(name, value, limit, "µm", told, wrong)

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.quality.finding import Finding, Name, found
-from dbbstation.quality.limits import largest_of, scale_of
+from dbbstation.quality.limits import ROBUST_SHARE, largest_of, scale_of
 from dbbstation.trace.gaussian import gaussian
 
 if TYPE_CHECKING:
@@ -91,18 +91,19 @@ def _peaks(one: CircleAnalysis, rest: NDArray[np.float64], near: NDArray[np.int6
     means = np.convolve(rest, np.full(samples, 1.0 / samples), mode="valid")
     middle = np.arange(len(means)) + samples // 2
     theta_deg, beside = one.raw.theta_deg[middle], near[middle]
-    noise = one.noise.sigma_um / np.sqrt(samples)
     # The two ends of the turn do not meet where anything drifted: the filter makes a step of that.
     phi = one.raw.phi_deg[middle]
     inner = (phi > REVERSAL_DEG) & (phi < FULL_TURN_DEG - REVERSAL_DEG)
     found_peaks = []
     away = np.flatnonzero(inner & (beside < 0))
-    if len(away):
-        scale = max(scale_of(list(means[away]))[0], noise)
-        # Stretches overlap: so many are independent, for each width that is tried.
-        independent = len(WIDTHS_DEG) * max(len(away) / samples, 1.0) * 2.0
-        limit = largest_of(independent, one.noise.freedom) * scale
-        top = away[int(np.argmax(np.abs(means[away])))]
+    usual = 0.0
+    if len(away) >= FEWEST * samples:
+        # Not the noise of the spectrum, which a bump itself makes louder: the median of the stretches does not see one. They
+        # overlap, so that fewer are independent: half a width apart they are all but so.
+        usual, _ = scale_of(list(means[away]))
+        apart = len(away) / samples
+        limit = largest_of(2.0 * apart * len(WIDTHS_DEG), ROBUST_SHARE * apart) * usual
+        top = _top(means, away)
         found_peaks.append(_Peak(float(means[top]), limit, float(theta_deg[top]), width_deg, at_reversal=False))
     numbers = [n for n in np.unique(beside[inner]) if n >= 0]
     tops = [_top(means, np.flatnonzero(inner & (beside == n))) for n in numbers]
@@ -111,7 +112,7 @@ def _peaks(one: CircleAnalysis, rest: NDArray[np.float64], near: NDArray[np.int6
         if len(others) < FEWEST:
             continue
         scale, freedom = scale_of(others)
-        limit = largest_of(len(tops) * len(WIDTHS_DEG), freedom) * max(scale, noise)
+        limit = largest_of(len(tops) * len(WIDTHS_DEG), freedom) * max(scale, usual)
         found_peaks.append(_Peak(float(means[top]), limit, float(theta_deg[top]), width_deg, at_reversal=True))
     return found_peaks
 

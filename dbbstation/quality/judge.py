@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dbbstation.quality.between import direction, other_direction, repeat
 from dbbstation.quality.finding import Finding, Name
-from dbbstation.quality.knowledge import Others, Run, Seen, apart_um, seen
+from dbbstation.quality.knowledge import Others, Run, Seen, across, apart_um, seen
 from dbbstation.quality.place import bore, radius
 from dbbstation.quality.single import by_itself
 
@@ -99,6 +101,11 @@ class SessionRuns:
             ),
             directions_um=tuple(apart for a, b, apart in self._directions if one is not a and one is not b),
             repeats_um=tuple(apart for a, b, apart in self._repeats if one is not a and one is not b),
+            across_um=tuple(
+                float(np.linalg.norm(across(a) - across(b)))
+                for a, b, _ in self._directions
+                if one is not a and one is not b
+            ),
             opposite=self._opposite(one),
             earlier=self._earlier(one),
         )

@@ -132,6 +132,7 @@ class Others:
         drift_um: drift over the turn of each, likewise [µm].
         directions_um: root mean square of the difference of both directions, of each other circle, likewise [µm].
         repeats_um: the same of repeats.
+        across_um: difference of both directions, of each other circle, off the axis through the start of the turn [µm].
         opposite: same test, mounting and repeat in the other direction; None where there is none.
         earlier: same test and direction, the repeat before; None where there is none.
     """
@@ -141,6 +142,7 @@ class Others:
     drift_um: tuple[tuple[float, float], ...] = ()
     directions_um: tuple[tuple[float, float], ...] = ()
     repeats_um: tuple[tuple[float, float], ...] = ()
+    across_um: tuple[float, ...] = ()
     opposite: Seen | None = None
     earlier: Seen | None = None
 
@@ -148,3 +150,8 @@ class Others:
 def apart_um(one: Seen, other: Seen) -> tuple[float, float]:
     """Root mean square of the difference of two runs up to three undulations, and each coefficient's uncertainty [µm]."""
     return float(np.linalg.norm(one.coefficients_um - other.coefficients_um)), float(np.hypot(one.u_um, other.u_um))
+
+
+def across(one: Seen) -> NDArray[np.float64]:
+    """Odd coefficients that change sign when a circle is mirrored about the axis through its start, shape (2,) [µm]."""
+    return one.coefficients_um[HIGHEST_HARMONIC + 1 :][::2]

@@ -66,13 +66,27 @@ def scale_of(values: Sequence[float]) -> tuple[float, float]:
     """
     if not values:
         return 0.0, 0.0
-    return float(np.median(np.abs(values))) / _NORMAL_MEDIAN, _EFFICIENCY * len(values)
+    return float(np.median(np.abs(values))) / _NORMAL_MEDIAN, ROBUST_SHARE * len(values)
 
 
 _NORMAL_MEDIAN = 0.674490
 """Median of the size of a normal value of standard deviation one."""
 
-_EFFICIENCY = 0.37
+ROBUST_SHARE = 0.37
+"""Share of values that a median of sizes knows a standard deviation as well as: 37 sound ones of 100 that may be spoilt."""
+
+
+def length_limit(lengths: Sequence[float], dimensions: int) -> float:
+    """Length that a sound vector passes with probability SHARE, where other vectors of its kind are known [Fisher].
+
+    Args:
+        lengths: of the others, of which some may be spoilt: the median of their squares counts.
+        dimensions: in which they scatter alike.
+    """
+    median = float(chdtri(dimensions, 0.5)) / dimensions
+    variance = float(np.median(np.square(lengths))) / median
+    known = ROBUST_SHARE * dimensions * len(lengths)
+    return float(np.sqrt(variance * ratio_quantile(dimensions, max(known, 1.0))))
 
 
 def joined(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -41,7 +41,15 @@ def judge_session(
         model: of the machine; None: only the usual sizes of what machines have are known.
         progress: told how many of how many runs are analysed.
     """
-    return judge([_run(session, run, recording, model) for run, recording in wanted], progress)
+    runs = runs_of(session, wanted, model)
+    return judge(runs, progress)
+
+
+def runs_of(
+    session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]], model: IdentifiedModel | None = None
+) -> tuple[Run, ...]:
+    """Return runs of a session as they are judged; arguments as of `judge_session`."""
+    return tuple(_run(session, run, recording, model) for run, recording in wanted)
 
 
 def _run(session: SessionFolder, run: RunEntry, recording: Recording, model: IdentifiedModel | None) -> Run:

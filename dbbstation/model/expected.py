@@ -45,7 +45,9 @@ def expected_circle(
     Raises:
         KinematicsError: the machine cannot take the circle.
     """
-    sparse = replace(observation, raw=averaged(observation.raw, SECTORS), commanded=None)
+    # A ball that was put up under the spindle has no place of its own; its circle has a radius like any other.
+    setup = replace(observation.setup, place_known=True, set_up_errors=None)
+    sparse = replace(observation, raw=averaged(observation.raw, SECTORS), commanded=None, setup=setup)
     motion = sparse.motion()
     identified = known_by if isinstance(known_by, IdentifiedModel) else None
     model = (known_by.model if isinstance(known_by, IdentifiedModel) else known_by).of_the_machine()

@@ -80,7 +80,7 @@ def measure(
     """
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
-    from dbbstation.files.recordings.session_writer import SessionDetails
+    from dbbstation.files.recordings.session_text import SessionDetails
     from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.library import at_rate, load_instrument
     from dbbstation.station.assembly import Job, assemble

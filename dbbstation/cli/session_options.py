@@ -11,8 +11,8 @@ from dbbstation.cli.shop import shop_option
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.files.recordings.session import Bar
-    from dbbstation.files.recordings.session_writer import SessionDetails
+    from dbbstation.files.recordings.entries import Bar
+    from dbbstation.files.recordings.session_text import SessionDetails
 
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
@@ -63,7 +63,7 @@ def session_details(
     Raises:
         click.UsageError: length without uncertainty, or something of the bar without either.
     """
-    from dbbstation.files.recordings.session_writer import SessionDetails
+    from dbbstation.files.recordings.session_text import SessionDetails
 
     bar = _bar(bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c, stroke_mm)
     return SessionDetails(serial_number, operator, ambient_temp_c, bar)
@@ -76,7 +76,7 @@ def _bar(
     temp_c: float | None,
     stroke_mm: float | None,
 ) -> Bar | None:
-    from dbbstation.files.recordings.session import Bar
+    from dbbstation.files.recordings.entries import Bar
 
     if length_mm is None and uncertainty_um is None:
         if serial_number or temp_c is not None:

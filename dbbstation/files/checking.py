@@ -13,15 +13,9 @@ from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.run_csv import PART, read_run
-from dbbstation.files.recordings.session import (
-    SESSION_FILE,
-    RunState,
-    SessionFolder,
-    no_session,
-    parse_session,
-    unlisted_sealed,
-)
+from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, no_session, parse_session, unlisted_sealed
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.trace.loss import lost_samples
 
@@ -160,6 +154,11 @@ def _session(checked: Checked) -> None:
     session = parse_session(checked.path, checked.problems)
     if session is None or checked.problems:
         return
+    checked.warnings += [
+        Problem(str(run.path), 0, 0, f"samples: {run.counts.text}")
+        for run in session.runs
+        if run.counts is not None and (run.counts.lost or run.counts.rejected)
+    ]
     for run in session.runs:
         try:
             read = session.load(run)
@@ -178,7 +177,13 @@ def _session(checked: Checked) -> None:
         session.plan.check(session.machine)
     except TravelError as error:
         checked.problems.append(Problem(str(session.plan_path), 0, 0, f"{error.where}: {error.what}", error.remedy))
-    checked.summary = f"session: {_states(session)}"
+    checked.warnings += [Problem(str(session.folder), 0, 0, amendment.text) for amendment in session.amendments]
+    seal = "sealed" if session.seal is not None else NO_SEAL
+    checked.summary = f"session: {_states(session)}; {seal}"
+
+
+NO_SEAL = "it carries no seal (`dbbstation session seal` writes one)"
+"""What is said of sessions of older programs, and of those that were written by hand: a changed plan is not noticed there."""
 
 
 def _states(session: SessionFolder) -> str:

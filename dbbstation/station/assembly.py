@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.recordings.bar_reach import unlike_bar
-from dbbstation.files.recordings.session_writer import SessionDetails
+from dbbstation.files.recordings.session_text import SessionDetails
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.opening import last_end, open_session
@@ -104,8 +104,9 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     }
     schedule = Schedule(plan, writer.next_repeat, writer.runs)
     names = {key: program.name for key, program in job.programs.items()}
-    station = Station(Sequencer(plan, schedule, programs=names, patience=job.patience), source)
     storage = Storage(writer, time_of_day(job.clock, last_end(writer.session)), kept)
+    sequencer = Sequencer(plan, schedule, storage.recorded, programs=names, patience=job.patience)
+    station = Station(sequencer, source)
     station.subscribe(storage)
     station.regularly(storage.sync_if_due)
     return Workplace(station, schedule, writer, storage)

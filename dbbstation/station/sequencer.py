@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Plan
     from dbbstation.station.events import Event, RunId, Sample
+    from dbbstation.station.run_record import Recorded
     from dbbstation.station.schedule import Schedule
 
 
@@ -39,6 +40,7 @@ class Sequencer:
     Args:
         plan: what is measured.
         schedule: what is left of it.
+        recorded: gives back the run that goes on, once it is complete.
         programs: name of the NC program that commands a test and direction; the plan's nominal circle where absent.
         patience: how long is waited for the machine.
     """
@@ -47,6 +49,7 @@ class Sequencer:
         self,
         plan: Plan,
         schedule: Schedule,
+        recorded: Recorded,
         *,
         programs: Mapping[tuple[str, Direction], str] | None = None,
         patience: Patience | None = None,
@@ -54,6 +57,7 @@ class Sequencer:
         self.state = State.BETWEEN
         self.plan = plan
         self.schedule = schedule
+        self._recorded = recorded
         self._programs = programs or {}
         self._patience = patience or Patience()
         self._out: list[Event] = []
@@ -249,7 +253,8 @@ class Sequencer:
             raise RuntimeError(f"no run is recorded while {self.state}")
         found = None
         if not problem:
-            found, problem = record.circle_figures(self.plan.largest_loss_percent)
+            recording = self._recorded(record.run, self._untold(record.run))
+            found, problem = record.circle_figures(recording, self.plan.largest_loss_percent)
         self._out.append(events.RunCompleted(record.run, len(record), record.lost, found, problem))
         self._edges = None
         return found is not None
@@ -281,6 +286,11 @@ class Sequencer:
             self._out.append(events.SamplesRecorded(self._record.run, samples))
         else:
             self._out.append(events.ReadingsSeen(samples))
+
+    def _untold(self, run: RunId) -> list[Sample]:
+        """Samples of a run that nobody has been told of yet."""
+        batches = (event for event in self._out if isinstance(event, events.SamplesRecorded) and event.run == run)
+        return [sample for batch in batches for sample in batch.samples]
 
     def _told(self) -> list[Event]:
         self._flush()

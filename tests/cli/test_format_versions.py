@@ -28,6 +28,7 @@ STORED = {
     "dbb-settings/1": FIXTURES / "settings" / "every-key.yaml",
     "dbb-session/1": FIXTURES / "sessions" / "under-spindle",
     "dbb-session/2": FIXTURES / "sessions" / "small",
+    "dbb-session/3": FIXTURES / "sessions" / "sealed",
 }
 """One stored file of each version."""
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from dbbstation.errors import InstrumentError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
+from dbbstation.files.recordings.entries import Counts
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import Direction
@@ -19,7 +21,7 @@ from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import State
 from tests.station.bench import MACHINE_FILE
-from tests.station.readings import run_readings
+from tests.station.readings import all_untold, run_readings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,7 +54,7 @@ class Script:
 
 def made(plan_file: Path, source: Script) -> Station:
     plan = read_plan(plan_file)
-    return Station(Sequencer(plan, Schedule(plan, lambda *_: 1)), source)
+    return Station(Sequencer(plan, Schedule(plan, lambda *_: 1), all_untold), source)
 
 
 def test_commands_from_another_thread_wake_it(plan_file: Path) -> None:
@@ -136,3 +138,37 @@ def test_what_is_stored_is_what_was_read(plan_file: Path, tmp_path: Path) -> Non
         ]
         assert stored.t_s.tolist() == pytest.approx([sample.t_s for sample in seen], abs=1e-6)
         assert stored.length_mm.tolist() == pytest.approx([sample.length_mm for sample in seen], abs=1e-6)
+
+
+def test_what_came_over_the_line_is_counted_in_run_file_and_session(plan_file: Path, tmp_path: Path) -> None:
+    plan = read_inline_plan(plan_file)
+    readings = run_readings(plan.to_domain().tests["a"].circle, 1000.0)
+    # Behind the feed-in, where the run has begun for certain; few enough for the plan.
+    readings[300] = replace(readings[300], lost=2)
+    readings[400] = replace(readings[400], length_mm=None, status="fault", said="signal lost")
+    readings[401] = replace(readings[401], status="overrange", said="beyond its range")
+    readings[402] = replace(readings[402], status="overrange", said="beyond its range")
+    source = Script(readings)
+    workplace = assemble(Job(read_machine(MACHINE_FILE), plan, tmp_path / "session"), source)
+    station = workplace.station
+    told: list[events.Event] = []
+
+    def judge(event: events.Event) -> None:
+        told.append(event)
+        if isinstance(event, events.StateChanged) and event.state is State.COMPLETE:
+            station.send(Accept())
+        elif isinstance(event, events.RunAnnounced):
+            station.send(Quit() if event.run.direction is Direction.CW else Start())
+
+    for observer in (source, judge):
+        station.subscribe(observer)
+    station.run()
+    workplace.close()
+    (run,) = read_session(tmp_path / "session").runs
+    completed = next(event for event in told if isinstance(event, events.RunCompleted))
+    text = run.path.read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line[0].isdigit()]
+    assert run.counts == Counts(len(rows), 2, {"fault": 1, "overrange": 2})
+    assert completed.samples == len(rows)
+    assert text.endswith(f"# received: {len(rows)}\n# lost: 2\n# rejected fault: 1\n# rejected overrange: 2\n")
+    assert read_run(run.path).header["lost"] == "2"

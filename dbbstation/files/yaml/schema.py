@@ -26,7 +26,7 @@ _OF_MACHINES = {"greatest_feed_mm_min": 2, "greatest_turn_deg_min": 2}
 
 SINCE: dict[str, dict[str, int]] = {
     "dbb-plan": {"largest_loss_percent": 2},
-    "dbb-session": {"stroke_mm": 2},
+    "dbb-session": {"stroke_mm": 2, "seal": 3, "amendments": 3, "chain_sha256": 3, "counts": 3},
     "dbb-instrument": {"stroke_mm": 2},
     "dbb-machine": _OF_MACHINES,
     "dbb-model": {**_OF_MACHINES, "provenance": 3},

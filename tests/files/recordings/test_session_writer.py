@@ -11,8 +11,10 @@ import pytest
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.session import Bar, RunState, read_session
-from dbbstation.files.recordings.session_writer import FinishedRun, SessionDetails, SessionWriter, write_session
+from dbbstation.files.recordings.entries import Bar, RunState
+from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.session_text import SessionDetails
+from dbbstation.files.recordings.session_writer import FinishedRun, SessionWriter, write_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 
@@ -47,7 +49,7 @@ def reread(writer: SessionWriter) -> list[tuple[str, str, str]]:
 def test_a_new_session_holds_machine_and_plan(writer: SessionWriter, machine) -> None:
     session = read_session(writer.session.folder)
     assert sorted(path.name for path in session.folder.iterdir()) == [
-        ".lock", "machine.yaml", "plan.yaml", "programs", "runs", "session.yaml"
+        ".lock", "machine.yaml", "plan.yaml", "programs", "runs", "sealed", "session.yaml"
     ]  # fmt: skip
     assert session.plan == PLAN.to_domain()
     assert np.array_equal(session.machine.hexapod.base_joints_mm, machine.hexapod.base_joints_mm)

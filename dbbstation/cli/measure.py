@@ -13,6 +13,7 @@ import click
 
 from dbbstation.cli.instrument_options import instrument_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.session_options import session_details, session_options
 
@@ -36,14 +37,14 @@ _AUTO_PATIENCE_S = 60.0
 @click.option("--auto", metavar="URL", help="Start each circle at this control address of `emulate`, accept every run.")
 @click.option(
     "--time-scale",
-    type=click.FloatRange(0.01, 200.0),
+    type=Finite(0.01, 200.0),
     default=1.0,
     show_default=True,
     help="The same factor as of `emulate`.",
 )
 @click.option(
     "--rate-hz",
-    type=click.FloatRange(0.1, 100000.0),
+    type=Finite(0.1, 100000.0),
     help="Sampling rate [1/s], where it is not the instrument's usual one.",
 )
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 
 if TYPE_CHECKING:
@@ -19,23 +20,23 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 _OPTIONS = (
     click.option("--operator", default="", help="Name of the operator."),
     shop_option("--serial-number", setting="serial_number", default="", help="Serial number of the machine."),
-    click.option("--ambient-temp-c", type=float, help="Temperature of the shop [degC]."),
+    click.option("--ambient-temp-c", type=Finite(), help="Temperature of the shop [degC]."),
     shop_option("--bar-serial-number", setting="bar.serial_number", default="", help="Serial number of the bar."),
     shop_option(
         "--bar-length-mm",
         setting="bar.calibrated_length_mm",
-        type=float,
+        type=Finite(),
         help="Calibrated distance between the ball centres [mm]; held against the plan's radii, never added to readings.",
     ),
     shop_option(
         "--bar-uncertainty-um",
         setting="bar.calibrator_uncertainty_mm",
         factor=1e3,
-        type=float,
+        type=Finite(),
         help="Standard uncertainty u of that length [µm].",
     ),
     shop_option(
-        "--bar-temp-c", setting="bar.temp_c", type=float, help="Temperature of the bar at its calibration [degC]."
+        "--bar-temp-c", setting="bar.temp_c", type=Finite(), help="Temperature of the bar at its calibration [degC]."
     ),
 )
 

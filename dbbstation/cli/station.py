@@ -14,6 +14,7 @@ import click
 
 from dbbstation.cli.instrument_options import instrument_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.session_options import session_details, session_options
 from dbbstation.cli.shop import from_settings
@@ -43,7 +44,7 @@ _DEMO_SEED = 3
 @click.option("--virtual", is_flag=True, help="Use a virtual machine and instrument.")
 @click.option(
     "--time-scale",
-    type=click.FloatRange(0.01, 50.0),
+    type=Finite(0.01, 50.0),
     default=1.0,
     show_default=True,
     help="Factor by which the virtual machine runs faster than real time, with --virtual.",

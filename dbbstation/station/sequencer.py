@@ -63,6 +63,7 @@ class Sequencer:
         self._out: list[Event] = []
         self._samples: list[Sample] = []
         self._run: RunId | None = None
+        self._commanded: Circle | None = None
         self._record: RunRecord | None = None
         self._edges: EdgeDetector | None = None
         self._waiting_since_s: float | None = None
@@ -122,7 +123,7 @@ class Sequencer:
         self._run = run = following.run
         test = self.plan.tests[run.test]
         program = self._programs.get((run.test, run.direction), "")
-        circle = test.run(run.direction)
+        self._commanded = circle = test.run(run.direction)
         announced = events.RunAnnounced(
             run=run,
             ball=test.ball,
@@ -267,8 +268,9 @@ class Sequencer:
         return self._run
 
     def _circle(self) -> Circle:
-        run = self._announced()
-        return self.plan.tests[run.test].run(run.direction)
+        if self._commanded is None:
+            raise RuntimeError(f"no circle was announced while {self.state}")
+        return self._commanded
 
     def _interrupted(self) -> RunId | None:
         return self._run if self.state in RECORDING else None

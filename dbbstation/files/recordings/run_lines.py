@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dbbstation.errors import Problem
-from dbbstation.files.source_text import decode
+from dbbstation.files.source_text import decode, shortened
 from dbbstation.trace import columns
 
 _COMMA, _NEWLINE = ord(","), ord("\n")
@@ -195,7 +195,7 @@ def _fault_of_fields(fields: list[bytes], names: tuple[str, ...]) -> tuple[str, 
     for name, text in zip(names, fields, strict=True):
         if name not in columns.COLUMNS:
             continue
-        shown = text.decode("utf-8", "replace").strip()
+        shown = shortened(text.decode("utf-8", "replace").strip())
         if not _NUMBER.fullmatch(text.strip()):
             kind = "not a finite number" if shown.lower().lstrip("+-") in {"nan", "inf", "infinity"} else "no number"
             return f"{name} is `{shown}`, {kind}", "write digits with a dot as decimal sign, leave no value out"

@@ -15,7 +15,7 @@ from dbbstation.cli.instrument_options import instrument_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
-from dbbstation.cli.session_options import session_details, session_options
+from dbbstation.cli.session_options import require_bar, session_details, session_options
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -64,6 +64,7 @@ def measure(
     programs: Path | None,
     rate_hz: float | None,
     largest_loss_percent: float | None,
+    largest_bar_age_h: float | None,
     as_json: bool,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> None:
@@ -76,7 +77,7 @@ def measure(
     \b
     Examples:
       dbbstation measure --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
-        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar-length-mm 150.0003 --bar-uncertainty-um 0.5
+        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
       dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `emulate`)
     """
     from dbbstation.files.formats.machine import read_machine
@@ -102,6 +103,8 @@ def measure(
         clock=clock,
     )
     job.check(str(plan_file))
+    if auto is None:  # a virtual machine has a bar of known length
+        require_bar(job, largest_bar_age_h)
     hands = None if auto is None else VirtualHands(auto)
     with Instrument(protocol, port, baud=baud, clock=clock, **driver_patience(time_scale)) as source:
         workplace = assemble(job, source)

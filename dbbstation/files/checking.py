@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, TravelError
+from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.every_format import SCHEMAS
 from dbbstation.files.formats.jig import parse_jig
 from dbbstation.files.formats.machine import parse_machine
@@ -80,6 +81,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         "dbb-jig": lambda: _jig(checked),
         "dbb-model": lambda: _model(checked, known_sources),
         "dbb-settings": lambda: _settings(checked),
+        "dbb-bar": lambda: _bar(checked),
     }
     name = str(given).partition("/")[0]
     if name in by_name:
@@ -124,6 +126,13 @@ def _settings(checked: Checked) -> None:
         return
     count = len(settings.values) + len(settings.tolerances)
     checked.summary = f"settings: {_count(count, 'value')}"
+
+
+def _bar(checked: Checked) -> None:
+    bar = parse_bar(checked.path, checked.problems)
+    if bar is not None:
+        long_um, u_um = 1e3 * (bar.readings.mean_mm - bar.length_mm), 1e3 * bar.uncertainty_mm
+        checked.summary = f"bar {bar.serial_number}: reads {long_um:+.2f} µm long, standard uncertainty {u_um:.2f} µm"
 
 
 def _run(checked: Checked) -> None:

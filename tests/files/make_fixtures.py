@@ -20,13 +20,14 @@ from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.amending import amend
-from dbbstation.files.recordings.entries import Bar, Counts
+from dbbstation.files.recordings.entries import Counts
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_set_up import SetUpReadings
 from dbbstation.files.recordings.session_text import SessionDetails
 from dbbstation.files.recordings.session_writer import FinishedRun, SessionWriter, write_session
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
@@ -54,8 +55,9 @@ def make_session(folder: Path) -> None:
             crc=True,
         )
         source = read_session(recorded)
-        bar = Bar("DBB-0042", 150.0003, 0.0005, BEGUN - timedelta(minutes=20), 20.3, 10.6, 10.0)
-        details = SessionDetails("PM600-0007", "first shift", 20.4, bar)
+        when = BEGUN - timedelta(minutes=20)
+        bar = Bar("DBB-0042", 150.0003, 0.0005, when, 20.3, 10.6, 10.0, 150.0005, 0.3, "ZB-150-17")
+        details = SessionDetails("PM600-0007", "first shift", 20.4, bar, "an example: the bar was on its calibrator")
         writer = SessionWriter.create(folder, source.machine, read_inline_plan(recorded / "plan.yaml"), details)
         runs = [source.runs[0], source.runs[1], *source.runs[1:]]
         for index, run in enumerate(runs):

@@ -56,6 +56,12 @@ class BarSchema(Schema):
     """Temperature of the bar then [degC]."""
     expansion_um_m_k: ExpansionUmMK | None = None
     """Thermal expansion of the bar [µm/(m K)]."""
+    reading_mm: Annotated[float, Quantity("mm", 20, 2_000)] | None = None
+    """What it read on its calibrator; the fit knows the difference, recorded lengths stay as read [mm]."""
+    temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)] | None = None
+    """Standard uncertainty of a temperature of the bar; where it is stated, the fit knows what the bar grew by [K]."""
+    calibrator_serial_number: str | None = None
+    """Of the calibrator."""
 
 
 class ProgramSchema(Schema):
@@ -187,6 +193,8 @@ class SessionFile(Schema):
     """Temperature of the shop [degC]."""
     bar: BarSchema | None = None
     """The bar."""
+    bar_waiver: str = ""
+    """Why it was measured without a fresh calibration of the bar."""
     set_up_errors: tuple[SetUpErrorsSchema, ...] = ()
     """Micrometer readings of balls that were put up under the spindle, one entry per mounting."""
     seal: SealSchema | None = None

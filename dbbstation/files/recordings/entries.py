@@ -9,6 +9,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from dbbstation.files.recordings.run_csv import sealed_or_part
+from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
 
 if TYPE_CHECKING:
@@ -106,29 +107,6 @@ class RunEntry:
     def label(self) -> str:
         """Name of the run in messages."""
         return f"{self.test} {self.direction} {self.repeat}"
-
-
-@dataclass(frozen=True)
-class Bar:
-    """The bar: nothing of it is added to readings; its length is held against the plan's radii.
-
-    Attributes:
-        serial_number: of the bar.
-        calibrated_length_mm: distance between the ball centres that its calibration found [mm].
-        calibrator_uncertainty_mm: of that length, one standard deviation [mm].
-        calibrated: when; None where not noted.
-        temp_c: of the bar then [degC]; None where not noted.
-        expansion_um_m_k: thermal expansion [µm/(m K)]; None where not noted.
-        stroke_mm: travel of its gauge from that length, either way [mm]; None where not noted.
-    """
-
-    serial_number: str
-    calibrated_length_mm: float
-    calibrator_uncertainty_mm: float
-    calibrated: datetime | None
-    temp_c: float | None
-    expansion_um_m_k: float | None
-    stroke_mm: float | None = None
 
 
 def run_entry(run: RunSchema, folder: Path) -> RunEntry:

@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import Bar
     from dbbstation.files.recordings.seal import Amendment, Seal
     from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.bar import Bar
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Plan
     from dbbstation.trace.recording import Recording
@@ -65,6 +65,7 @@ class SessionFolder:
         operator: empty where not noted.
         ambient_temp_c: temperature of the shop [degC]; None where not noted.
         bar: None where not noted.
+        bar_waiver: why it was measured without a fresh calibration of the bar; empty where there was one.
         set_up_errors: micrometer readings of balls that were put up under the spindle, at most one per mounting.
         seal: what machine, plan and list of runs were when they were sealed; None where nobody sealed them.
         amendments: what was changed on purpose after that, oldest first.
@@ -82,6 +83,7 @@ class SessionFolder:
     operator: str = ""
     ambient_temp_c: float | None = None
     bar: Bar | None = None
+    bar_waiver: str = ""
     set_up_errors: tuple[SetUpReadings, ...] = ()
     seal: Seal | None = None
     amendments: tuple[Amendment, ...] = ()
@@ -105,6 +107,7 @@ class SessionFolder:
         """Return ball, mounting and bar of a run, named so that no other session has the same names."""
         ball = self.plan.tests[run.test].ball
         mounted = mounted_name(self.plan, run.test, run.mounting)
+        long_mm, uncertainty_mm = (0.0, 0.0) if self.bar is None else self.bar.reads_long_mm(self.ambient_temp_c)
         readings = (r for r in self.set_up_errors if mounted_name(self.plan, r.test, r.mounting) == mounted)
         return Setup(
             session=self.name,
@@ -114,7 +117,8 @@ class SessionFolder:
             fixed_ball_mm=np.array(ball.centre_mm, dtype=np.float64),
             mounting_repeatability_mm=ball.repeatability_mm,
             ball_uncertainty_mm=ball.uncertainty_mm,
-            bar_uncertainty_mm=0.0 if self.bar is None else self.bar.calibrator_uncertainty_mm,
+            bar_uncertainty_mm=uncertainty_mm,
+            bar_reads_long_mm=long_mm,
             place_known=ball.place_known,
             set_up_errors=next((reading.to_domain() for reading in readings), None),
             plate=ball.plate,
@@ -286,6 +290,7 @@ def parse_session(
         operator=session.operator,
         ambient_temp_c=session.ambient_temp_c,
         bar=None if session.bar is None else bar_entry(session.bar),
+        bar_waiver=session.bar_waiver,
         set_up_errors=tuple(map(set_up_readings, session.set_up_errors)),
         seal=seal,
         amendments=tuple(map(amendment_entry, session.amendments)),

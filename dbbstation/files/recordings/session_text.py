@@ -14,9 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import Bar, RunEntry
+    from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.seal import Amendment, Seal
     from dbbstation.files.recordings.session_set_up import SetUpReadings
+    from dbbstation.plan.bar import Bar
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class SessionDetails:
         operator: who measures.
         ambient_temp_c: temperature of the shop [degC].
         bar: the bar.
+        bar_waiver: why it is measured without a fresh calibration of the bar; empty where there is one.
         set_up_errors: micrometer readings of balls that were put up under the spindle.
         seal: hashes of machine, plan and jig, and the end of the chain of runs.
         amendments: what was changed on purpose after it was sealed.
@@ -37,6 +39,7 @@ class SessionDetails:
     operator: str = ""
     ambient_temp_c: float | None = None
     bar: Bar | None = None
+    bar_waiver: str = ""
     set_up_errors: tuple[SetUpReadings, ...] = ()
     seal: Seal | None = None
     amendments: tuple[Amendment, ...] = ()
@@ -60,6 +63,7 @@ def session_text(folder: Path, names: Sequence[str], details: SessionDetails, ru
         "operator": details.operator,
         "ambient_temp_c": details.ambient_temp_c,
         "bar": bar and {each.name: _plain(getattr(bar, each.name)) for each in fields(bar)},
+        "bar_waiver": details.bar_waiver or None,
         "seal": seal and seal_data(seal),
         "amendments": [_amendment_data(amendment) for amendment in details.amendments] or None,
         # Directly above the runs, where people write them in.

@@ -11,11 +11,12 @@ import pytest
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.entries import Bar, RunState
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_text import SessionDetails
 from dbbstation.files.recordings.session_writer import FinishedRun, SessionWriter, write_session
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
 
 BEGUN = datetime(2026, 11, 20, 8, 0, 0, 250000, tzinfo=UTC)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
@@ -34,10 +35,15 @@ def opened(folder: Path) -> SessionWriter:
     return SessionWriter.create(folder, read_machine(MACHINE_FILE), read_inline_plan(PLAN))
 
 
-def record(folder: Path, told: int) -> None:
+def record(folder: Path, told: int, pace_s: float = 0.0) -> None:
     """Record run after run; each line to `told` is about something that is done.
 
     `sample RUN N`: it was handed to the journal, which has written it. `sealed RUN`, `accepted RUN`: the session file says so.
+
+    Args:
+        folder: of the session; gone on with where it is there.
+        told: file descriptor that takes the lines.
+        pace_s: pause behind each sample [s].
     """
 
     def tell(line: str) -> None:
@@ -52,6 +58,8 @@ def record(folder: Path, told: int) -> None:
                 for sample in range(SAMPLES):
                     journal.append((sample * STEP_S, length_mm(name, sample), "ok"))
                     tell(f"sample {name} {sample}")
+                    if pace_s:
+                        time.sleep(pace_s)
                 done = writer.finish_run(journal, Counts(SAMPLES, 0, {}))
             tell(f"sealed {name}")
             writer.judge(done, accepted=True)

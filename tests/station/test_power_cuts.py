@@ -31,6 +31,7 @@ from tests.station.kills import SAMPLES, STEP_S, length_mm, record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from multiprocessing.process import BaseProcess
 
 PROMISED_S = 1.0
 CUTS = 50
@@ -65,6 +66,19 @@ def made(image: Path) -> Path:
     except OSError as error:
         pytest.skip(f"no loop device can be mounted here: {error}")
     return image
+
+
+@contextlib.contextmanager
+def recording(folder: Path, told: int) -> Iterator[BaseProcess]:
+    """A process that records into a session until the end of the block."""
+    child = multiprocessing.get_context("fork").Process(target=record, args=(folder, told, PACE_S))
+    child.start()
+    os.close(told)
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.join()
 
 
 class Told:
@@ -112,10 +126,9 @@ def test_what_is_a_second_old_outlasts_a_power_cut(tmp_path: Path) -> None:
     followed = lost = wrong = 0
     out, told = os.pipe()
     lines = Told(out)
-    with mounted(image, tmp_path / "disk", "loop,data=writeback,commit=30") as disk:
-        child = multiprocessing.get_context("fork").Process(target=record, args=(disk / "session", told, PACE_S))
-        child.start()
-        os.close(told)
+    with contextlib.ExitStack() as stack:
+        disk = stack.enter_context(mounted(image, tmp_path / "disk", "loop,data=writeback,commit=30"))
+        child = stack.enter_context(recording(disk / "session", told))
         for cut in range(CUTS):
             end_s = time.monotonic() + rng.uniform(1.2, 3.0)
             while time.monotonic() < end_s:
@@ -135,9 +148,7 @@ def test_what_is_a_second_old_outlasts_a_power_cut(tmp_path: Path) -> None:
             last = lines.lines[-1][1].split()
             at_end = last[0] == "sample" and int(last[2]) == SAMPLES - 1
             table["while sealing" if at_end else "between samples" if last[0] == "sample" else f"behind {last[0]}"] += 1
-        child.kill()
-        child.join()
-        os.close(out)
+    os.close(out)
     told_table = ", ".join(f"{count} {moment}" for moment, count in sorted(table.items()))
     sys.stdout.write(f"\n{CUTS} power cuts ({told_table}): {followed} samples promised, {lost} lost, {wrong} wrong\n")
     assert (lost, wrong) == (0, 0)

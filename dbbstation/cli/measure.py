@@ -105,6 +105,7 @@ def measure(
         programs={} if programs is None else load_programs(programs, plan.to_domain(), machine),
         patience=Patience() if auto is None else Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)),
         clock=clock,
+        time_scale=time_scale,
         rate_hz=protocol.fastest_hz(baud),
     )
     job.check(str(plan_file))

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
     from dbbstation.instrument.bytelog import ByteLog
     from dbbstation.instrument.protocol import Protocol
+    from dbbstation.service.runner import Opener, OpenStation
     from dbbstation.station.assembly import Job
     from dbbstation.station.events import Observer
     from dbbstation.tui.app import StationApp
-    from dbbstation.tui.runner import Opener, OpenStation
 
 _DEMO = {"plan": "protocols/plans/ten-minute-check.yaml", "machine": "fixtures/machines/reference.yaml"}
 _DEMO_INSTRUMENT = "streaming-encoder"
@@ -116,7 +116,7 @@ def station(
             place = stack.enter_context(
                 virtual_place(machine, plan.to_domain(), protocol, time_scale=time_scale, seed=_DEMO_SEED)
             )
-            job, port, helper = replace(job, clock=place.clock), place.port, place.helper
+            job, port, helper = replace(job, clock=place.clock, time_scale=time_scale), place.port, place.helper
         say_sampling(plan.to_domain(), protocol, baud)
         log = stack.enter_context(spying(spy, protocol, str(port)))
         return _run(job, opener(job, protocol, str(port), baud=baud, helper=helper, time_scale=time_scale, log=log))
@@ -173,8 +173,8 @@ def opener(
     """
     from dbbstation.cli.measure_talk import Log
     from dbbstation.instrument.driver import Instrument
+    from dbbstation.service.runner import OpenStation
     from dbbstation.station.assembly import assemble
-    from dbbstation.tui.runner import OpenStation
 
     @contextmanager
     def opened() -> Iterator[OpenStation]:
@@ -201,8 +201,8 @@ def _run(job: Job, open_station: Opener) -> int:
         StationError: the fault that ended the sequence, where nothing was done about it.
         click.Abort: a signal ended it.
     """
+    from dbbstation.service.runner import Runner
     from dbbstation.tui.app import Shown, StationApp
-    from dbbstation.tui.runner import Runner
 
     runner = Runner(open_station)
     app = StationApp(Shown(job.plan.plan.name, job.plan.jig.bores), runner)

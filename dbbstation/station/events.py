@@ -187,6 +187,32 @@ class RunCompleted:
 
 
 @dataclass(frozen=True)
+class RunRestored:
+    """A run that was recorded before waits for its verdict still; its figures follow as those of any completed run.
+
+    Attributes:
+        run: which run.
+        samples: of its turn, in time order, thinned; empty where it has none.
+    """
+
+    run: RunId
+    samples: tuple[Sample, ...]
+
+
+@dataclass(frozen=True)
+class FeedInMissed:
+    """The machine is on the circle, and nothing is recorded.
+
+    Attributes:
+        run: that is announced.
+        problem: what was seen, and what to do.
+    """
+
+    run: RunId
+    problem: str
+
+
+@dataclass(frozen=True)
 class RunAccepted:
     """The run counts."""
 
@@ -284,6 +310,8 @@ Event: TypeAlias = (
     | FeedInSeen
     | Progress
     | RunCompleted
+    | RunRestored
+    | FeedInMissed
     | RunAccepted
     | RunRejected
     | RunLate

@@ -11,8 +11,8 @@ from dbbstation.tui.panel import Panel, lines
 if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Ball
+    from dbbstation.service.board import Board
     from dbbstation.station.events import RunAnnounced
-    from dbbstation.tui.board import Board
 
 
 class SetUpPanel(Panel):

@@ -49,7 +49,8 @@ def check(
     r"""Validate machines, plans, jigs, models, settings, runs (.csv, .csv.part), recordings of drives and session folders.
 
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
-    its runs: hashes, checksums, units, and whether the machine can travel the plan's circles.
+    its runs: hashes, checksums, units, and whether the machine can travel the plan's circles. Its runs are judged as
+    `dbbstation circles --findings` does without a model: what is wrong with one comes as a note.
 
     Plans and one machine together are also dry-run: every program that `dbbstation program` would write with the same options
     is held against the travel of axes, angles and struts and against the feeds, on its whole way. All faults are listed.
@@ -100,9 +101,7 @@ def check(
     if as_json:
         print_json(
             {
-                "files": [
-                    {"file": str(r.path), "format": r.kind, "ok": not r.problems, "summary": r.summary} for r in results
-                ],
+                "files": [_file(result) for result in results],
                 "dry_runs": [
                     {"plan": str(r.plan), "machine": str(r.machine), "programs": r.programs, "ok": not r.problems}
                     for r in runs
@@ -119,6 +118,21 @@ def check(
                 click.echo(f"{one.plan}: {note}")
     if problems:
         raise InputError(set(problems))
+
+
+def _file(result: Checked) -> dict[str, object]:
+    """Return what was found in a file; of a session also the findings of its runs."""
+    from dbbstation.quality.summary import findings_summary
+
+    told: dict[str, object] = {
+        "file": str(result.path),
+        "format": result.kind,
+        "ok": not result.problems,
+        "summary": result.summary,
+    }
+    if result.judgements:
+        told["runs"] = [{"run": one.run.label, "findings": findings_summary(one)} for one in result.judgements]
+    return told
 
 
 def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:

@@ -24,6 +24,7 @@ class CircleNoise:
         slow_um: standard deviation of white noise that slow figures feel as they feel this one, per sample [µm]; NaN where
             there are too few samples to tell.
         reading_um: standard deviation of single readings [µm].
+        reading_freedom: degrees of freedom of that.
         resolution_um: step in which the readings come [µm]; zero where none shows.
         freedom: degrees of freedom of `slow_um`.
     """
@@ -32,6 +33,7 @@ class CircleNoise:
     reading_um: float
     resolution_um: float
     freedom: float
+    reading_freedom: float
 
     @property
     def sigma_um(self) -> float:
@@ -54,13 +56,19 @@ def noise_of(
     """
     resolution_um = 1e3 * _step_mm(reading_mm)
     if len(deviation_um) < FEWEST_SAMPLES:
-        return CircleNoise(float("nan"), float("nan"), resolution_um, 1.0)
+        return CircleNoise(float("nan"), float("nan"), resolution_um, 1.0, 1.0)
     low, high = bands(len(deviation_um))
     square = coefficients(deviation_um, np.radians(phi_deg), high)[1:] ** 2
     spectrum = noise_spectrum((square[:high] + square[high:])[low:], low, 2.0)
     lines = np.abs(np.fft.rfft(deviation_um)[low + 1 :]) ** 2 / len(deviation_um)
+    # Power of a line is exponentially distributed, with two degrees of freedom and a mean square of twice its mean's square.
+    known = 4.0 * float(lines.sum()) ** 2 / max(float(np.sum(lines**2)), np.finfo(float).tiny)
     return CircleNoise(
-        float(np.sqrt(spectrum.power[0])), float(np.sqrt(np.mean(lines))), resolution_um, spectrum.freedom
+        slow_um=float(np.sqrt(spectrum.power[0])),
+        reading_um=float(np.sqrt(np.mean(lines))),
+        resolution_um=resolution_um,
+        freedom=spectrum.freedom,
+        reading_freedom=max(known, 1.0),
     )
 
 

@@ -33,7 +33,7 @@ def lost_samples(one: Seen) -> Finding:
 
 def noise(one: CircleAnalysis, others: Others) -> Finding:
     """Noise against that of the other runs."""
-    value = one.noise.slow_um
+    value = one.noise.reading_um
     if not np.isfinite(value):
         return untold(Name.NOISE, "too few samples to tell noise from form", "µm")
     known = [other for other in others.noise_um if np.isfinite(other) and other > 0.0]
@@ -43,7 +43,7 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
         )
     logs = np.log(known)
     middle = float(np.median(logs))
-    own = 1.0 / float(np.sqrt(2.0 * one.noise.freedom))
+    own = 1.0 / float(np.sqrt(2.0 * one.noise.reading_freedom))
     # The median of n values is off by sqrt(pi / 2n) of their scatter.
     u = own * float(np.sqrt(1.0 + 0.5 * np.pi / len(known)))
     limit = float(np.exp(middle + _beyond(u, np.inf, [(float(log - middle), own) for log in logs])))

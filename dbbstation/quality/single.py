@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.quality.bump import bump
 from dbbstation.quality.finding import Finding, Name, Verdict, found, untold
-from dbbstation.quality.limits import joined, quantile, scale_of
+from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
 from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE
 from dbbstation.trace.loss import AFTER_LOSS, share_lost
 
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.plan.circle import Circle
     from dbbstation.quality.knowledge import Others, Seen
-
-FEWEST_OTHERS = 3
-"""Runs that must be there beside one for their scatter to say anything."""
 
 
 def lost_samples(one: Seen) -> Finding:

@@ -8,12 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.harmonics import bands, coefficients, noise_spectrum
+from dbbstation.trace.cut import SMALLEST_SHAPE_MM
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FEWEST_SAMPLES = 100
 """Samples of a turn below which its spectrum holds no noise apart from its form."""
+
+
+ROUNDING = float(np.sqrt(12.0))
+"""Step of rounded readings over the standard deviation of what rounding does to them [GUM 4.3.7]."""
+
+LEAST_UM = 1e3 * SMALLEST_SHAPE_MM / ROUNDING
+"""Noise of a bar as fine as there is none: recordings that were computed have less, and any difference would be found [µm]."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +44,14 @@ class CircleNoise:
     reading_freedom: float
 
     @property
+    def known(self) -> bool:
+        """Whether there were samples enough to tell noise from form."""
+        return bool(np.isfinite(self.slow_um))
+
+    @property
     def sigma_um(self) -> float:
         """Standard deviation to count with: a coarse reading may show no noise at all, its rounding is there [µm]."""
-        return float(np.hypot(np.nan_to_num(self.slow_um), self.resolution_um / np.sqrt(12.0)))
+        return float(np.hypot(np.nan_to_num(self.slow_um), max(self.resolution_um / ROUNDING, LEAST_UM)))
 
 
 def noise_of(

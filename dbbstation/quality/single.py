@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.circles.noise import LEAST_UM
 from dbbstation.quality.bump import bump
 from dbbstation.quality.finding import Finding, Name, Verdict, found, untold
 from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
@@ -30,10 +31,10 @@ def lost_samples(one: Seen) -> Finding:
 
 def noise(one: CircleAnalysis, others: Others) -> Finding:
     """Noise against that of the other runs."""
-    value = one.noise.reading_um
-    if not np.isfinite(value):
+    value = max(one.noise.reading_um, LEAST_UM)
+    if not one.noise.known:
         return untold(Name.NOISE, "too few samples to tell noise from form", "µm")
-    known = [other for other in others.noise_um if np.isfinite(other) and other > 0.0]
+    known = [max(other, LEAST_UM) for other in others.noise_um if np.isfinite(other)]
     if len(known) < FEWEST_OTHERS:
         return untold(
             Name.NOISE, f"{value:.2f} µm; fewer than {FEWEST_OTHERS} other runs to hold it against", "µm", value
@@ -57,8 +58,8 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
 
 def closure(one: CircleAnalysis, others: Others) -> Finding:
     """End of the turn less its beginning, against noise and what the other runs do."""
-    if one.closure is None:
-        return untold(Name.CLOSURE, "too few samples at the ends of the turn", "µm")
+    if one.closure is None or not one.noise.known:
+        return untold(Name.CLOSURE, "too few samples, at the ends of the turn or to tell noise from form", "µm")
     u = one.closure.u_um
     limit = _beyond(u, one.noise.freedom, others.closure_um)
     size = abs(one.closure.height_um)
@@ -77,6 +78,8 @@ def drift(one: CircleAnalysis, others: Others) -> Finding:
     """Second pass of the overlap less the first, against noise, feed and what the other runs do."""
     if one.passes is None:
         return untold(Name.DRIFT, "the recording was cut to its turn: no place is passed twice", "µm")
+    if not one.noise.known:
+        return untold(Name.DRIFT, "too few samples to tell noise from form", "µm")
     passes = one.passes
     u = passes.u_mean_um(one.noise.sigma_um)
     limit = _beyond(float(np.hypot(u, _by_feed_um(one))), one.noise.freedom, others.drift_um)

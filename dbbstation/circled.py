@@ -10,8 +10,9 @@ import numpy as np
 from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis, analyse, analyse_pair
 from dbbstation.circles.budget import SetUpKnowledge
 from dbbstation.errors import InputError, Problem, TraceError
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.judged import judge_session
-from dbbstation.files.recordings.session import RunState, SessionFolder, read_session
+from dbbstation.files.recordings.session import SessionFolder, read_session
 from dbbstation.recorded import check_named
 from dbbstation.trace.cut import cut
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.circles.path import Filter
-    from dbbstation.files.recordings.session import RunEntry
+    from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.quality.judge import Judgement
     from dbbstation.trace.recording import Recording

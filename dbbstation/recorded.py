@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, StationError
-from dbbstation.files.recordings.session import RunEntry, RunState, SessionFolder, read_session
+from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.files.recordings.session import SessionFolder, read_session
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.model.observation import Observation
@@ -80,7 +81,8 @@ def load_sessions(
             if began is not None and read.recording.temperature_degc:
                 logged.append((began, read.recording))
             try:
-                raw = cut(replace(read.recording, name=str(run.path)), session.circle(run))
+                lost = 0 if run.counts is None else run.counts.lost
+                raw = cut(replace(read.recording, name=str(run.path)), session.circle(run), counted_lost=lost)
                 observations.append(_observation(session, run, raw))
             except InputError as error:
                 problems += error.problems

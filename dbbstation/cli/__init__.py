@@ -22,6 +22,7 @@ DONE, FAILED, USAGE = 0, 1, 2
 _DEBUG, _VERBOSE, _SETTINGS = "--debug", "--verbose", "--settings"
 
 COMMANDS = {
+    "bar": "Read the bar on its calibrator, and keep what it read.",
     "calibrate": "Fit the machine's errors to recorded sessions.",
     "check": "Validate files of any format, and whole sessions.",
     "circles": "Figures of measured circles after ISO 230-4, and findings.",

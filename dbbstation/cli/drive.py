@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.figure_option import figure_option, format_of
+from dbbstation.cli.number_types import Finite
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -15,11 +16,13 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING.csv...")
-@click.option("--force-per-ampere", type=float, metavar="N/A", help="Force of the drive at 1 A, for motor_current_a.")
+@click.option(
+    "--force-per-ampere", type=Finite(), metavar="N/A", help="Force of the drive at 1 A, for motor_current_a."
+)
 @click.option("--sources", metavar="A,B,...", help="Causes to compare [default: all].")
 @click.option(
     "--cutoff-hz",
-    type=float,
+    type=Finite(),
     metavar="HZ",
     help="Bandwidth in which force and model are compared [default: chosen from the recording].",
 )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.instrument_options import chosen_protocol, protocol_options
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -34,27 +35,27 @@ _LOOK_S = 0.2
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of everything random.")
 @click.option(
     "--rate-hz",
-    type=click.FloatRange(0.1, 100000.0),
+    type=Finite(0.1, 100000.0),
     help="Sampling rate [1/s], where it is not the instrument's usual one.",
 )
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of NC programs to run.")
 @click.option(
     "--time-scale",
-    type=click.FloatRange(0.01, 200.0),
+    type=Finite(0.01, 200.0),
     default=1.0,
     show_default=True,
     help="Factor by which machine and line run faster than real time.",
 )
 @click.option(
     "--noise-um",
-    type=click.FloatRange(min=0.0),
+    type=Finite(min=0.0),
     default=0.3,
     show_default=True,
     help="Standard deviation of the noise of a reading [µm].",
 )
 @click.option(
     "--bar-um",
-    type=click.FloatRange(min=0.0),
+    type=Finite(min=0.0),
     default=0.5,
     show_default=True,
     help="Standard deviation of the bar's length error [µm].",

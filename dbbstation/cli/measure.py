@@ -13,9 +13,10 @@ import click
 
 from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.loss import loss_option, with_loss_limit
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.sampling import say_sampling
-from dbbstation.cli.session_options import session_details, session_options
+from dbbstation.cli.session_options import require_bar, session_details, session_options
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,14 +38,14 @@ _AUTO_PATIENCE_S = 60.0
 @click.option("--auto", metavar="URL", help="Start each circle at this control address of `emulate`, accept every run.")
 @click.option(
     "--time-scale",
-    type=click.FloatRange(0.01, 200.0),
+    type=Finite(0.01, 200.0),
     default=1.0,
     show_default=True,
     help="The same factor as of `emulate`.",
 )
 @click.option(
     "--rate-hz",
-    type=click.FloatRange(0.1, 100000.0),
+    type=Finite(0.1, 100000.0),
     help="Sampling rate [1/s], where it is not the instrument's usual one.",
 )
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")
@@ -68,6 +69,7 @@ def measure(
     programs: Path | None,
     rate_hz: float | None,
     largest_loss_percent: float | None,
+    largest_bar_age_h: float | None,
     as_json: bool,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> None:
@@ -80,12 +82,12 @@ def measure(
     \b
     Examples:
       dbbstation measure --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
-        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar-length-mm 150.0003 --bar-uncertainty-um 0.5
+        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
       dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `emulate`)
     """
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
-    from dbbstation.files.recordings.session_writer import SessionDetails
+    from dbbstation.files.recordings.session_text import SessionDetails
     from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.library import at_rate
     from dbbstation.station.assembly import Job, assemble
@@ -110,6 +112,8 @@ def measure(
     )
     job.check(str(plan_file))
     say_sampling(plan.to_domain(), protocol, baud)
+    if auto is None:  # a virtual machine has a bar of known length
+        require_bar(job, largest_bar_age_h)
     hands = None if auto is None else VirtualHands(auto)
     with (
         spying(spy, protocol, port) as log,

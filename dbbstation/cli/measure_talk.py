@@ -17,7 +17,7 @@ from dbbstation.station.states import State
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from dbbstation.files.recordings.session import RunEntry
+    from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.station.assembly import Workplace
     from dbbstation.station.commands import Command
 

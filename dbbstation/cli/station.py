@@ -14,9 +14,10 @@ import click
 
 from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.loss import loss_option, with_loss_limit
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.sampling import say_sampling
-from dbbstation.cli.session_options import session_details, session_options
+from dbbstation.cli.session_options import require_bar, session_details, session_options
 from dbbstation.cli.shop import from_settings
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ _DEMO_SEED = 3
 @click.option("--virtual", is_flag=True, help="Use a virtual machine and instrument.")
 @click.option(
     "--time-scale",
-    type=click.FloatRange(0.01, 50.0),
+    type=Finite(0.01, 50.0),
     default=1.0,
     show_default=True,
     help="Factor by which the virtual machine runs faster than real time, with --virtual.",
@@ -67,6 +68,7 @@ def station(
     virtual: bool,
     time_scale: float,
     largest_loss_percent: float | None,
+    largest_bar_age_h: float | None,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
@@ -78,7 +80,7 @@ def station(
       dbbstation station --virtual                     try it without hardware
       dbbstation station --virtual --time-scale 10     the same, ten times faster
       dbbstation station --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
-        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar-length-mm 150.0003 --bar-uncertainty-um 0.5
+        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
     """
     # The shop's instrument stands elsewhere: a virtual one brings its own line.
     port = None if virtual and from_settings("port") else port
@@ -106,6 +108,8 @@ def station(
     with ExitStack() as stack:
         job = Job(machine, plan, folder, details, rate_hz=protocol.fastest_hz(baud))
         job.check(str(plan_file))
+        if not virtual:
+            require_bar(job, largest_bar_age_h)
         helper = None
         if virtual:
             from dataclasses import replace

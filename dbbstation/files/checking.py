@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, TravelError
+from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.every_format import SCHEMAS
 from dbbstation.files.formats.jig import parse_jig
 from dbbstation.files.formats.machine import parse_machine
@@ -13,16 +14,10 @@ from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.judged import JUDGED, judge_session
 from dbbstation.files.recordings.run_csv import PART, read_run
-from dbbstation.files.recordings.session import (
-    SESSION_FILE,
-    RunState,
-    SessionFolder,
-    no_session,
-    parse_session,
-    unlisted_sealed,
-)
+from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, no_session, parse_session, unlisted_sealed
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.quality.finding import Name
 from dbbstation.trace.loss import lost_samples
@@ -31,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.session import RunEntry
+    from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.quality.judge import Judgement
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.trace.recording import Recording
@@ -93,6 +88,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         "dbb-jig": lambda: _jig(checked),
         "dbb-model": lambda: _model(checked, known_sources),
         "dbb-settings": lambda: _settings(checked),
+        "dbb-bar": lambda: _bar(checked),
     }
     name = str(given).partition("/")[0]
     if name in by_name:
@@ -139,6 +135,13 @@ def _settings(checked: Checked) -> None:
     checked.summary = f"settings: {_count(count, 'value')}"
 
 
+def _bar(checked: Checked) -> None:
+    bar = parse_bar(checked.path, checked.problems)
+    if bar is not None:
+        long_um, u_um = 1e3 * (bar.readings.mean_mm - bar.length_mm), 1e3 * bar.uncertainty_mm
+        checked.summary = f"bar {bar.serial_number}: reads {long_um:+.2f} µm long, standard uncertainty {u_um:.2f} µm"
+
+
 def _run(checked: Checked) -> None:
     try:
         run = read_run(checked.path)
@@ -168,6 +171,11 @@ def _session(checked: Checked) -> None:
     if session is None or checked.problems:
         return
     wanted: list[tuple[RunEntry, Recording]] = []
+    checked.warnings += [
+        Problem(str(run.path), 0, 0, f"samples: {run.counts.text}")
+        for run in session.runs
+        if run.counts is not None and (run.counts.lost or run.counts.rejected)
+    ]
     for run in session.runs:
         try:
             read = session.load(run)
@@ -189,7 +197,13 @@ def _session(checked: Checked) -> None:
     except TravelError as error:
         checked.problems.append(Problem(str(session.plan_path), 0, 0, f"{error.where}: {error.what}", error.remedy))
     _judge(checked, session, wanted)
-    checked.summary = f"session: {_states(session)}"
+    checked.warnings += [Problem(str(session.folder), 0, 0, amendment.text) for amendment in session.amendments]
+    seal = "sealed" if session.seal is not None else NO_SEAL
+    checked.summary = f"session: {_states(session)}; {seal}"
+
+
+NO_SEAL = "it carries no seal (`dbbstation session seal` writes one)"
+"""What is said of sessions of older programs, and of those that were written by hand: a changed plan is not noticed there."""
 
 
 def _judge(checked: Checked, session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]]) -> None:

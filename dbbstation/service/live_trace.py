@@ -1,4 +1,7 @@
-"""The traces that are drawn: one per direction of a test, in arrays that grow; as measured, and centred once complete."""
+"""The traces that are drawn: one per direction of a test, as many points as can be told apart, however many samples come.
+
+As measured, and about their own centre once they are complete.
+"""
 
 from __future__ import annotations
 
@@ -22,11 +25,16 @@ _FIRST_ROOM = 4096
 
 _TURN_DEG = 360.0
 
+STEP_DEG = 0.05
+"""Of the samples within such a step of the travel the least and the greatest are kept: a tenth of a dot of the largest
+screen. A turn has at most three points a step then, whatever the sampling rate [deg]."""
+
 
 class LiveTrace:
     """Angles and deviations of one run, as far as they are known live.
 
-    Only the full turn is kept, not the overshoots; samples that are no length on the circle break the line.
+    Only the full turn is kept, not the overshoots; samples that are no length on the circle break the line. Of samples that lie
+    closer than can be drawn, the extremes are kept.
 
     Args:
         run: which run.
@@ -39,6 +47,7 @@ class LiveTrace:
         self.largest_um = 0.0
         self.centred: Centred | None = None
         self._count = 0
+        self._step, self._step_from = -1, 0
         self._data = np.empty((2, _FIRST_ROOM))
 
     def __len__(self) -> int:
@@ -84,12 +93,28 @@ class LiveTrace:
         # Beyond half the feed-in it is off the circle: a bar that was lifted, or the feed-out.
         usable &= np.abs(deviation) < 1e3 * self.circle.feed_in_mm / 2.0
         behind_gap = np.flatnonzero([sample.lost > 0 for sample in on_turn])
-        self._append(
-            np.insert(self.circle.theta_deg(phi), behind_gap, np.nan),
-            np.insert(np.where(usable, deviation, np.nan), behind_gap, np.nan),
-        )
+        steps = np.insert(phi // STEP_DEG, behind_gap, phi[behind_gap] // STEP_DEG).astype(np.int64)
+        theta = np.insert(self.circle.theta_deg(phi), behind_gap, np.nan)
+        shown = np.insert(np.where(usable, deviation, np.nan), behind_gap, np.nan)
+        for step in np.unique(steps).tolist():
+            self._take(step, theta[steps == step], shown[steps == step])
         if usable.any():
             self.largest_um = max(self.largest_um, float(np.abs(deviation[usable]).max()))
+
+    def _take(self, step: int, theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]) -> None:
+        """Add points of one step of the travel, which may have some already."""
+        if step == self._step:
+            kept = self._data[:, self._step_from : self._count]
+            theta_deg = np.concatenate([kept[0], theta_deg])
+            deviation_um = np.concatenate([kept[1], deviation_um])
+            self._count = self._step_from
+        self._step, self._step_from = step, self._count
+        breaks = np.flatnonzero(np.isnan(deviation_um))
+        telling = {int(breaks[0])} if len(breaks) else set()
+        if len(breaks) < len(deviation_um):
+            telling |= {int(np.nanargmin(deviation_um)), int(np.nanargmax(deviation_um))}
+        chosen = sorted(telling)
+        self._append(theta_deg[chosen], deviation_um[chosen])
 
     def _append(self, theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]) -> None:
         end = self._count + len(theta_deg)

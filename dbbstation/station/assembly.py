@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.recordings.bar_reach import unlike_bar
-from dbbstation.files.recordings.session_writer import SessionDetails
+from dbbstation.files.recordings.session_text import SessionDetails
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.opening import last_end, open_session
@@ -109,18 +109,19 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     }
     schedule = Schedule(plan, writer.next_repeat, writer.runs)
     names = {key: program.name for key, program in job.programs.items()}
+    # Real runs bear the computer's time, so that they fit what thermometers log.
+    now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
+    storage = Storage(writer, now, kept)
     sequencer = Sequencer(
         plan,
         schedule,
+        storage.recorded,
         programs=names,
         patience=job.patience,
         waiting=unjudged(writer.session),
         rate_hz=job.rate_hz,
     )
     station = Station(sequencer, source)
-    # Real runs bear the computer's time, so that they fit what thermometers log.
-    now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
-    storage = Storage(writer, now, kept)
     station.subscribe(storage)
     station.regularly(storage.sync_if_due)
     return Workplace(station, schedule, writer, storage)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Plan
     from dbbstation.station.events import Event, RunId, Sample
+    from dbbstation.station.run_record import Recorded
     from dbbstation.station.schedule import Schedule
 
 
@@ -56,6 +57,7 @@ class Sequencer:
     Args:
         plan: what is measured.
         schedule: what is left of it.
+        recorded: gives back the run that goes on, once it is complete.
         programs: name of the NC program that commands a test and direction; the plan's nominal circle where absent.
         patience: how long is waited for the machine.
         waiting: runs that were recorded before and have no verdict, oldest first; they are judged before anything is measured.
@@ -66,6 +68,7 @@ class Sequencer:
         self,
         plan: Plan,
         schedule: Schedule,
+        recorded: Recorded,
         *,
         programs: Mapping[tuple[str, Direction], str] | None = None,
         patience: Patience | None = None,
@@ -75,12 +78,14 @@ class Sequencer:
         self.state = State.BETWEEN
         self.plan = plan
         self.schedule = schedule
+        self._recorded = recorded
         self._programs = programs or {}
         self._patience = patience or Patience()
         self._rate_hz = rate_hz
         self._out: list[Event] = []
         self._samples: list[Sample] = []
         self._run: RunId | None = None
+        self._commanded: Circle | None = None
         self._record: RunRecord | None = None
         self._edges: EdgeDetector | None = None
         self._watch: CircleWatch | None = None
@@ -159,7 +164,7 @@ class Sequencer:
         self._run = run
         test = self.plan.tests[run.test]
         program = self._programs.get((run.test, run.direction), "")
-        circle = test.run(run.direction)
+        self._commanded = circle = test.run(run.direction)
         seen = None if self._rate_hz is None else sampling(circle, self._rate_hz)
         announced = events.RunAnnounced(
             run=run,
@@ -337,7 +342,8 @@ class Sequencer:
             raise RuntimeError(f"no run is recorded while {self.state}")
         found = None
         if not problem:
-            found, problem = record.circle_figures(self.plan.largest_loss_percent)
+            recording = self._recorded(record.run, self._untold(record.run))
+            found, problem = record.circle_figures(recording, self.plan.largest_loss_percent)
         self._out.append(events.RunCompleted(record.run, len(record), record.lost, found, problem))
         self.schedule.recorded(record.run)
         self._edges = None
@@ -351,8 +357,9 @@ class Sequencer:
         return self._run
 
     def _circle(self) -> Circle:
-        run = self._announced()
-        return self.plan.tests[run.test].run(run.direction)
+        if self._commanded is None:
+            raise RuntimeError(f"no circle was announced while {self.state}")
+        return self._commanded
 
     def _interrupted(self) -> RunId | None:
         return self._run if self.state in RECORDING else None
@@ -370,6 +377,11 @@ class Sequencer:
             self._out.append(events.SamplesRecorded(self._record.run, samples))
         else:
             self._out.append(events.ReadingsSeen(samples))
+
+    def _untold(self, run: RunId) -> list[Sample]:
+        """Samples of a run that nobody has been told of yet."""
+        batches = (event for event in self._out if isinstance(event, events.SamplesRecorded) and event.run == run)
+        return [sample for batch in batches for sample in batch.samples]
 
     def _told(self) -> list[Event]:
         self._flush()

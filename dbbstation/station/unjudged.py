@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
-from dbbstation.files.recordings.session import RunState
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.station.events import RunCompleted, RunId, Sample
 from dbbstation.station.run_record import circle_figures
 from dbbstation.station.sequencer import Waiting
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
-    from dbbstation.files.recordings.session import RunEntry, SessionFolder
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.trace.circle import RawCircle
 
 
@@ -28,9 +29,10 @@ def _waiting(session: SessionFolder, entry: RunEntry) -> Waiting:
     except InputError as error:
         return Waiting(RunCompleted(run, 0, 0, None, str(error)), ())
     circle = session.circle(entry)
-    found, problem = circle_figures(recording, circle, 0, session.plan.largest_loss_percent)
+    lost = entry.counts.lost if entry.counts is not None else 0
+    found, problem = circle_figures(recording, circle, lost, lost, session.plan.largest_loss_percent)
     samples = () if found is None else _on_turn(cut(recording, circle))
-    return Waiting(RunCompleted(run, len(recording), 0, found, problem), samples)
+    return Waiting(RunCompleted(run, len(recording), lost, found, problem), samples)
 
 
 def _on_turn(raw: RawCircle) -> tuple[Sample, ...]:

@@ -67,21 +67,27 @@ INSIDE_FEEDINGS = 3.0
 """How far from an edge, in durations of the feed-in, its two levels are read."""
 
 
-def cut(recording: Recording, circle: Circle) -> RawCircle:
+def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircle:
     """Return the full turn of a recording.
 
     Rows with angles are taken as they are: they are cut already. Otherwise the turn is anchored midway between
     feed-in and feed-out, and angles follow from the programmed feed: controls dwell at the corners, so the
     trace's duration says little.
 
+    Args:
+        recording: of a whole run.
+        circle: as commanded.
+        counted_lost: samples that the line counted as lost in it.
+
     Raises:
         TraceError: no feed-in or feed-out, a gap, a bar that left the circle, or a feed that is not the
-            programmed one; with the lost samples first where the times show some, since these may be the cause.
+            programmed one; with the lost samples first where the line counted some or the times show some, since these
+            may be the cause.
     """
     try:
         return _cut(recording, circle)
     except TraceError as error:
-        lost = lost_samples(recording.t_s)
+        lost = max(lost_samples(recording.t_s), counted_lost)
         if not lost:
             raise
         raise TraceError(

@@ -16,7 +16,7 @@ from dbbstation.station.instructions import instructions
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer, Waiting
 from dbbstation.station.states import State
-from tests.station.readings import kinds, run_readings, still
+from tests.station.readings import all_untold, kinds, run_readings, still
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,7 +36,7 @@ def made(plan: Plan, **more: Any) -> Sequencer:
     def next_repeat(test: str, direction: Direction) -> int:
         return taken.get((test, direction), 0) + 1
 
-    sequencer = Sequencer(plan, Schedule(plan, next_repeat), **more)
+    sequencer = Sequencer(plan, Schedule(plan, next_repeat), all_untold, **more)
     sequencer.taken = taken  # type: ignore[attr-defined]
     return sequencer
 

@@ -15,7 +15,7 @@ from dbbstation.station.commands import Accept, GoTo, Judge, Pause, Quit, Reject
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import COMMAND_CAUSES, FINAL, TRANSITIONS, Cause, State, commands_allowed
-from tests.station.readings import run_readings, still
+from tests.station.readings import run_readings, still, told_and_untold
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -72,8 +72,9 @@ step = st.one_of(
 @given(steps=st.lists(step, max_size=25))
 def test_no_sequence_of_commands_and_readings_leaves_the_table(plan_file: Path, steps: list[object]) -> None:
     plan = read_plan(plan_file)
-    sequencer = Sequencer(plan, Schedule(plan, lambda *_: 1))
-    told = sequencer.begin()
+    told: list[events.Event] = []
+    sequencer = Sequencer(plan, Schedule(plan, lambda *_: 1), told_and_untold(told))
+    told += sequencer.begin()
     circle = plan.tests["a"].circle
     now_s = 0.0
     for one in steps:
@@ -135,7 +136,7 @@ def _check_told(told: list[events.Event], last: State) -> None:
 @pytest.mark.parametrize("state", sorted(FINAL))
 def test_nothing_happens_any_more_in_a_final_state(state: State, plan_file: Path) -> None:
     plan = read_plan(plan_file)
-    sequencer = Sequencer(plan, Schedule(plan, lambda *_: 1))
+    sequencer = Sequencer(plan, Schedule(plan, lambda *_: 1), told_and_untold([]))
     sequencer.begin()
     sequencer.state = state
     assert sequencer.readings(still(151.5, 1.0)) == []

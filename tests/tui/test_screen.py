@@ -15,7 +15,8 @@ from dbbstation.cli.station_virtual import VirtualPlace, virtual_place
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import InlinePlan, read_inline_plan
-from dbbstation.files.recordings.session import RunState, read_session
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction

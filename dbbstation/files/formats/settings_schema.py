@@ -1,4 +1,4 @@
-"""`dbb-settings/2`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
+"""`dbb-settings/2`, which has all of `/1`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
 
 from typing import Annotated, Literal
 
@@ -49,6 +49,8 @@ class LimitSettings(Schema):
     """A model that shifts any point by more is refused [mm]."""
     largest_loss_percent: Annotated[float, Quantity("%", 0.001, 100, or_zero=True)] | None = None
     """A run that lost more of its samples is repeated, where the plan does not say [%]."""
+    largest_bar_age_h: Annotated[float, Quantity("h", 0.1, 10_000)] | None = None
+    """A calibration of the bar that is older is stale [h]."""
 
 
 class NumberSettings(Schema):

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import MachineError, TraceError
-from dbbstation.files.recordings.session import RunState
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.model.expected import expected_circle
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
@@ -18,7 +18,8 @@ from dbbstation.trace.cut import cut
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.files.recordings.session import RunEntry, SessionFolder
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.quality.knowledge import Expected
     from dbbstation.trace.recording import Recording

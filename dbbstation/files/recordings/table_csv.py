@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
+from dbbstation.files.csv_rows import csv_rows
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -54,7 +55,7 @@ class TableFile:
         found = []
         for line, cell, value in zip(self.lines.tolist(), self.cells[name], self.values[name], strict=True):
             if not np.isfinite(value) and cell.lower() not in NO_NUMBER:
-                what = f"{name} is `{cell}`, not a finite number"
+                what = f"{name} is `{shortened(cell)}`, not a finite number"
                 found.append(Problem(self.file, line, 0, what, "correct the cell, or leave it empty"))
         return found
 
@@ -97,13 +98,13 @@ def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: Numbe
         raise InputError([Problem(file, 0, 0, "the file has no columns and no rows", "begin with a line of names")])
     header, head = lines[0]
     separator = numbers.separator if numbers else max(SEPARATORS, key=head.count)
-    names = [name.strip() for name in next(csv.reader([head], delimiter=separator))]
+    names = [name.strip() for name in next(csv_rows([head], separator, file, first_line=header))[1]]
     faults = _faults_of_names(names, needed, file, header)
     if not faults and len(lines) == 1:
         faults.append(Problem(file, header, 0, "there are no rows below this line"))
     rows, places = [], []
     for number, line in lines[1:]:
-        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+        cells = [cell.strip() for cell in next(csv_rows([line], separator, file, first_line=number))[1]]
         if len(cells) != len(names):
             what = f"{len(cells)} values in {len(names)} columns"
             remedy = f"compare the line with the header; {(numbers or PLAIN).text}"

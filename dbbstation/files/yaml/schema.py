@@ -18,6 +18,7 @@ FORMATS = {
     "dbb-jig": "a jig",
     "dbb-model": "a model",
     "dbb-settings": "a shop's settings",
+    "dbb-bar": "the calibration of a bar",
 }
 """Every format by the name before its version, with what it is called in messages."""
 
@@ -46,11 +47,20 @@ _OF_INSTRUMENTS = dict.fromkeys(
     3,
 )
 
+_OF_BARS = ("reading_mm", "temp_uncertainty_k", "calibrator_serial_number", "bar_waiver")
+
 SINCE: dict[str, dict[str, int]] = {
     "dbb-plan": {"largest_loss_percent": 2},
-    "dbb-session": {"stroke_mm": 2},
+    "dbb-session": {
+        "stroke_mm": 2,
+        "seal": 3,
+        "amendments": 3,
+        "chain_sha256": 3,
+        "counts": 3,
+        **dict.fromkeys(_OF_BARS, 3),
+    },
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},
-    "dbb-settings": {"profile": 2},
+    "dbb-settings": {"largest_bar_age_h": 2, "profile": 2},
     "dbb-machine": _OF_MACHINES,
     "dbb-model": {**_OF_MACHINES, "provenance": 3},
 }

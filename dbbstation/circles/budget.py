@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.circles.noise import ROUNDING
 from dbbstation.trace.gaussian import gaussian
 
 if TYPE_CHECKING:
@@ -41,9 +42,6 @@ class Cause(StrEnum):
     TEMPERATURE = "temperature of the bar"
     MOUNTING = "where the ball stands"
 
-
-_RECTANGULAR = float(np.sqrt(12.0))
-"""Width of a rectangular distribution over its standard deviation [GUM 4.3.7]."""
 
 NOT_STATED = (
     "form of both balls",
@@ -114,9 +112,9 @@ def budgets(one: CircleAnalysis, known: SetUpKnowledge) -> dict[Quantity, Budget
     peak = _peak_noise_um(one)
     shape = {
         Cause.NOISE: peak,
-        Cause.RESOLUTION: along * one.noise.resolution_um / _RECTANGULAR,
+        Cause.RESOLUTION: along * one.noise.resolution_um / ROUNDING,
         Cause.SAMPLING: _between_samples_um(one) / np.sqrt(3.0),
-        Cause.CLOSURE: _closure_um(one) / _RECTANGULAR,
+        Cause.CLOSURE: _closure_um(one) / ROUNDING,
     }
     length = _length_terms(one, known, along)
     adds = 2.0 * peak * _expected_extreme(one)

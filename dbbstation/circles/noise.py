@@ -8,12 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.harmonics import bands, coefficients, noise_spectrum
+from dbbstation.trace.cut import SMALLEST_SHAPE_MM
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FEWEST_SAMPLES = 100
 """Samples of a turn below which its spectrum holds no noise apart from its form."""
+
+
+ROUNDING = float(np.sqrt(12.0))
+"""Step of rounded readings over the standard deviation of what rounding does to them [GUM 4.3.7]."""
+
+LEAST_UM = 1e3 * SMALLEST_SHAPE_MM / ROUNDING
+"""Noise of a bar as fine as there is none: recordings that were computed have less, and any difference would be found [µm]."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +32,7 @@ class CircleNoise:
         slow_um: standard deviation of white noise that slow figures feel as they feel this one, per sample [µm]; NaN where
             there are too few samples to tell.
         reading_um: standard deviation of single readings [µm].
+        reading_freedom: degrees of freedom of that.
         resolution_um: step in which the readings come [µm]; zero where none shows.
         freedom: degrees of freedom of `slow_um`.
     """
@@ -32,11 +41,17 @@ class CircleNoise:
     reading_um: float
     resolution_um: float
     freedom: float
+    reading_freedom: float
+
+    @property
+    def known(self) -> bool:
+        """Whether there were samples enough to tell noise from form."""
+        return bool(np.isfinite(self.slow_um))
 
     @property
     def sigma_um(self) -> float:
         """Standard deviation to count with: a coarse reading may show no noise at all, its rounding is there [µm]."""
-        return float(np.hypot(np.nan_to_num(self.slow_um), self.resolution_um / np.sqrt(12.0)))
+        return float(np.hypot(np.nan_to_num(self.slow_um), max(self.resolution_um / ROUNDING, LEAST_UM)))
 
 
 def noise_of(
@@ -54,13 +69,19 @@ def noise_of(
     """
     resolution_um = 1e3 * _step_mm(reading_mm)
     if len(deviation_um) < FEWEST_SAMPLES:
-        return CircleNoise(float("nan"), float("nan"), resolution_um, 1.0)
+        return CircleNoise(float("nan"), float("nan"), resolution_um, 1.0, 1.0)
     low, high = bands(len(deviation_um))
     square = coefficients(deviation_um, np.radians(phi_deg), high)[1:] ** 2
     spectrum = noise_spectrum((square[:high] + square[high:])[low:], low, 2.0)
     lines = np.abs(np.fft.rfft(deviation_um)[low + 1 :]) ** 2 / len(deviation_um)
+    # Power of a line is exponentially distributed, with two degrees of freedom and a mean square of twice its mean's square.
+    known = 4.0 * float(lines.sum()) ** 2 / max(float(np.sum(lines**2)), np.finfo(float).tiny)
     return CircleNoise(
-        float(np.sqrt(spectrum.power[0])), float(np.sqrt(np.mean(lines))), resolution_um, spectrum.freedom
+        slow_um=float(np.sqrt(spectrum.power[0])),
+        reading_um=float(np.sqrt(np.mean(lines))),
+        resolution_um=resolution_um,
+        freedom=spectrum.freedom,
+        reading_freedom=max(known, 1.0),
     )
 
 

@@ -8,14 +8,11 @@ import numpy as np
 
 from dbbstation.quality.finding import Finding, Name, Verdict, found, untold
 from dbbstation.quality.knowledge import HIGHEST_HARMONIC, Others, Seen, across, apart_um
-from dbbstation.quality.limits import length_limit, length_quantile, quantile, ratio_quantile
+from dbbstation.quality.limits import FEWEST_OTHERS, length_limit, length_quantile, quantile, ratio_quantile
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-
-FEWEST_OTHERS = 3
-"""Other pairs that must be there for their differences to say what is usual."""
 
 SCATTERING = 3
 """Dimensions in which runs of one circle scatter at the least: where the ball came to stand in X and Y, and how long the bar is.

@@ -94,7 +94,7 @@ class SessionRuns:
     def _others(self, one: Seen) -> Others:
         analyses = [o.analysis for o in self._runs if o is not one and o.analysis is not None]
         return Others(
-            noise_um=tuple(a.noise.slow_um for a in analyses),
+            noise_um=tuple(a.noise.reading_um for a in analyses),
             closure_um=tuple((a.closure.height_um, a.closure.u_um) for a in analyses if a.closure is not None),
             drift_um=tuple(
                 (a.passes.mean_um, a.passes.u_mean_um(a.noise.sigma_um)) for a in analyses if a.passes is not None

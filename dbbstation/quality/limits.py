@@ -23,6 +23,10 @@ SHARE = FALSE_ALARMS_PER_RUN / TESTED
 """Probability of each [Bonferroni]: they may depend on one another."""
 
 
+FEWEST_OTHERS = 3
+"""Other runs, or pairs of runs, that must be there for their scatter to say what is usual: of two nobody knows which is spoilt."""
+
+
 def quantile(freedom: float, share: float = SHARE) -> float:
     """Size in standard deviations that a sound value passes, up or down, with probability `share` [Student].
 

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.circles.noise import LEAST_UM
 from dbbstation.quality.bump import bump
 from dbbstation.quality.finding import Finding, Name, Verdict, found, untold
-from dbbstation.quality.limits import joined, quantile, scale_of
+from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
 from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE
 from dbbstation.trace.loss import AFTER_LOSS, share_lost
 
@@ -18,9 +19,6 @@ if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.plan.circle import Circle
     from dbbstation.quality.knowledge import Others, Seen
-
-FEWEST_OTHERS = 3
-"""Runs that must be there beside one for their scatter to say anything."""
 
 
 def lost_samples(one: Seen) -> Finding:
@@ -33,17 +31,17 @@ def lost_samples(one: Seen) -> Finding:
 
 def noise(one: CircleAnalysis, others: Others) -> Finding:
     """Noise against that of the other runs."""
-    value = one.noise.slow_um
-    if not np.isfinite(value):
+    value = max(one.noise.reading_um, LEAST_UM)
+    if not one.noise.known:
         return untold(Name.NOISE, "too few samples to tell noise from form", "µm")
-    known = [other for other in others.noise_um if np.isfinite(other) and other > 0.0]
+    known = [max(other, LEAST_UM) for other in others.noise_um if np.isfinite(other)]
     if len(known) < FEWEST_OTHERS:
         return untold(
             Name.NOISE, f"{value:.2f} µm; fewer than {FEWEST_OTHERS} other runs to hold it against", "µm", value
         )
     logs = np.log(known)
     middle = float(np.median(logs))
-    own = 1.0 / float(np.sqrt(2.0 * one.noise.freedom))
+    own = 1.0 / float(np.sqrt(2.0 * one.noise.reading_freedom))
     # The median of n values is off by sqrt(pi / 2n) of their scatter.
     u = own * float(np.sqrt(1.0 + 0.5 * np.pi / len(known)))
     limit = float(np.exp(middle + _beyond(u, np.inf, [(float(log - middle), own) for log in logs])))
@@ -60,8 +58,8 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
 
 def closure(one: CircleAnalysis, others: Others) -> Finding:
     """End of the turn less its beginning, against noise and what the other runs do."""
-    if one.closure is None:
-        return untold(Name.CLOSURE, "too few samples at the ends of the turn", "µm")
+    if one.closure is None or not one.noise.known:
+        return untold(Name.CLOSURE, "too few samples, at the ends of the turn or to tell noise from form", "µm")
     u = one.closure.u_um
     limit = _beyond(u, one.noise.freedom, others.closure_um)
     size = abs(one.closure.height_um)
@@ -80,6 +78,8 @@ def drift(one: CircleAnalysis, others: Others) -> Finding:
     """Second pass of the overlap less the first, against noise, feed and what the other runs do."""
     if one.passes is None:
         return untold(Name.DRIFT, "the recording was cut to its turn: no place is passed twice", "µm")
+    if not one.noise.known:
+        return untold(Name.DRIFT, "too few samples to tell noise from form", "µm")
     passes = one.passes
     u = passes.u_mean_um(one.noise.sigma_um)
     limit = _beyond(float(np.hypot(u, _by_feed_um(one))), one.noise.freedom, others.drift_um)

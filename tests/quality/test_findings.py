@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.quality.finding import Name, Verdict
 from dbbstation.quality.judge import SessionRuns
@@ -21,7 +22,8 @@ from dbbstation.quality.limits import (
     quantile,
     scale_of,
 )
-from tests.quality.sabotage import SPOILERS, calibrated, finding_of, mirrored, sound, spoil
+from tests.cli.conftest import call
+from tests.quality.sabotage import SPOILERS, calibrated, finding_of, mirrored, read, sound, spoil
 
 
 @pytest.fixture(scope="module")
@@ -163,3 +165,12 @@ def test_two_hundred_sound_circles(tmp_path):
     judged = [j for seed in range(1, 7) for j in sound(tmp_path / str(seed), seed).judged()][:200]
     assert len(judged) == 200
     assert sum(bool(j.wrong) for j in judged) <= 2
+
+
+@pytest.mark.parametrize("samples", [36, 720])
+def test_computed_recordings_without_noise_have_no_findings(tmp_path, samples):
+    model = shipped_folder("fixtures") / "models" / "small.yaml"
+    plan = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
+    outcome = call("simulate", "--model", model, "--plan", plan, "--out", tmp_path / "computed", "--samples", samples)
+    assert outcome.code == 0, outcome.err
+    assert [f"{j.run.label}: {f.text}" for j in read(tmp_path / "computed").judged() for f in j.wrong] == []

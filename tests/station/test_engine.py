@@ -20,12 +20,13 @@ from dbbstation.station import events, storage
 from dbbstation.station.assembly import Job, assemble
 from dbbstation.station.commands import Accept, Quit, Repeat, Skip, Start
 from dbbstation.station.engine import Station
+from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import State
 from dbbstation.station.storage import time_of_day
 from tests.station.bench import MACHINE_FILE
-from tests.station.readings import all_untold, run_readings
+from tests.station.readings import run_readings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,7 +60,7 @@ class Script:
 
 def made(plan_file: Path, source: Script) -> Station:
     plan = read_plan(plan_file)
-    return Station(Sequencer(plan, Schedule(plan, lambda *_: 1), all_untold), source)
+    return Station(Sequencer(plan, Schedule(plan, lambda *_: 1), recording_of), source)
 
 
 def test_commands_from_another_thread_wake_it(plan_file: Path) -> None:

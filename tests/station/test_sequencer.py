@@ -13,10 +13,11 @@ from dbbstation.station import events
 from dbbstation.station.commands import Accept, Quit, Reject, Repeat, Skip, Start
 from dbbstation.station.detector import Patience
 from dbbstation.station.instructions import instructions
+from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import State
-from tests.station.readings import all_untold, kinds, run_readings, still
+from tests.station.readings import kinds, run_readings, still
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -35,7 +36,7 @@ def made(plan: Plan, **more: Patience) -> Sequencer:
     def next_repeat(test: str, direction: Direction) -> int:
         return taken.get((test, direction), 0) + 1
 
-    sequencer = Sequencer(plan, Schedule(plan, next_repeat), all_untold, **more)
+    sequencer = Sequencer(plan, Schedule(plan, next_repeat), recording_of, **more)
     sequencer.taken = taken  # type: ignore[attr-defined]
     return sequencer
 

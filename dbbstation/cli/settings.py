@@ -60,7 +60,7 @@ def built_in() -> dict[str, Any]:
     from dbbstation.station.bar_known import USUAL_AGE_H
 
     return {
-        **dict.fromkeys(("instrument", "port", "baud", "serial_number")),
+        **dict.fromkeys(("instrument", "profile", "port", "baud", "serial_number")),
         **{
             f"bar.{key}": None
             for key in ("serial_number", "calibrated_length_mm", "calibrator_uncertainty_mm", "temp_c")

@@ -153,10 +153,10 @@ def _of_struts(machine: Machine, pairs: Sequence[Pair], low: int) -> list[Family
         found.setdefault((_STEP, None), []).append(steps)
         signs = []
         for shape in shapes(extent):
-            if shape.name not in _NAMES:
+            if str(shape.follows) not in _NAMES:
                 continue
             columns = towards @ shape.columns(run)
-            found.setdefault((_NAMES[shape.name], shape.strut), []).append(columns)
+            found.setdefault((_NAMES[str(shape.follows)], shape.strut), []).append(columns)
             if shape.variable == "strut-speed-sign" and shape.strut is not None:
                 signs.append(columns)
         if signs:

@@ -14,7 +14,8 @@ from dbbstation.errors import TraceError
 from dbbstation.station.detector import DWELL_BEHIND_S, live_phi_deg
 from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
-from dbbstation.trace.cut import cut, lost_on_turn
+from dbbstation.trace.cut import cut
+from dbbstation.trace.cut import lost_on_turn as shown_lost
 from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 from dbbstation.trace.recording import Recording
 
@@ -127,13 +128,28 @@ class RunRecord:
             recording: the whole run.
             largest_loss_percent: share of the samples that may be lost [%].
         """
-        shown, kept = lost_on_turn(recording, self.circle)
-        if problem := too_many_lost(max(self.lost_on_turn, shown), kept, largest_loss_percent):
-            return None, f"{problem}; {AFTER_LOSS}"
-        try:
-            return figures(cut(recording, self.circle, counted_lost=self.lost)), ""
-        except TraceError as error:
-            return None, str(error)
+        return circle_figures(recording, self.circle, self.lost, self.lost_on_turn, largest_loss_percent)
+
+
+def circle_figures(
+    recording: Recording, circle: Circle, lost: int, lost_on_turn: int, largest_loss_percent: float
+) -> tuple[CircleFigures | None, str]:
+    """Return the figures of a recorded circle, or None and why there is none.
+
+    Args:
+        recording: of the whole run.
+        circle: as commanded.
+        lost: samples that the line counted as lost, wherever in the run; 0 where nobody counted.
+        lost_on_turn: those from feed-in to feed-out.
+        largest_loss_percent: share of the samples that may be lost [%].
+    """
+    shown, kept = shown_lost(recording, circle)
+    if problem := too_many_lost(max(lost_on_turn, shown), kept, largest_loss_percent):
+        return None, f"{problem}; {AFTER_LOSS}"
+    try:
+        return figures(cut(recording, circle, counted_lost=lost)), ""
+    except TraceError as error:
+        return None, str(error)
 
 
 def unrecorded(reading: Reading) -> Sample:

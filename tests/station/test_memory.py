@@ -12,12 +12,12 @@ import pytest
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.instrument.reading import Reading
+from dbbstation.service.board import Board
 from dbbstation.station import events
 from dbbstation.station.assembly import Job, assemble
 from dbbstation.station.commands import Quit, Start
 from dbbstation.station.detector import Patience
 from dbbstation.station.states import State
-from dbbstation.tui.board import Board
 from tests.station.bench import MACHINE_FILE
 
 if TYPE_CHECKING:

@@ -100,6 +100,8 @@ class SettingsFile(Schema):
     """Name and version of this format."""
     instrument: _Word | None = None
     """Name of an instrument, or path of a protocol file from this file's folder."""
+    profile: _Word | None = None
+    """Variant of the instrument, where it is not the usual one."""
     port: _Word | None = None
     """Port that the instrument is connected to, or a URL."""
     baud: Annotated[int, Field(ge=1)] | None = None
@@ -116,3 +118,11 @@ class SettingsFile(Schema):
     """How numbers are written in tables from elsewhere."""
     tolerances: tuple[ToleranceSettings, ...] | None = None
     """What circles may have."""
+
+    @model_validator(mode="after")
+    def _profile_of_something(self) -> "SettingsFile":
+        if self.profile is not None and self.instrument is None:
+            raise PydanticCustomError(
+                "alone", "a profile is one of an instrument; give `instrument` in the same file", {}
+            )
+        return self

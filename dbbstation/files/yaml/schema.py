@@ -25,6 +25,28 @@ FORMATS = {
 
 _OF_MACHINES = {"greatest_feed_mm_min": 2, "greatest_turn_deg_min": 2}
 
+_OF_INSTRUMENTS = dict.fromkeys(
+    (
+        "bare",
+        "feature",
+        "features",
+        "follow_up",
+        "latch_bounds_s",
+        "leading_zero",
+        "min_width",
+        "profile",
+        "profiles",
+        "refused",
+        "relative",
+        "request_end",
+        "scale",
+        "zero_mm",
+        "prefix",
+        "end",
+    ),
+    3,
+)
+
 _OF_BARS = ("reading_mm", "temp_uncertainty_k", "calibrator_serial_number", "bar_waiver")
 
 SINCE: dict[str, dict[str, int]] = {
@@ -37,8 +59,8 @@ SINCE: dict[str, dict[str, int]] = {
         "counts": 3,
         **dict.fromkeys(_OF_BARS, 3),
     },
-    "dbb-instrument": {"stroke_mm": 2},
-    "dbb-settings": {"largest_bar_age_h": 2},
+    "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},
+    "dbb-settings": {"largest_bar_age_h": 2, "profile": 2},
     "dbb-machine": _OF_MACHINES,
     "dbb-model": {**_OF_MACHINES, "provenance": 3},
 }

@@ -13,9 +13,6 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from benchmarks.measuring import Row, show  # isort: skip - sets up the environment
 

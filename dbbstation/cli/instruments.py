@@ -37,14 +37,19 @@ def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None
         return
     if profile is not None:
         raise click.UsageError("--profile is one of an instrument: name the instrument too")
-    known = [load_instrument(one) for one in known_instruments()]
+    known = [load_variants(one) for one in known_instruments()]
     if as_json:
-        print_json({"instruments": [_summary(one) for one in known]})
+        rows = [{**_summary(one[0]), "profiles": [each.profile for each in one if each.profile]} for one in known]
+        print_json({"instruments": rows})
         return
-    for one in known:
-        click.echo(
-            f"{one.name}\n    {one.title}\n    {one.line.text}, about {one.fastest_hz():.0f} readings per second"
-        )
+    for variants in known:
+        one, called = variants[0], ", ".join(each.profile for each in variants if each.profile)
+        open_ones = sum(not each.verified for each in one.references)
+        click.echo(f"{one.name}" + (f" ({called})" if called else ""))
+        click.echo(f"    {one.title}")
+        click.echo(f"    {one.line.text}, about {one.fastest_hz():.0f} readings per second")
+        if open_ones:
+            click.echo(f"    {open_ones} of {len(one.references)} statements about it are not verified")
 
 
 def _summary(protocol: Protocol) -> dict[str, object]:
@@ -55,7 +60,7 @@ def _summary(protocol: Protocol) -> dict[str, object]:
         "line": protocol.line.model_dump(),
         "mode": protocol.ask.mode,
         "readings_per_second": protocol.fastest_hz(),
-        "verified": all(one.verified for one in protocol.references),
+        "not_verified": [one.says for one in protocol.references if not one.verified],
         "has_checksum": protocol.has_checksum,
         "counts_samples": protocol.counter_modulus is not None,
         "range_mm": protocol.length.range_mm,

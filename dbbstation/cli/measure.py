@@ -109,6 +109,7 @@ def measure(
         clock=clock,
         time_scale=time_scale,
         rate_hz=protocol.fastest_hz(baud),
+        range_mm=protocol.length.range_mm,
     )
     job.check(str(plan_file))
     say_sampling(plan.to_domain(), protocol, baud)

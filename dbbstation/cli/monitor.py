@@ -13,8 +13,8 @@ from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, inst
 from dbbstation.cli.provenance import provenance
 
 if TYPE_CHECKING:
-    from dbbstation.instrument.driver import Tally
     from dbbstation.instrument.reading import Reading
+    from dbbstation.instrument.reception import Tally
 
 
 @click.command()

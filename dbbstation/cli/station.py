@@ -106,7 +106,7 @@ def station(
     details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
     with ExitStack() as stack:
-        job = Job(machine, plan, folder, details, rate_hz=protocol.fastest_hz(baud))
+        job = Job(machine, plan, folder, details, rate_hz=protocol.fastest_hz(baud), range_mm=protocol.length.range_mm)
         job.check(str(plan_file))
         if not virtual:
             require_bar(job, largest_bar_age_h)

@@ -10,19 +10,16 @@ import threading
 import time
 from collections import deque
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError, StationError
 from dbbstation.instrument import symptoms
 from dbbstation.instrument.adapters import adapter_of, port_of
-from dbbstation.instrument.arrivals import Arrivals
-from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage, Heard, Piece
-from dbbstation.instrument.latch import latch_of
 from dbbstation.instrument.link import LineClosedError, open_link
-from dbbstation.instrument.reading import Reading
-from dbbstation.instrument.sequence import Sequence
-from dbbstation.instrument.stamps import StreamStamps
+from dbbstation.instrument.listening import Listener
+from dbbstation.instrument.polling import Poller
+from dbbstation.instrument.reception import Reception, Tally
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -30,49 +27,15 @@ if TYPE_CHECKING:
 
     from dbbstation.instrument.adapters import Adapter
     from dbbstation.instrument.bytelog import ByteLog
-    from dbbstation.instrument.fields import Reason
     from dbbstation.instrument.link import Link, Port
     from dbbstation.instrument.protocol import Protocol, Step
-
-_PAUSE_TICK_S = 0.001
-
-_MARGIN_S = 0.02
-
-_INCOMPLETE = "incomplete"
+    from dbbstation.instrument.reading import Reading
 
 _LOOK_S = 0.25
 """Between looks for an adapter that was pulled out [s]."""
 
 _JOIN_S = 5.0
 """The reader thread ends within some hundredths of a second; after this long something is broken."""
-
-
-@dataclass(slots=True)
-class Tally:
-    """What a driver has seen since `start`.
-
-    Attributes:
-        readings: handed out.
-        lost: samples that never came, or came and were rejected.
-        rejected: frames and stretches of bytes that were not believed, by reason.
-        garbage_bytes: bytes of these.
-        garbage: an example of them.
-        reconnected: how often the line was opened again.
-    """
-
-    readings: int = 0
-    lost: int = 0
-    rejected: dict[Reason, int] = field(default_factory=dict)
-    garbage_bytes: int = 0
-    garbage: bytes = b""
-    reconnected: int = 0
-
-    def reject(self, raw: bytes, reason: Reason) -> None:
-        """Count bytes that were not believed."""
-        if raw:
-            self.rejected[reason] = self.rejected.get(reason, 0) + 1
-            self.garbage_bytes += len(raw)
-            self.garbage = self.garbage or raw[:LONGEST_LINE]
 
 
 class Instrument:
@@ -252,11 +215,22 @@ class Instrument:
             self._end(InstrumentError(f"reading failed: {type(error).__name__}: {error}", where=self.where))
 
     def _read_on(self, link: Link, after: bytes) -> None:
+        reception = Reception(
+            protocol=self.protocol,
+            where=self.where,
+            baud=self._baud,
+            clock=self._clock,
+            timeout_s=self._timeout_s,
+            memory_s=self._memory_s,
+            tally=self.tally,
+            stop=self._stop,
+            put=self._put,
+        )
         if self.protocol.ask.asked:
             self.tally.reject(after, "bytes")
-            self._poll(link)
+            Poller(link, reception).run()
         else:
-            self._listen(link, after)
+            Listener(link, reception).run(after)
 
     def _plugged_in_again(self) -> tuple[Link, bytes] | None:
         """Wait for the same adapter under whatever name; return its line, and what came behind the start sequence."""
@@ -276,144 +250,6 @@ class Instrument:
                 self.tally.reconnected += 1
                 return link, self._begin(link)
         return None
-
-    def _poll(self, link: Link) -> None:
-        """Ask, wait for the reply, ask again; a reply that does not come or cannot be read is asked for again."""
-        timing, request = self.protocol.timing, self.protocol.ask.request
-        sequence = Sequence[Reading](self.protocol.counter_modulus, self.where)
-        pause_s = 1.0 / timing.rate_hz if timing.rate_hz else 0.0
-        last_s = float("-inf")
-        failed: list[Garbage] = []
-        explained = ""
-        self._until_quiet(link)
-        while not self._stop.is_set():
-            asked_s = self._clock()
-            link.write(request)
-            heard, first_s = self._reply(link, self.protocol)
-            if self._stop.is_set():
-                return
-            if isinstance(heard, Piece):
-                latch = latch_of(self.protocol, asked_s=asked_s, first_byte_s=first_s, baud=self._baud)
-                last_s = max(latch.t_s, last_s + 1e-6)
-                reading = replace(heard.reading, t_s=last_s, t_uncertainty_s=latch.uncertainty_s, first_byte_s=first_s)
-                if reading.status == "fault":
-                    # Asked once: while the fault lasts the words stay the same.
-                    explained = explained or self._explanation(link) or reading.said
-                    reading = replace(reading, said=explained)
-                else:
-                    explained = ""
-                for placed in sequence.place(reading.counter, reading):
-                    if placed.lost is None:
-                        self.tally.reject(heard.raw, "counter")
-                    else:
-                        self._put(replace(placed.sample, lost=placed.lost if sequence.counts else len(failed)))
-                failed.clear()
-                while self._clock() < asked_s + pause_s and not self._stop.wait(_PAUSE_TICK_S):
-                    pass
-                continue
-            failed.append(heard)
-            self.tally.reject(heard.raw, heard.reason)
-            self._until_quiet(link)
-            if len(failed) > timing.retries:
-                # The attempt that brought something says more than the silence after it.
-                telling = next((one for one in reversed(failed) if one.raw), heard)
-                raise self._symptom(telling.raw, telling.why)
-
-    def _explanation(self, link: Link) -> str:
-        """Ask for the text of a fault; empty where the device has none to tell or is not asked."""
-        follow_up, protocol = self.protocol.ask.follow_up, self.protocol.explaining
-        if follow_up is None or protocol is None:
-            return ""
-        link.write(follow_up.request)
-        heard, _ = self._reply(link, protocol)
-        if isinstance(heard, Garbage):
-            self.tally.reject(heard.raw, heard.reason)
-            return ""
-        # Only the first of the frames has words; the others say that there are none.
-        return heard.reading.said if protocol.frames[0].pattern.fullmatch(heard.raw) else ""
-
-    def _until_quiet(self, link: Link) -> None:
-        """Let a reply to an earlier request pass, perhaps one of a program before, lest it be taken for the next one.
-
-        The line is quiet when nothing came for longer than a reply takes from the request to its last byte.
-        """
-        timing, line = self.protocol.timing, self.protocol.line
-        quiet_s = timing.reply_latency_s + self.protocol.frame_characters * line.character_s(self._baud) + _MARGIN_S
-        now_s = heard_s = time.monotonic()
-        end_s = now_s + self._timeout_s + quiet_s
-        while now_s < min(heard_s + quiet_s, end_s) and not self._stop.is_set():
-            raw = link.read()
-            now_s = time.monotonic()
-            heard_s = now_s if raw else heard_s
-            self.tally.reject(raw, "bytes")
-
-    def _reply(self, link: Link, protocol: Protocol) -> tuple[Heard, float]:
-        """Return the reply, or as garbage whatever came instead before patience ended; and when its first byte was seen."""
-        decoder = Decoder(protocol, joining=False)
-        character_s = protocol.line.character_s(self._baud)
-        deadline_s = time.monotonic() + self._timeout_s
-        first_s: float | None = None
-        while time.monotonic() < deadline_s and not self._stop.is_set():
-            raw = link.read()
-            if raw and first_s is None:
-                first_s = self._clock() - (len(raw) - 1) * character_s
-            heard = decoder.feed(raw)
-            pieces = [one for one in heard if isinstance(one, Piece)]
-            if pieces:
-                noise = b"".join(one.raw for one in heard if isinstance(one, Garbage)) + decoder.take_pending()
-                self.tally.reject(noise, "bytes")
-                return pieces[-1], first_s or 0.0
-            if heard and not decoder.pending:
-                # A whole line that is no reading: asking again is quicker than waiting.
-                return heard[-1], first_s or 0.0
-        return Garbage(decoder.take_pending(), _INCOMPLETE), first_s or 0.0
-
-    def _listen(self, link: Link, chunk: bytes) -> None:
-        """Take what comes; only a long time without a reading is an error."""
-        timing, character_s = self.protocol.timing, self.protocol.line.character_s(self._baud)
-        sequence = Sequence[tuple[Piece, float, float]](self.protocol.counter_modulus, self.where)
-        # Behind the answer to a start command the stream begins with a whole frame.
-        decoder = Decoder(self.protocol, joining=not (self.protocol.ask.start and self.protocol.ask.start[-1].reply))
-        stamps = StreamStamps(1.0 / self.protocol.fastest_hz(self._baud), self._memory_s)
-        arrivals = Arrivals(character_s, 2 * LONGEST_LINE)
-        good_s = time.monotonic()
-        garbled, unread, why = 0, b"", ""
-        while not self._stop.is_set():
-            chunk += link.read()
-            seen_s = self._clock()
-            arrivals.note(len(chunk), seen_s)
-            for heard in decoder.feed(chunk) if chunk else ():
-                if isinstance(heard, Garbage):
-                    if not heard.joining:
-                        self.tally.reject(heard.raw, heard.reason)
-                        garbled += max(1, round(len(heard.raw) / self.protocol.frame_characters))
-                        unread, why = (unread + heard.raw)[:LONGEST_LINE], heard.why
-                    continue
-                size = heard.after + len(heard.raw)
-                on_line_s = seen_s - size * character_s - timing.latch_delay_s
-                sample = (heard, on_line_s, arrivals.at_latest_s(size - 1))
-                for placed in sequence.place(heard.reading.counter, sample):
-                    piece, left_s, first_s = placed.sample
-                    if placed.lost is None:
-                        self.tally.reject(piece.raw, "counter")
-                        unread, why = (unread + piece.raw)[:LONGEST_LINE], placed.why
-                        continue
-                    lost = placed.lost if sequence.counts else garbled
-                    t_s = stamps.stamp(left_s, lost)
-                    self._put(replace(piece.reading, t_s=t_s, lost=lost, first_byte_s=first_s))
-                    good_s = time.monotonic()
-                    garbled, unread, why = 0, b"", ""
-            chunk = b""
-            if time.monotonic() - good_s > self._timeout_s:
-                raise self._symptom(unread or decoder.pending, why if unread else _INCOMPLETE)
-
-    def _symptom(self, raw: bytes, why: str) -> InstrumentError:
-        if not raw:
-            heard_before = self.tally.readings > 0
-            return symptoms.silence(self.protocol, self.where, self._timeout_s, self._baud, heard_before=heard_before)
-        if why == _INCOMPLETE and symptoms.begins_well(self.protocol, raw):
-            return symptoms.half_line(raw, self.where, self._timeout_s)
-        return symptoms.garbage(self.protocol, self.where, raw, why, self._baud)
 
     def _put(self, reading: Reading) -> None:
         if self._away and self._last_s is not None:

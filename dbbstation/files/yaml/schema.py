@@ -264,6 +264,7 @@ def keys_at(schema: type[Schema], location: Location) -> Iterator[str]:
             if isinstance(step, int) and "prefixItems" in part:
                 inner += part["prefixItems"][step : step + 1]
             inner += [part[name] for name in ("items", "additionalProperties") if isinstance(part.get(name), dict)]
+            inner += part.get("patternProperties", {}).values()
             inner += [part["properties"][step]] if step in part.get("properties", {}) else []
         parts = [found for option in inner for found in alternatives(option)]
     for part in parts:

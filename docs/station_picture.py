@@ -27,6 +27,7 @@ from dbbstation.service.board import SequenceOpened
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named
 from dbbstation.station.commands import Accept, Start
+from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.tui.app import Shown
@@ -58,7 +59,7 @@ def happened() -> tuple[Shown, list[Event | SequenceOpened]]:
     truth = MachineModel(machine, (*kinematics, Fitted(play, np.array(PLAY_UM))))
     virtual = VirtualMachine(truth, plan, seed=SEED)
     schedule = Schedule(plan, lambda _test, _direction: 1)
-    sequencer = Sequencer(plan, schedule)
+    sequencer = Sequencer(plan, schedule, recording_of)
     events: list[Event | SequenceOpened] = [
         SequenceOpened(schedule.tasks, schedule.open, "2026-11-20-hexapod-7"),
         *sequencer.begin(),

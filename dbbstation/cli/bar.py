@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.cli.instrument_options import instrument_options
+from dbbstation.cli.instrument_options import chosen_protocol, instrument_options
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from dbbstation.files.formats.bar import BarFile
+    from dbbstation.instrument.protocol import Protocol
     from dbbstation.trace.steady import Steady
 
 USUAL_TEMP_UNCERTAINTY_K = 0.3
@@ -60,6 +61,8 @@ STEEL_BAR_UM_M_K = 11.5
 def bar(
     *,
     instrument: str,
+    profile: str | None,
+    zero_mm: float | None,
     port: str,
     baud: int | None,
     serial_number: str,
@@ -96,7 +99,8 @@ def bar(
     from dbbstation.files.formats.bar import write_bar
 
     refuse_existing(out, force=force)
-    found = _read(instrument, port, baud, count, resolution_um)
+    protocol = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=calibrator_mm)
+    found = _read(protocol, port, baud, count, resolution_um)
     file = _file(
         found,
         {
@@ -133,7 +137,7 @@ _DRIFT = 2.0
 """A drift that is greater than the expanded uncertainty (k = 2) matters."""
 
 
-def _read(instrument: str, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:
+def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:
     """Mean of so many good readings.
 
     Raises:
@@ -144,11 +148,10 @@ def _read(instrument: str, port: str, baud: int | None, count: int, resolution_u
 
     from dbbstation.errors import InstrumentError
     from dbbstation.instrument.driver import Instrument
-    from dbbstation.instrument.library import load_instrument
     from dbbstation.trace.steady import steady
 
     lengths: list[float] = []
-    with Instrument(load_instrument(instrument), port, baud=baud, **driver_patience(1.0)) as source:
+    with Instrument(protocol, port, baud=baud, **driver_patience(1.0)) as source:
         for reading in source.readings(2 * count):
             if reading.length_mm is not None and reading.status == "ok":
                 lengths.append(reading.length_mm)

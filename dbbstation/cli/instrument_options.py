@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def protocol_options(*, required: bool) -> Callable[[_Function], _Function]:
         ),
         click.option(
             "--zero-mm",
-            type=click.FloatRange(20.0, 2000.0),
+            type=Finite(20.0, 2000.0),
             help="Distance between the ball centres at which an instrument that has no room for it shows zero [mm].",
         ),
     )

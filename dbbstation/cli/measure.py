@@ -16,7 +16,7 @@ from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.sampling import say_sampling
-from dbbstation.cli.session_options import require_bar, session_details, session_options
+from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -97,7 +97,7 @@ def measure(
 
     clock = ScaledClock(time_scale)
     machine, plan = read_machine(machine_file), with_loss_limit(read_inline_plan(plan_file), largest_loss_percent)
-    chosen = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=told["bar_length_mm"])
+    chosen = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=stated_length_mm(told))
     protocol = at_rate(chosen, rate_hz)
     job = Job(
         machine=machine,

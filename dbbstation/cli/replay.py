@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.number_types import Finite
+
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
@@ -15,7 +17,7 @@ import click
 @click.option("--profile", metavar="NAME", help="Variant of the instrument [default: that of the log].")
 @click.option(
     "--zero-mm",
-    type=click.FloatRange(20.0, 2000.0),
+    type=Finite(20.0, 2000.0),
     default=None,
     help="Length at which an instrument that has no room for it shows zero [mm]; without, lengths count from there.",
 )

@@ -12,7 +12,7 @@ from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import from_settings, shop_option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from dbbstation.files.recordings.session_text import SessionDetails
     from dbbstation.plan.bar import Bar
@@ -97,6 +97,23 @@ def session_details(
         return replace(details, bar_waiver=bar_waiver.strip())
     bar = _bar(bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c, stroke_mm)
     return SessionDetails(serial_number, operator, ambient_temp_c, bar, bar_waiver.strip())
+
+
+def stated_length_mm(told: Mapping[str, Any]) -> float | None:
+    """Return the length of the bar that its file or `--bar-length-mm` states [mm]; None where neither does.
+
+    Args:
+        told: the options, as `session_details` takes them.
+
+    Raises:
+        InputError: faults of the bar's file.
+    """
+    if told["bar_file"] is None:
+        length_mm: float | None = told["bar_length_mm"]
+        return length_mm
+    from dbbstation.files.formats.bar import read_bar
+
+    return read_bar(told["bar_file"]).length_mm
 
 
 def require_bar(job: Job, largest_age_h: float | None) -> None:

@@ -17,7 +17,7 @@ from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.sampling import say_sampling
-from dbbstation.cli.session_options import require_bar, session_details, session_options
+from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 from dbbstation.cli.shop import from_settings
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def station(
     machine = read_machine(machine_file or demo("machine"))
     plan = with_loss_limit(read_inline_plan(plan_file), largest_loss_percent)
     name = instrument or _DEMO_INSTRUMENT
-    protocol = chosen_protocol(name, profile, zero_mm, bar_length_mm=told["bar_length_mm"])
+    protocol = chosen_protocol(name, profile, zero_mm, bar_length_mm=stated_length_mm(told))
     details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
     with ExitStack() as stack:

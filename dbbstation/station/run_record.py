@@ -33,7 +33,7 @@ _STEP_S = 2e-6
 class Recorded(Protocol):
     """Gives back what was recorded of the run that goes on."""
 
-    def __call__(self, run: RunId, behind: Sequence[Sample]) -> Recording:
+    def __call__(self, run: RunId, behind: Sequence[Sample], /) -> Recording:
         """Return the whole run.
 
         Args:

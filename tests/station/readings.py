@@ -31,11 +31,6 @@ def run_readings(circle: Circle, begin_s: float = 0.0, rate_hz: float = RATE_HZ)
     return [Reading(begin_s + float(t), float(value)) for t, value in zip(t_s, length, strict=True)]
 
 
-def all_untold(run: RunId, behind: Sequence[Sample]) -> Recording:
-    """The recording of a run whose readings all came in one call."""
-    return recording_of(run, behind)
-
-
 def told_and_untold(told: Sequence[Event]) -> Recorded:
     """The recording of a run of which a list of events has the first samples."""
 

@@ -20,12 +20,13 @@ from dbbstation.station import events, storage
 from dbbstation.station.assembly import Job, assemble
 from dbbstation.station.commands import Accept, Quit, Repeat, Skip, Start
 from dbbstation.station.engine import Station
+from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import State
 from dbbstation.station.storage import time_of_day
 from tests.station.bench import MACHINE_FILE
-from tests.station.readings import all_untold, run_readings
+from tests.station.readings import run_readings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,7 +60,7 @@ class Script:
 
 def made(plan_file: Path, source: Script) -> Station:
     plan = read_plan(plan_file)
-    return Station(Sequencer(plan, Schedule(plan, lambda *_: 1), all_untold), source)
+    return Station(Sequencer(plan, Schedule(plan, lambda *_: 1), recording_of), source)
 
 
 def test_commands_from_another_thread_wake_it(plan_file: Path) -> None:
@@ -148,11 +149,11 @@ def test_what_is_stored_is_what_was_read(plan_file: Path, tmp_path: Path) -> Non
 def test_what_came_over_the_line_is_counted_in_run_file_and_session(plan_file: Path, tmp_path: Path) -> None:
     plan = read_inline_plan(plan_file)
     readings = run_readings(plan.to_domain().tests["a"].circle, 1000.0)
-    # Behind the feed-in, where the run has begun for certain; few enough for the plan.
+    # Lost on the arc, few enough for the plan; without a length in the dwell before it, where that harms nothing.
     readings[300] = replace(readings[300], lost=2)
-    readings[400] = replace(readings[400], length_mm=None, status="fault", said="signal lost")
-    readings[401] = replace(readings[401], status="overrange", said="beyond its range")
-    readings[402] = replace(readings[402], status="overrange", said="beyond its range")
+    readings[8] = replace(readings[8], length_mm=None, status="fault", said="signal lost")
+    readings[9] = replace(readings[9], status="overrange", said="beyond its range")
+    readings[10] = replace(readings[10], status="overrange", said="beyond its range")
     source = Script(readings)
     workplace = assemble(Job(read_machine(MACHINE_FILE), plan, tmp_path / "session"), source)
     station = workplace.station

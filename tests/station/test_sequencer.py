@@ -13,10 +13,11 @@ from dbbstation.station import events
 from dbbstation.station.commands import Accept, GoTo, Judge, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.detector import Patience
 from dbbstation.station.instructions import instructions
+from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer, Waiting
 from dbbstation.station.states import State
-from tests.station.readings import all_untold, kinds, run_readings, still
+from tests.station.readings import kinds, run_readings, still
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,7 +37,7 @@ def made(plan: Plan, **more: Any) -> Sequencer:
     def next_repeat(test: str, direction: Direction) -> int:
         return taken.get((test, direction), 0) + 1
 
-    sequencer = Sequencer(plan, Schedule(plan, next_repeat), all_untold, **more)
+    sequencer = Sequencer(plan, Schedule(plan, next_repeat), recording_of, **more)
     sequencer.taken = taken  # type: ignore[attr-defined]
     return sequencer
 
@@ -303,7 +304,7 @@ def test_a_run_without_a_verdict_is_offered_again_before_anything_is_measured(pl
     for command, following in ((Accept(), "a-cw-1"), (Repeat("no"), "a-ccw-2"), (Reject("no"), "a-cw-1")):
         schedule = Schedule(plan, lambda *run: 2 if run == ("a", Direction.CCW) else 1)
         schedule.recorded(completed.run)
-        again = Sequencer(plan, schedule, waiting=[Waiting(completed, samples)])
+        again = Sequencer(plan, schedule, recording_of, waiting=[Waiting(completed, samples)])
         offered = again.begin()
         assert kinds(offered) == ["RunAnnounced", "RunRestored", "RunCompleted"]
         assert again.state is State.COMPLETE

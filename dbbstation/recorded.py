@@ -63,8 +63,8 @@ def load_sessions(
     warnings = _check_one_machine(sessions)
     _check_no_copies(sessions)
     every = {test for session in sessions for test in session.plan.tests}
-    _check_named(sessions, every, exclude, " to exclude")
-    _check_named(sessions, every, only)
+    check_named(sessions, every, exclude, " to exclude")
+    check_named(sessions, every, only)
     exclude = [*exclude, *(test for test in every if only and test not in only)]
     observations: list[Observation] = []
     problems: list[Problem] = []
@@ -224,7 +224,7 @@ def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
     return told
 
 
-def _check_named(sessions: Sequence[SessionFolder], every: set[str], named: Sequence[str], why: str = "") -> None:
+def check_named(sessions: Sequence[SessionFolder], every: set[str], named: Sequence[str], why: str = "") -> None:
     """Refuse names of tests that no session has."""
     unknown = [name for name in named if name not in every]
     if unknown:

@@ -23,13 +23,13 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
+from dbbstation.service.board import SequenceOpened
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named
 from dbbstation.station.commands import Accept, Start
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.tui.app import Shown
-from dbbstation.tui.board import SequenceOpened
 from dbbstation.tui.still import still_svg
 from dbbstation.virtual.machine import VirtualMachine
 from dbbstation.virtual.truth import random_kinematics

@@ -24,6 +24,7 @@ _DEBUG, _VERBOSE, _SETTINGS = "--debug", "--verbose", "--settings"
 COMMANDS = {
     "calibrate": "Fit the machine's errors to recorded sessions.",
     "check": "Validate files of any format, and whole sessions.",
+    "circles": "Figures of measured circles after ISO 230-4, and findings.",
     "compare": "Where two sessions differ, and which variable that follows.",
     "compensate": "Compensate any NC program with a calibrated model.",
     "diagnose": "Find the physics that a calibration leaves out.",

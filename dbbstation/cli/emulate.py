@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.instrument_options import chosen_protocol, protocol_options
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -23,12 +24,7 @@ _LOOK_S = 0.2
 
 
 @click.command()
-@click.option(
-    "--instrument",
-    required=True,
-    metavar="NAME",
-    help="Name of an instrument (`dbbstation instruments`), or a protocol file.",
-)
+@protocol_options(required=True)
 @click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="Test plan.")
 @click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
 @click.option(
@@ -68,6 +64,8 @@ _LOOK_S = 0.2
 def emulate(
     *,
     instrument: str,
+    profile: str | None,
+    zero_mm: float | None,
     plan_file: Path,
     machine_file: Path,
     truth: Path | None,
@@ -98,14 +96,14 @@ def emulate(
     """
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
-    from dbbstation.instrument.library import at_rate, load_instrument
+    from dbbstation.instrument.library import at_rate
     from dbbstation.virtual.cell import VirtualCell
     from dbbstation.virtual.control import CellCommands, ControlServer
     from dbbstation.virtual.machine import Sizes, VirtualMachine
     from dbbstation.virtual.wire import VirtualInstrument
     from dbbstation.virtual.wire_clock import ScaledClock
 
-    protocol = at_rate(load_instrument(instrument), rate_hz)
+    protocol = at_rate(chosen_protocol(instrument, profile, zero_mm), rate_hz)
     machine, plan = read_machine(machine_file), read_plan(plan_file)
     model = _truth(machine, truth, source_files, seed)
     virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.instrument_options import instrument_options
+from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.patience import driver_patience
+from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import session_details, session_options
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ _AUTO_PATIENCE_S = 60.0
     help="Sampling rate [1/s], where it is not the instrument's usual one.",
 )
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")
+@spy_option
 @loss_option
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
@@ -55,8 +57,11 @@ def measure(
     plan_file: Path,
     machine_file: Path,
     instrument: str,
+    profile: str | None,
+    zero_mm: float | None,
     port: str,
     baud: int | None,
+    spy: Path | None,
     out: Path,
     auto: str | None,
     time_scale: float,
@@ -82,7 +87,7 @@ def measure(
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.recordings.session_writer import SessionDetails
     from dbbstation.instrument.driver import Instrument
-    from dbbstation.instrument.library import at_rate, load_instrument
+    from dbbstation.instrument.library import at_rate
     from dbbstation.station.assembly import Job, assemble
     from dbbstation.station.detector import Patience
     from dbbstation.station.programs import load_programs
@@ -90,7 +95,8 @@ def measure(
 
     clock = ScaledClock(time_scale)
     machine, plan = read_machine(machine_file), with_loss_limit(read_inline_plan(plan_file), largest_loss_percent)
-    protocol = at_rate(load_instrument(instrument), rate_hz)
+    chosen = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=told["bar_length_mm"])
+    protocol = at_rate(chosen, rate_hz)
     job = Job(
         machine=machine,
         plan=plan,
@@ -99,10 +105,18 @@ def measure(
         programs={} if programs is None else load_programs(programs, plan.to_domain(), machine),
         patience=Patience() if auto is None else Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)),
         clock=clock,
+        time_scale=time_scale,
+        rate_hz=protocol.fastest_hz(baud),
     )
     job.check(str(plan_file))
+    say_sampling(plan.to_domain(), protocol, baud)
     hands = None if auto is None else VirtualHands(auto)
-    with Instrument(protocol, port, baud=baud, clock=clock, **driver_patience(time_scale)) as source:
+    with (
+        spying(spy, protocol, port) as log,
+        Instrument(
+            protocol, port, baud=baud, clock=clock, log=log, reconnect_s=RECONNECT_S, **driver_patience(time_scale)
+        ) as source,
+    ):
         workplace = assemble(job, source)
         if workplace.writer.runs and job.details != SessionDetails():
             click.echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)

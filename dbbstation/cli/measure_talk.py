@@ -11,7 +11,7 @@ import click
 
 from dbbstation.cli.output import log_said
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, Quit, Reject, Repeat, Skip, Start
+from dbbstation.station.commands import Accept, GoTo, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import State
 
 if TYPE_CHECKING:
@@ -29,19 +29,26 @@ _QUARTERS = 4
 _OF_MACHINE, _OF_SET_UP = "centre", "set-up"
 """Under the spindle the centre of a circle shows how the balls were put up, and nothing of the machine."""
 
-_ON_ENTER: dict[State, Command] = {State.ANNOUNCED: Start(), State.COMPLETE: Accept(), State.FLAWED: Repeat()}
+_ON_ENTER: dict[State, Command] = {
+    State.ANNOUNCED: Start(),
+    State.COMPLETE: Accept(),
+    State.FLAWED: Repeat(),
+    State.PAUSED: Resume(),
+}
 _WORDS: dict[str, Command] = {
     "m": Start(remounted=True),
     "a": Accept(),
     "r": Repeat(),
     "x": Reject(),
     "s": Skip(),
+    "p": Pause(),
     "q": Quit(),
 }
 _ASKED = {
-    State.ANNOUNCED: "Enter: ready, start the circle   m: ready, the holder was touched   s: skip   q: quit",
+    State.ANNOUNCED: "Enter: ready, start the circle   m: ready, the holder was touched   s: skip   g TEST: go to   p: pause   q: quit",
     State.COMPLETE: "Enter: accept   r: repeat   x: reject   q: quit",
     State.FLAWED: "Enter: repeat   x: reject   q: quit",
+    State.PAUSED: "Enter: go on   q: quit",
 }
 
 
@@ -178,14 +185,22 @@ class Keyboard:
 
     def _listen(self) -> None:
         for line in self._lines:
-            word = line.strip().lower()
-            command = _WORDS.get(word[:1]) if word else _ON_ENTER.get(self._state)
+            word = line.strip()
+            command = _command_of(word) if word else _ON_ENTER.get(self._state)
             if command is not None:
                 self._send(command)
             elif word:
                 click.echo(f"  `{word}` is no answer", err=True)
         # The input has ended: nobody will answer any more.
         self._send(Quit())
+
+
+def _command_of(line: str) -> Command | None:
+    """Return what a line says; a test is named as the plan has it."""
+    word, _, rest = line.partition(" ")
+    if word.lower() == "g" and rest.strip():
+        return GoTo(rest.strip())
+    return _WORDS.get(word[:1].lower())
 
 
 def _lines(event: events.Event, centre: str) -> list[str]:
@@ -203,19 +218,33 @@ def _lines(event: events.Event, centre: str) -> list[str]:
         case events.CommandRefused():
             return [f"  {event.why}"]
         case (
-            events.RunStarted() | events.RunCompleted() | events.RunAccepted() | events.RunRejected() | events.RunLate()
+            events.RunStarted()
+            | events.RunCompleted()
+            | events.RunAccepted()
+            | events.RunRejected()
+            | events.RunLate()
+            | events.FeedInMissed()
+            | events.RunRestored()
         ):
             return [f"  {event.run.label}: {_of_run(event, centre)}"]
     return []
 
 
 def _of_run(
-    event: events.RunStarted | events.RunCompleted | events.RunAccepted | events.RunRejected | events.RunLate,
+    event: events.RunStarted
+    | events.RunCompleted
+    | events.RunAccepted
+    | events.RunRejected
+    | events.RunLate
+    | events.FeedInMissed
+    | events.RunRestored,
     centre: str,
 ) -> str:
     match event:
         case events.RunStarted():
             return "recording"
+        case events.RunRestored():
+            return "recorded before, it waits for its verdict"
         case events.RunAccepted():
             return "accepted"
         case events.RunRejected():

@@ -59,7 +59,7 @@ def built_in() -> dict[str, Any]:
     from dbbstation.plan.plan import LARGEST_LOSS_PERCENT
 
     return {
-        **dict.fromkeys(("instrument", "port", "baud", "serial_number")),
+        **dict.fromkeys(("instrument", "profile", "port", "baud", "serial_number")),
         **{
             f"bar.{key}": None
             for key in ("serial_number", "calibrated_length_mm", "calibrator_uncertainty_mm", "temp_c")
@@ -123,6 +123,6 @@ def _template() -> str:
     from dbbstation.files.shipped import shipped_folder
 
     text = (shipped_folder("fixtures") / "settings" / "every-key.yaml").read_text(encoding="utf-8")
-    head, format_line, rest = text.partition("format: dbb-settings/1\n")
+    head, format_line, rest = text.partition("format: dbb-settings/2\n")
     hint = "# Take away the # in front of what you set; where a line is indented, in front of the line above it too.\n"
     return head + hint + format_line + re.sub(r"^(?=[^#\n])", "#", rest, flags=re.MULTILINE)

@@ -13,6 +13,7 @@ from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
+from dbbstation.files.recordings.judged import JUDGED, judge_session
 from dbbstation.files.recordings.run_csv import PART, read_run
 from dbbstation.files.recordings.session import (
     SESSION_FILE,
@@ -23,13 +24,17 @@ from dbbstation.files.recordings.session import (
     unlisted_sealed,
 )
 from dbbstation.files.yaml.text import load_yaml
+from dbbstation.quality.finding import Name
 from dbbstation.trace.loss import lost_samples
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    from dbbstation.files.recordings.session import RunEntry
+    from dbbstation.quality.judge import Judgement
     from dbbstation.sources.contract import ErrorSource
+    from dbbstation.trace.recording import Recording
 
 
 @dataclass
@@ -42,6 +47,7 @@ class Checked:
         summary: what it holds, one line; empty where it has problems.
         problems: what makes it unusable.
         warnings: what does not.
+        judgements: of the runs of a session that are accepted or wait to be; empty for everything else.
     """
 
     path: Path
@@ -49,6 +55,7 @@ class Checked:
     summary: str = ""
     problems: list[Problem] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
+    judgements: tuple[Judgement, ...] = ()
 
 
 def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
@@ -160,9 +167,12 @@ def _session(checked: Checked) -> None:
     session = parse_session(checked.path, checked.problems)
     if session is None or checked.problems:
         return
+    wanted: list[tuple[RunEntry, Recording]] = []
     for run in session.runs:
         try:
             read = session.load(run)
+            if run.state in JUDGED:
+                wanted.append((run, read.recording))
             checked.warnings += read.warnings
             if run.state is not RunState.REJECTED:
                 checked.warnings += session.loss(run, read.recording)
@@ -178,7 +188,21 @@ def _session(checked: Checked) -> None:
         session.plan.check(session.machine)
     except TravelError as error:
         checked.problems.append(Problem(str(session.plan_path), 0, 0, f"{error.where}: {error.what}", error.remedy))
+    _judge(checked, session, wanted)
     checked.summary = f"session: {_states(session)}"
+
+
+def _judge(checked: Checked, session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]]) -> None:
+    """Say what is wrong with runs that can be read; samples that were lost, and what comes of that, are said already."""
+    checked.judgements = judge_session(session, wanted)
+    for (run, _), judgement in zip(wanted, checked.judgements, strict=True):
+        lossy = any(finding.name is Name.LOST for finding in judgement.wrong)
+        said = {Name.LOST, Name.CIRCLE} if lossy else {Name.LOST}
+        checked.warnings += [
+            Problem(str(run.path), 0, 0, f"{finding.name}: {finding.text}")
+            for finding in judgement.wrong
+            if finding.name not in said
+        ]
 
 
 def _states(session: SessionFolder) -> str:

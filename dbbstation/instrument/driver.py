@@ -9,23 +9,30 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError, StationError
 from dbbstation.instrument import symptoms
-from dbbstation.instrument.codec import Decoder, GapCounter, Garbage, Heard, Piece
-from dbbstation.instrument.link import open_link
+from dbbstation.instrument.adapters import adapter_of, port_of
+from dbbstation.instrument.arrivals import Arrivals
+from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage, Heard, Piece
+from dbbstation.instrument.latch import latch_of
+from dbbstation.instrument.link import LineClosedError, open_link
+from dbbstation.instrument.reading import Reading
+from dbbstation.instrument.sequence import Sequence
 from dbbstation.instrument.stamps import StreamStamps
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Self
 
+    from dbbstation.instrument.adapters import Adapter
     from dbbstation.instrument.bytelog import ByteLog
+    from dbbstation.instrument.fields import Reason
     from dbbstation.instrument.link import Link, Port
     from dbbstation.instrument.protocol import Protocol, Step
-    from dbbstation.instrument.reading import Reading
 
 _PAUSE_TICK_S = 0.001
 
@@ -33,18 +40,39 @@ _MARGIN_S = 0.02
 
 _INCOMPLETE = "incomplete"
 
+_LOOK_S = 0.25
+"""Between looks for an adapter that was pulled out [s]."""
+
 _JOIN_S = 5.0
 """The reader thread ends within some hundredths of a second; after this long something is broken."""
 
 
 @dataclass(slots=True)
 class Tally:
-    """What a driver has seen since `start`: readings, samples lost, bytes not understood and an example of them."""
+    """What a driver has seen since `start`.
+
+    Attributes:
+        readings: handed out.
+        lost: samples that never came, or came and were rejected.
+        rejected: frames and stretches of bytes that were not believed, by reason.
+        garbage_bytes: bytes of these.
+        garbage: an example of them.
+        reconnected: how often the line was opened again.
+    """
 
     readings: int = 0
     lost: int = 0
+    rejected: dict[Reason, int] = field(default_factory=dict)
     garbage_bytes: int = 0
     garbage: bytes = b""
+    reconnected: int = 0
+
+    def reject(self, raw: bytes, reason: Reason) -> None:
+        """Count bytes that were not believed."""
+        if raw:
+            self.rejected[reason] = self.rejected.get(reason, 0) + 1
+            self.garbage_bytes += len(raw)
+            self.garbage = self.garbage or raw[:LONGEST_LINE]
 
 
 class Instrument:
@@ -60,6 +88,8 @@ class Instrument:
         timeout_s: patience before a silent line is an error, instead of the protocol's.
         memory_s: how long the quickest arrival of a stream's samples is remembered, by `clock`: on a scaled clock as many
             times longer, because what holds samples up is the computer, in real time.
+        reconnect_s: how long an adapter that was pulled out is waited for, in real seconds; it is known by its USB identity,
+            whatever its port is called then. A port that is no USB adapter is not waited for.
     """
 
     def __init__(
@@ -72,6 +102,7 @@ class Instrument:
         log: ByteLog | None = None,
         timeout_s: float | None = None,
         memory_s: float = 2.0,
+        reconnect_s: float = 0.0,
     ) -> None:
         self.protocol = protocol
         self.tally = Tally()
@@ -81,6 +112,10 @@ class Instrument:
         self._log = log
         self._timeout_s = timeout_s or protocol.timing.timeout_s
         self._memory_s = memory_s
+        self._reconnect_s = reconnect_s
+        self._adapter: Adapter | None = None
+        self._last_s: float | None = None
+        self._away = False
         self._link: Link | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
@@ -102,14 +137,14 @@ class Instrument:
         if self._thread is not None:
             raise InstrumentError("it is being read already", where=self.where, remedy="stop it first")
         self._link = self._link or open_link(self._port, self.protocol.line, baud=self._baud, log=self._log)
+        self._adapter = adapter_of(self._port) if self._reconnect_s and isinstance(self._port, str) else None
+        self._last_s, self._away = None, False
         self._stop.clear()
         self._queue.clear()
         self._failure = None
         self.tally = Tally()
-        after = b""
         try:
-            for step in self.protocol.ask.start:
-                after = _command(self._link, step, self._timeout_s)
+            after = self._begin(self._link)
         except StationError:
             self.close()
             raise
@@ -194,49 +229,108 @@ class Instrument:
             yield self.read()
             done += 1
 
+    def _begin(self, link: Link) -> bytes:
+        """Send the start sequence; return what came behind its last answer."""
+        after = b""
+        for step in self.protocol.ask.start:
+            after = _command(link, step, self._timeout_s)
+        return after
+
     def _run(self, link: Link, after: bytes) -> None:
         try:
-            if self.protocol.ask.mode == "request":
-                self._note_garbage(after)
-                self._poll(link)
-            else:
-                self._listen(link, after)
+            while not self._stop.is_set():
+                try:
+                    self._read_on(link, after)
+                except LineClosedError as error:
+                    found = self._plugged_in_again()
+                    if found is None:
+                        raise error from None
+                    link, after = found
         except StationError as error:
             self._end(error)
         except Exception as error:  # noqa: BLE001 (a thread that dies silently would look like a silent instrument)
             self._end(InstrumentError(f"reading failed: {type(error).__name__}: {error}", where=self.where))
 
+    def _read_on(self, link: Link, after: bytes) -> None:
+        if self.protocol.ask.asked:
+            self.tally.reject(after, "bytes")
+            self._poll(link)
+        else:
+            self._listen(link, after)
+
+    def _plugged_in_again(self) -> tuple[Link, bytes] | None:
+        """Wait for the same adapter under whatever name; return its line, and what came behind the start sequence."""
+        if self._adapter is None:
+            return None
+        if self._link is not None:
+            self._link.close()
+        end_s = time.monotonic() + self._reconnect_s
+        while time.monotonic() < end_s and not self._stop.wait(_LOOK_S):
+            name = port_of(self._adapter)
+            if name is None:
+                continue
+            # A port that has just appeared may not be ready, or not be ours yet: it is tried again.
+            with suppress(StationError):
+                link = open_link(name, self.protocol.line, baud=self._baud, log=self._log)
+                self._link, self._away = link, True
+                self.tally.reconnected += 1
+                return link, self._begin(link)
+        return None
+
     def _poll(self, link: Link) -> None:
         """Ask, wait for the reply, ask again; a reply that does not come or cannot be read is asked for again."""
-        timing, line, request = self.protocol.timing, self.protocol.line, self.protocol.ask.request
-        gaps = GapCounter(self.protocol.counter_modulus)
-        to_latch_s = len(request) * line.character_s(self._baud) + timing.latch_delay_s
+        timing, request = self.protocol.timing, self.protocol.ask.request
+        sequence = Sequence[Reading](self.protocol.counter_modulus, self.where)
         pause_s = 1.0 / timing.rate_hz if timing.rate_hz else 0.0
         last_s = float("-inf")
         failed: list[Garbage] = []
+        explained = ""
         self._until_quiet(link)
         while not self._stop.is_set():
-            decoder = Decoder(self.protocol, joining=False)
             asked_s = self._clock()
             link.write(request)
-            heard = self._reply(link, decoder)
+            heard, first_s = self._reply(link, self.protocol)
             if self._stop.is_set():
                 return
             if isinstance(heard, Piece):
-                last_s = max(asked_s + to_latch_s, last_s + 1e-6)
-                missing = gaps.lost_before(heard.reading.counter, self.where)
-                self._put(replace(heard.reading, t_s=last_s, lost=missing if gaps.counts else len(failed)))
+                latch = latch_of(self.protocol, asked_s=asked_s, first_byte_s=first_s, baud=self._baud)
+                last_s = max(latch.t_s, last_s + 1e-6)
+                reading = replace(heard.reading, t_s=last_s, t_uncertainty_s=latch.uncertainty_s, first_byte_s=first_s)
+                if reading.status == "fault":
+                    # Asked once: while the fault lasts the words stay the same.
+                    explained = explained or self._explanation(link) or reading.said
+                    reading = replace(reading, said=explained)
+                else:
+                    explained = ""
+                for placed in sequence.place(reading.counter, reading):
+                    if placed.lost is None:
+                        self.tally.reject(heard.raw, "counter")
+                    else:
+                        self._put(replace(placed.sample, lost=placed.lost if sequence.counts else len(failed)))
                 failed.clear()
                 while self._clock() < asked_s + pause_s and not self._stop.wait(_PAUSE_TICK_S):
                     pass
                 continue
             failed.append(heard)
-            self._note_garbage(heard.raw)
+            self.tally.reject(heard.raw, heard.reason)
             self._until_quiet(link)
             if len(failed) > timing.retries:
                 # The attempt that brought something says more than the silence after it.
                 telling = next((one for one in reversed(failed) if one.raw), heard)
                 raise self._symptom(telling.raw, telling.why)
+
+    def _explanation(self, link: Link) -> str:
+        """Ask for the text of a fault; empty where the device has none to tell or is not asked."""
+        follow_up, protocol = self.protocol.ask.follow_up, self.protocol.explaining
+        if follow_up is None or protocol is None:
+            return ""
+        link.write(follow_up.request)
+        heard, _ = self._reply(link, protocol)
+        if isinstance(heard, Garbage):
+            self.tally.reject(heard.raw, heard.reason)
+            return ""
+        # Only the first of the frames has words; the others say that there are none.
+        return heard.reading.said if protocol.frames[0].pattern.fullmatch(heard.raw) else ""
 
     def _until_quiet(self, link: Link) -> None:
         """Let a reply to an earlier request pass, perhaps one of a program before, lest it be taken for the next one.
@@ -251,50 +345,64 @@ class Instrument:
             raw = link.read()
             now_s = time.monotonic()
             heard_s = now_s if raw else heard_s
-            self._note_garbage(raw)
+            self.tally.reject(raw, "bytes")
 
-    def _reply(self, link: Link, decoder: Decoder) -> Heard:
-        """Return the reply, or as garbage whatever came instead before patience ended."""
+    def _reply(self, link: Link, protocol: Protocol) -> tuple[Heard, float]:
+        """Return the reply, or as garbage whatever came instead before patience ended; and when its first byte was seen."""
+        decoder = Decoder(protocol, joining=False)
+        character_s = protocol.line.character_s(self._baud)
         deadline_s = time.monotonic() + self._timeout_s
+        first_s: float | None = None
         while time.monotonic() < deadline_s and not self._stop.is_set():
-            heard = decoder.feed(link.read())
+            raw = link.read()
+            if raw and first_s is None:
+                first_s = self._clock() - (len(raw) - 1) * character_s
+            heard = decoder.feed(raw)
             pieces = [one for one in heard if isinstance(one, Piece)]
             if pieces:
-                self._note_garbage(
-                    b"".join(one.raw for one in heard if isinstance(one, Garbage)) + decoder.take_pending()
-                )
-                return pieces[-1]
+                noise = b"".join(one.raw for one in heard if isinstance(one, Garbage)) + decoder.take_pending()
+                self.tally.reject(noise, "bytes")
+                return pieces[-1], first_s or 0.0
             if heard and not decoder.pending:
                 # A whole line that is no reading: asking again is quicker than waiting.
-                return heard[-1]
-        return Garbage(decoder.take_pending(), _INCOMPLETE)
+                return heard[-1], first_s or 0.0
+        return Garbage(decoder.take_pending(), _INCOMPLETE), first_s or 0.0
 
     def _listen(self, link: Link, chunk: bytes) -> None:
         """Take what comes; only a long time without a reading is an error."""
-        timing, line = self.protocol.timing, self.protocol.line
-        gaps = GapCounter(self.protocol.counter_modulus)
+        timing, character_s = self.protocol.timing, self.protocol.line.character_s(self._baud)
+        sequence = Sequence[tuple[Piece, float, float]](self.protocol.counter_modulus, self.where)
         # Behind the answer to a start command the stream begins with a whole frame.
         decoder = Decoder(self.protocol, joining=not (self.protocol.ask.start and self.protocol.ask.start[-1].reply))
         stamps = StreamStamps(1.0 / self.protocol.fastest_hz(self._baud), self._memory_s)
-        character_s = line.character_s(self._baud)
+        arrivals = Arrivals(character_s, 2 * LONGEST_LINE)
         good_s = time.monotonic()
         garbled, unread, why = 0, b"", ""
         while not self._stop.is_set():
             chunk += link.read()
             seen_s = self._clock()
+            arrivals.note(len(chunk), seen_s)
             for heard in decoder.feed(chunk) if chunk else ():
                 if isinstance(heard, Garbage):
                     if not heard.joining:
-                        self._note_garbage(heard.raw)
+                        self.tally.reject(heard.raw, heard.reason)
                         garbled += max(1, round(len(heard.raw) / self.protocol.frame_characters))
-                        unread, why = (unread + heard.raw)[:256], heard.why
+                        unread, why = (unread + heard.raw)[:LONGEST_LINE], heard.why
                     continue
-                missing = gaps.lost_before(heard.reading.counter, self.where)
-                lost = missing if gaps.counts else garbled
-                on_line_s = (heard.after + len(heard.raw)) * character_s + timing.latch_delay_s
-                self._put(replace(heard.reading, t_s=stamps.stamp(seen_s - on_line_s, lost), lost=lost))
-                good_s = time.monotonic()
-                garbled, unread, why = 0, b"", ""
+                size = heard.after + len(heard.raw)
+                on_line_s = seen_s - size * character_s - timing.latch_delay_s
+                sample = (heard, on_line_s, arrivals.at_latest_s(size - 1))
+                for placed in sequence.place(heard.reading.counter, sample):
+                    piece, left_s, first_s = placed.sample
+                    if placed.lost is None:
+                        self.tally.reject(piece.raw, "counter")
+                        unread, why = (unread + piece.raw)[:LONGEST_LINE], placed.why
+                        continue
+                    lost = placed.lost if sequence.counts else garbled
+                    t_s = stamps.stamp(left_s, lost)
+                    self._put(replace(piece.reading, t_s=t_s, lost=lost, first_byte_s=first_s))
+                    good_s = time.monotonic()
+                    garbled, unread, why = 0, b"", ""
             chunk = b""
             if time.monotonic() - good_s > self._timeout_s:
                 raise self._symptom(unread or decoder.pending, why if unread else _INCOMPLETE)
@@ -307,11 +415,12 @@ class Instrument:
             return symptoms.half_line(raw, self.where, self._timeout_s)
         return symptoms.garbage(self.protocol, self.where, raw, why, self._baud)
 
-    def _note_garbage(self, raw: bytes) -> None:
-        self.tally.garbage_bytes += len(raw)
-        self.tally.garbage = self.tally.garbage or raw
-
     def _put(self, reading: Reading) -> None:
+        if self._away and self._last_s is not None:
+            # Nobody counted while the cable was out: the clock did.
+            missed = round((reading.t_s - self._last_s) * self.protocol.fastest_hz(self._baud)) - 1
+            reading = replace(reading, lost=max(reading.lost, missed, 1))
+        self._away, self._last_s = False, reading.t_s
         with self._arrived:
             self.tally.readings += 1
             self.tally.lost += reading.lost
@@ -334,6 +443,12 @@ def _command(link: Link, step: Step, patience_s: float) -> bytes:
     came = b""
     deadline_s = time.monotonic() + patience_s
     while step.reply and step.reply not in came:
+        if step.refused and step.refused in came:
+            raise InstrumentError(
+                f"it refuses the command {symptoms.shown(step.send)}",
+                where=link.name,
+                remedy="is it the right instrument and the right profile, and does its display show the actual value?",
+            )
         if time.monotonic() > deadline_s:
             answer = symptoms.shown(came) if came else "nothing"
             raise InstrumentError(

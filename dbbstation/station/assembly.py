@@ -16,6 +16,7 @@ from dbbstation.station.preflight import check_plan
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.storage import Storage, time_of_day
+from dbbstation.station.unjudged import unjudged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -41,6 +42,8 @@ class Job:
         programs: what commands each test and direction; empty: plain nominal circles.
         patience: how long is waited for the machine.
         clock: machine time, that of the instrument's readings [s].
+        time_scale: how much faster than real time that goes; other than 1 for a virtual machine only.
+        rate_hz: readings per second that the instrument brings; None: not known.
     """
 
     machine: Machine
@@ -50,6 +53,8 @@ class Job:
     programs: Mapping[tuple[str, Direction], RunProgram] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
     clock: Callable[[], float] = time.monotonic
+    time_scale: float = 1.0
+    rate_hz: float | None = None
 
     def check(self, plan_file: str) -> None:
         """Dry-run the plan; to be done before an instrument is opened.
@@ -104,8 +109,18 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     }
     schedule = Schedule(plan, writer.next_repeat, writer.runs)
     names = {key: program.name for key, program in job.programs.items()}
-    station = Station(Sequencer(plan, schedule, programs=names, patience=job.patience), source)
-    storage = Storage(writer, time_of_day(job.clock, last_end(writer.session)), kept)
+    sequencer = Sequencer(
+        plan,
+        schedule,
+        programs=names,
+        patience=job.patience,
+        waiting=unjudged(writer.session),
+        rate_hz=job.rate_hz,
+    )
+    station = Station(sequencer, source)
+    # Real runs bear the computer's time, so that they fit what thermometers log.
+    now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
+    storage = Storage(writer, now, kept)
     station.subscribe(storage)
     station.regularly(storage.sync_if_due)
     return Workplace(station, schedule, writer, storage)

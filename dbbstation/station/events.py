@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from dbbstation.instrument.reading import Status
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Ball
+    from dbbstation.plan.sampling import Sampling
     from dbbstation.station.commands import Command
     from dbbstation.station.states import State
     from dbbstation.trace.analysis import CircleFigures
@@ -87,6 +88,7 @@ class RunAnnounced:
         number: of the run in the sequence, from 1.
         count: runs in the sequence.
         instructions: the same in words, one step per entry.
+        sampling: what the instrument sees of the circle at its feed; None where its rate is not known.
     """
 
     run: RunId
@@ -97,6 +99,7 @@ class RunAnnounced:
     number: int
     count: int
     instructions: tuple[str, ...]
+    sampling: Sampling | None = None
 
 
 @dataclass(frozen=True)
@@ -180,6 +183,32 @@ class RunCompleted:
     samples: int
     lost: int
     figures: CircleFigures | None
+    problem: str
+
+
+@dataclass(frozen=True)
+class RunRestored:
+    """A run that was recorded before waits for its verdict still; its figures follow as those of any completed run.
+
+    Attributes:
+        run: which run.
+        samples: of its turn, in time order, thinned; empty where it has none.
+    """
+
+    run: RunId
+    samples: tuple[Sample, ...]
+
+
+@dataclass(frozen=True)
+class FeedInMissed:
+    """The machine is on the circle, and nothing is recorded.
+
+    Attributes:
+        run: that is announced.
+        problem: what was seen, and what to do.
+    """
+
+    run: RunId
     problem: str
 
 
@@ -281,6 +310,8 @@ Event: TypeAlias = (
     | FeedInSeen
     | Progress
     | RunCompleted
+    | RunRestored
+    | FeedInMissed
     | RunAccepted
     | RunRejected
     | RunLate

@@ -98,19 +98,33 @@ class RunRecord:
             length_mm=np.array(self._length_mm),
             usable=np.array(self._usable, dtype=np.bool_),
         )
-        shown, kept = lost_on_turn(recording, self.circle)
-        if problem := too_many_lost(max(self._lost_between_edges(), shown), kept, largest_loss_percent):
-            return None, f"{problem}; {AFTER_LOSS}"
-        try:
-            return figures(cut(recording, self.circle)), ""
-        except TraceError as error:
-            return None, str(error)
+        return circle_figures(recording, self.circle, self._lost_between_edges(), largest_loss_percent)
 
     def _lost_between_edges(self) -> int:
         """Samples that the line counted as lost from feed-in to feed-out."""
         begin = -np.inf if self.fed_in_s is None else self.fed_in_s
         end = np.inf if self.fed_out_s is None else self.fed_out_s
         return sum(lost for t, lost in zip(self._t_s, self._lost, strict=True) if begin < t <= end)
+
+
+def circle_figures(
+    recording: Recording, circle: Circle, lost: int, largest_loss_percent: float
+) -> tuple[CircleFigures | None, str]:
+    """Return the figures of a recorded circle, or None and why there is none.
+
+    Args:
+        recording: of the whole run.
+        circle: as commanded.
+        lost: samples that the line counted as lost from feed-in to feed-out; 0 where nobody counted.
+        largest_loss_percent: share of the samples that may be lost [%].
+    """
+    shown, kept = lost_on_turn(recording, circle)
+    if problem := too_many_lost(max(lost, shown), kept, largest_loss_percent):
+        return None, f"{problem}; {AFTER_LOSS}"
+    try:
+        return figures(cut(recording, circle)), ""
+    except TraceError as error:
+        return None, str(error)
 
 
 def unrecorded(reading: Reading) -> Sample:

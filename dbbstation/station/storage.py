@@ -39,7 +39,6 @@ class Storage:
         self._now = now or (lambda: datetime.now(UTC))
         self._programs = programs or {}
         self._journal: RunWriter | None = None
-        self._sealed: RunEntry | None = None
 
     def __call__(self, event: events.Event) -> None:
         """Keep what the event says.
@@ -53,12 +52,12 @@ class Storage:
             case events.SamplesRecorded():
                 self._append(event.samples)
             case events.RunCompleted() if self._journal is not None:
-                self._sealed = self._writer.finish_run(self._journal)
+                self._writer.finish_run(self._journal)
                 self._journal = None
-            case events.RunAccepted() if self._sealed is not None:
-                self._writer.judge(self._sealed, accepted=True)
-            case events.RunRejected() if self._sealed is not None:
-                self._writer.judge(self._sealed, accepted=False, reason=event.reason)
+            case events.RunAccepted():
+                self._writer.judge(self._entry(event.run), accepted=True)
+            case events.RunRejected():
+                self._writer.judge(self._entry(event.run), accepted=False, reason=event.reason)
             case events.SessionStopped() | events.Fault():
                 self.close()
             case _:
@@ -84,7 +83,6 @@ class Storage:
             journal.close()
 
     def _start(self, run: events.RunId) -> None:
-        self._sealed = None
         self._journal = self._writer.start_run(
             run.test,
             run.direction,
@@ -101,6 +99,11 @@ class Storage:
                 remedy="another program writes into this session: end it, then continue",
             )
 
+    def _entry(self, run: events.RunId) -> RunEntry:
+        """What the session says of a recorded run."""
+        key = (run.test, run.direction, run.repeat)
+        return next(entry for entry in self._writer.runs if (entry.test, entry.direction, entry.repeat) == key)
+
     def _append(self, samples: tuple[events.Sample, ...]) -> None:
         if self._journal is None:
             raise RuntimeError("samples came without a run")
@@ -111,10 +114,10 @@ class Storage:
 
 
 def time_of_day(clock: Callable[[], float], last: datetime | None = None) -> Callable[[], datetime]:
-    """Return the time of day that goes as fast as `clock`, so that runs on scaled time lie apart as their samples do.
+    """Return the time of day that goes as fast as a scaled `clock`, so that runs on it lie apart as their samples do.
 
     Args:
-        clock: machine time [s].
+        clock: machine time, faster than real time [s].
         last: start of the last run of a session that goes on; time of day never falls behind it.
     """
     begun_s = clock()

@@ -108,10 +108,21 @@ def _cut(recording: Recording, circle: Circle) -> RawCircle:
         phi = _along(circle.phi_deg(recording.theta_deg))
         return _selected(recording, circle, phi, np.ones(len(recording), dtype=bool))
     edges = edges_of(recording, circle)
-    phi = FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
+    phi = progress_deg(recording, circle, edges)
     _check_feed(recording, circle, edges)
     raw = _selected(recording, circle, phi, (phi >= 0.0) & (phi < FULL_TURN_DEG))
     return replace(raw, start_uncertainty_deg=start_uncertainty_deg(recording, circle))
+
+
+def progress_deg(recording: Recording, circle: Circle, edges: tuple[float, float]) -> NDArray[np.float64]:
+    """Progress of every sample along the turn by the programmed feed, 0 at its start, shape (n,) [deg].
+
+    Args:
+        recording: as recorded.
+        circle: as commanded.
+        edges: times of feed-in and feed-out [s].
+    """
+    return FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
 
 
 def start_uncertainty_deg(recording: Recording, circle: Circle) -> float:

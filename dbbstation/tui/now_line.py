@@ -11,9 +11,9 @@ from dbbstation.tui.panel import Panel
 from dbbstation.tui.sentences import now
 
 if TYPE_CHECKING:
-    from dbbstation.tui.board import Board
+    from dbbstation.service.board import Board
 
-_ASKING = {State.ANNOUNCED, State.ARMED, State.COMPLETE}
+_ASKING = {State.ANNOUNCED, State.ARMED, State.COMPLETE, State.PAUSED}
 """States in which the station waits for a person."""
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.service.messages import problem_alone
 from dbbstation.station.states import State
-from dbbstation.tui.messages import problem_alone
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dbbstation.service.board import Board
     from dbbstation.station.events import RunAnnounced
-    from dbbstation.tui.board import Board
 
 _BEGIN = "Opening instrument and session …"
 
@@ -62,6 +62,10 @@ def _flawed(board: Board) -> str:
     return f"No usable circle in {name}: {_ended(problem)} R measures it again, X leaves it out."
 
 
+def _paused(_board: Board) -> str:
+    return "Pause: nothing is recorded and nothing is waited for. P goes on."
+
+
 _SENTENCES: dict[State, Callable[[Board], str]] = {
     State.ANNOUNCED: _set_up,
     State.ARMED: _armed,
@@ -70,6 +74,7 @@ _SENTENCES: dict[State, Callable[[Board], str]] = {
     State.LEAVING: _leaving,
     State.COMPLETE: _verdict,
     State.FLAWED: _flawed,
+    State.PAUSED: _paused,
 }
 
 

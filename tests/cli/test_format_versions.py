@@ -25,7 +25,8 @@ STORED = {
     "dbb-model/1": FIXTURES / "models" / "small.yaml",
     "dbb-model/2": FIXTURES / "models" / "greatest-feed.yaml",
     "dbb-model/3": FIXTURES / "models" / "provenance.yaml",
-    "dbb-settings/1": FIXTURES / "settings" / "every-key.yaml",
+    "dbb-settings/1": FIXTURES / "settings" / "first-version.yaml",
+    "dbb-settings/2": FIXTURES / "settings" / "every-key.yaml",
     "dbb-session/1": FIXTURES / "sessions" / "under-spindle",
     "dbb-session/2": FIXTURES / "sessions" / "small",
 }

@@ -56,7 +56,7 @@ def test_a_name_that_is_not_known_brings_the_nearest() -> None:
     ):
         load_instrument("heidenhain-nd281")
     with pytest.raises(
-        InstrumentError, match=r"known are heidenhain-nd281b, streaming-encoder.*; or give a \.yaml file of your own"
+        InstrumentError, match=r"known are heidenhain-nd281b, heidenhain-nd287.*; or give a \.yaml file of your own"
     ):
         load_instrument("zzz")
 
@@ -100,4 +100,4 @@ def test_the_instruments_need_nothing_of_ours_but_errors_and_files() -> None:
         "print(*{name.split('.')[1] for name in sys.modules if name.startswith('dbbstation.')})"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert set(done.stdout.split()) == {"errors", "files", "instrument"}
+    assert set(done.stdout.split()) == {"catalogue", "errors", "files", "instrument"}

@@ -105,6 +105,7 @@ def test_a_person_answers_with_keys(plan_file: Path, tmp_path: Path) -> None:
     assert "0 of 6 runs accepted" in done.stdout
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(plan_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "session"
     with bench(plan_file, scale=30.0) as place:

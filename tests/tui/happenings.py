@@ -7,12 +7,12 @@ import numpy as np
 from dbbstation.instrument.reading import Reading
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.plan import Ball, Plan, PlannedTest
+from dbbstation.service.board import Board, SequenceOpened
 from dbbstation.station.commands import Start
 from dbbstation.station.events import Event
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.tui.app import Shown
-from dbbstation.tui.board import Board, SequenceOpened
 
 BORES = {1: (0.0, 100.0), 2: (-100.0, 100.0), 3: (-100.0, 0.0), 9: (0.0, 0.0), 7: (100.0, 0.0), 5: (0.0, -100.0)}
 RATE_HZ = 20.0

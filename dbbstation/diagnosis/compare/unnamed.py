@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.shapes import EVERY, READING, SIGNED, UNITS, moves_struts, ranges, samples_of, shapes
+from dbbstation.diagnosis.shapes import EVERY, READING, SIGNED, UNITS, ranges, samples_of, shapes
 from dbbstation.inference.forms import Hats, Lobes, Sign
 from dbbstation.inference.patterns import Family, Pattern, patterns
 from dbbstation.inference.variables import Kind, Variable
@@ -92,7 +92,7 @@ def _pattern(shape: Shape, sides: Sides, runs: Sequence[Samples]) -> Pattern:
     # What changes its sign with a strut's direction is hysteresis of its length.
     name = "strut-length" if family is Family.HYSTERESIS else shape.variable
     variable = Variable(name, UNITS[shape.variable], Kind.ANY, followed)
-    which = f"strut {shape.strut}" if shape.strut else "all struts" if moves_struts(shape.name) else ""
+    which = f"strut {shape.strut}" if shape.strut else "all struts" if shape.follows.moves_struts else ""
     label = " ".join(
         text for text in (which, shape.form.text("mm") if shape.moves not in {EVERY, SIGNED} else "") if text
     )

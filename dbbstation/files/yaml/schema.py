@@ -24,10 +24,33 @@ FORMATS = {
 
 _OF_MACHINES = {"greatest_feed_mm_min": 2, "greatest_turn_deg_min": 2}
 
+_OF_INSTRUMENTS = dict.fromkeys(
+    (
+        "bare",
+        "feature",
+        "features",
+        "follow_up",
+        "latch_bounds_s",
+        "leading_zero",
+        "min_width",
+        "profile",
+        "profiles",
+        "refused",
+        "relative",
+        "request_end",
+        "scale",
+        "zero_mm",
+        "prefix",
+        "end",
+    ),
+    3,
+)
+
 SINCE: dict[str, dict[str, int]] = {
     "dbb-plan": {"largest_loss_percent": 2},
     "dbb-session": {"stroke_mm": 2},
-    "dbb-instrument": {"stroke_mm": 2},
+    "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},
+    "dbb-settings": {"profile": 2},
     "dbb-machine": _OF_MACHINES,
     "dbb-model": {**_OF_MACHINES, "provenance": 3},
 }

@@ -19,7 +19,7 @@ EXAMPLES = {
     "dbb-machine/2": [FIXTURES / "machines" / "every-key.yaml"],
     "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
     "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
-    "dbb-settings/1": [FIXTURES / "settings" / "every-key.yaml"],
+    "dbb-settings/2": [FIXTURES / "settings" / "every-key.yaml"],
     "dbb-model/3": [FIXTURES / "models" / "provenance.yaml"],
     "dbb-session/2": [SESSIONS / "small" / "session.yaml", SESSIONS / "under-spindle" / "session.yaml"],
 }

@@ -1,17 +1,17 @@
-"""What the screen knows: events folded into the state that is drawn. Nothing of it is computed, nothing is forgotten."""
+"""What a screen shows: events folded into the state that is drawn."""
 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from dbbstation.service.live_trace import LiveTrace
+from dbbstation.service.messages import Message, Weight, message_of
+from dbbstation.service.reading_rate import ReadingRate
 from dbbstation.station import events
 from dbbstation.station.states import State
-from dbbstation.tui.messages import Message, Weight, message_of
-from dbbstation.tui.reading_rate import ReadingRate
-from dbbstation.tui.trace import LiveTrace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +33,14 @@ class Mark(StrEnum):
     FLAWED = "no circle"
     ACCEPTED = "accepted"
     PASSED = "left out"
+
+
+class Verdict(StrEnum):
+    """What was decided about a recorded run; the text is what people read."""
+
+    NONE = ""
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
 
 
 @dataclass(frozen=True)
@@ -80,6 +88,7 @@ class Board:
         traces: of the test that was started last, by direction.
         running: direction of the run that is on its circle; None where none is.
         results: what completed runs say, the last ones.
+        verdicts: on runs that were judged here, by their names.
         completed: the run that waits for a verdict, or waited last.
         fault: what ended the sequence.
         finished: the end of the plan.
@@ -99,6 +108,7 @@ class Board:
     traces: dict[Direction, LiveTrace] = field(default_factory=dict)
     running: Direction | None = None
     results: deque[events.RunCompleted] = field(default_factory=lambda: deque(maxlen=2))
+    verdicts: dict[str, Verdict] = field(default_factory=dict)
     completed: events.RunCompleted | None = None
     fault: events.Fault | None = None
     finished: events.SessionFinished | None = None
@@ -115,7 +125,7 @@ class Board:
         """Planned runs that have an accepted recording."""
         return self.marks.count(Mark.ACCEPTED)
 
-    def take(self, event: events.Event | SequenceOpened) -> None:  # noqa: C901 - a line per event, nothing nested
+    def take(self, event: events.Event | SequenceOpened) -> None:  # noqa: C901, PLR0912 - a line per event, nothing nested
         """Note what happened."""
         message = message_of(event)
         if message is not None:
@@ -133,8 +143,13 @@ class Board:
                 self._begin(event.run)
             case events.RunCompleted():
                 self._complete(event)
+            case events.RunRestored():
+                self._begin(event.run)
+                self._trace(event.run, event.samples)
             case events.RunAccepted():
-                self._mark(Mark.ACCEPTED)
+                self._judge(event.run, Verdict.ACCEPTED)
+            case events.RunRejected():
+                self._judge(event.run, Verdict.REJECTED)
             case events.SessionFinished():
                 self.finished = event
             case events.Fault():
@@ -148,6 +163,10 @@ class Board:
         self.tasks, self.session = opened.tasks, opened.session
         self.marks = [Mark.OPEN if task in opened.open else Mark.ACCEPTED for task in opened.tasks]
         if self.fault is not None:
+            # What is over does not stay red.
+            past = [replace(message, weight=Weight.NOTE) for message in self.messages]
+            self.messages.clear()
+            self.messages.extend(past)
             self.messages.append(Message(Weight.NOTE, "connected again; what was recorded before stays"))
         self.fault = self.finished = self.sample = None
         self.rate.forget()
@@ -194,13 +213,42 @@ class Board:
         self.completed = completed
         if completed.figures is not None:
             self.results.append(completed)
+            trace = self.traces.get(completed.run.direction)
+            if trace is not None:
+                trace.centre()
+
+    def _judge(self, run: events.RunId, verdict: Verdict) -> None:
+        """Note a verdict; on the announced run as its mark, on an earlier one wherever its task stands."""
+        self.verdicts[run.label] = verdict
+        announced = self.announced.run if self.announced else None
+        if announced is not None and announced.label == run.label:
+            if verdict is Verdict.ACCEPTED:
+                self._mark(Mark.ACCEPTED)
+        else:
+            self._mark_earlier(run, verdict)
+        if verdict is Verdict.REJECTED:
+            trace = self.traces.get(run.direction)
+            if trace is not None and trace.run.label == run.label:
+                del self.traces[run.direction]
+
+    def _mark_earlier(self, run: events.RunId, verdict: Verdict) -> None:
+        mine = [k for k, task in enumerate(self.tasks) if (task.test, task.direction) == (run.test, run.direction)]
+        if verdict is Verdict.ACCEPTED:
+            changed = next((k for k in mine if self.marks[k] is not Mark.ACCEPTED), None)
+        else:
+            changed = next((k for k in reversed(mine) if self.marks[k] is Mark.ACCEPTED), None)
+        if changed is not None:
+            self.marks[changed] = Mark.ACCEPTED if verdict is Verdict.ACCEPTED else Mark.OPEN
+
+    def _trace(self, run: events.RunId, samples: Sequence[events.Sample]) -> None:
+        trace = self.traces.get(run.direction)
+        if trace is not None:
+            trace.add(samples)
 
     def _samples(self, event: events.SamplesRecorded | events.ReadingsSeen) -> None:
         samples: Sequence[events.Sample] = event.samples
         if isinstance(event, events.SamplesRecorded):
             self.lost += sum(sample.lost for sample in samples)
-            trace = self.traces.get(event.run.direction)
-            if trace is not None:
-                trace.add(samples)
+            self._trace(event.run, samples)
         self.rate.add(samples)
         self.sample = samples[-1]

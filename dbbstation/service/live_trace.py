@@ -1,10 +1,14 @@
-"""The traces that are drawn: one per direction of a test, in arrays that grow."""
+"""The traces that are drawn: one per direction of a test, in arrays that grow; as measured, and centred once complete."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from dbbstation.errors import TraceError
+from dbbstation.trace.analysis import best_circle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +37,7 @@ class LiveTrace:
         self.run = run
         self.circle = circle
         self.largest_um = 0.0
+        self.centred: Centred | None = None
         self._count = 0
         self._data = np.empty((2, _FIRST_ROOM))
 
@@ -48,6 +53,18 @@ class LiveTrace:
     def deviation_um(self) -> NDArray[np.float64]:
         """Bar length minus nominal; not a number where the line breaks, shape (n,) [µm]."""
         return self._data[1, : self._count]
+
+    def centre(self) -> None:
+        """Take the least-squares circle out of what is there, so that the form can be seen on a scale of its own."""
+        known = np.isfinite(self.deviation_um)
+        height_mm = self.circle.bar_mm * np.sin(np.radians(self.circle.elevation_deg))
+        radius_mm = np.sqrt((self.circle.bar_mm + self.deviation_um[known] / 1e3) ** 2 - height_mm**2)
+        left_um = np.full(len(self), np.nan)
+        try:
+            left_um[known] = 1e3 * best_circle(self.theta_deg[known], radius_mm)[2]
+        except TraceError:
+            return
+        self.centred = Centred(self, left_um, float(np.abs(left_um[known]).max()))
 
     def add(self, samples: Sequence[Sample]) -> None:
         """Take samples in time order."""
@@ -82,3 +99,36 @@ class LiveTrace:
             self._data = wider
         self._data[:, self._count : end] = theta_deg, deviation_um
         self._count = end
+
+
+@dataclass(frozen=True, eq=False)
+class Centred:
+    """A trace less its least-squares circle, drawn as one that was measured.
+
+    Attributes:
+        measured: the trace.
+        deviation_um: radial deviation from the circle; not a number where the line breaks, shape (n,) [µm].
+        largest_um: greatest of them, without sign [µm].
+    """
+
+    measured: LiveTrace
+    deviation_um: NDArray[np.float64]
+    largest_um: float
+
+    def __len__(self) -> int:
+        return len(self.deviation_um)
+
+    @property
+    def run(self) -> RunId:
+        """Which run."""
+        return self.measured.run
+
+    @property
+    def circle(self) -> Circle:
+        """As commanded."""
+        return self.measured.circle
+
+    @property
+    def theta_deg(self) -> NDArray[np.float64]:
+        """Angles from +X towards +Y, shape (n,) [deg]."""
+        return self.measured.theta_deg[: len(self)]

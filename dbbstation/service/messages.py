@@ -38,7 +38,9 @@ def message_of(event: object) -> Message | None:  # noqa: PLR0911 - a line per e
             return Message(Weight.NOTE, f"{event.run.label} does not count, its recording is kept: {event.reason}")
         case events.RunCompleted(problem=problem) if problem:
             return Message(Weight.WARNING, f"{event.run.label}: {problem_alone(event)}")
-        case events.RunLate():
+        case events.RunRestored():
+            return Message(Weight.NOTE, f"{event.run.label} was recorded before and waits for its verdict")
+        case events.RunLate() | events.FeedInMissed():
             return Message(Weight.WARNING, f"{event.run.label}: {event.problem}")
         case events.CommandRefused():
             return Message(Weight.WARNING, event.why)

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from dbbstation.errors import StationError
+from dbbstation.service.board import SequenceOpened
 from dbbstation.station.commands import Quit
 from dbbstation.station.events import Event, Fault
-from dbbstation.tui.board import SequenceOpened
 
 if TYPE_CHECKING:
     from collections.abc import Callable

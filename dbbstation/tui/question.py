@@ -13,35 +13,37 @@ if TYPE_CHECKING:
     from textual.binding import BindingType
 
 
-class QuitQuestion(ModalScreen[bool]):
-    """Returns whether to quit.
+class GiveUpQuestion(ModalScreen[bool]):
+    """Returns whether to do what ends the run.
 
     Args:
         run: name of the run that goes on.
+        act: what was asked for, as a verb with a capital letter.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        ("y", "answer(True)", "Quit"),
+        ("y", "answer(True)", "Yes"),
         ("n,escape,ctrl+c,q", "answer(False)", "Go on"),
     ]
 
     DEFAULT_CSS = """
-    QuitQuestion {
+    GiveUpQuestion {
         align: center middle;
         & > Vertical { width: 60; max-width: 90%; height: auto; padding: 1 2; background: $panel; border: thick $warning; }
     }
     """
 
-    def __init__(self, run: str) -> None:
+    def __init__(self, run: str, act: str) -> None:
         super().__init__()
-        self._run = run
+        self.run = run
+        self._act = act
 
     def compose(self) -> ComposeResult:
         """Ask."""
         text = (
-            f"The circle {self._run} is being recorded. Quit all the same?\n\n"
+            f"The circle {self.run} is being recorded. {self._act} all the same?\n\n"
             "What was recorded so far is kept, but the run has to be measured again. The machine is not stopped.\n\n"
-            "Y  quit      N or Esc  go on"
+            f"Y  {self._act.lower()}      N or Esc  go on"
         )
         with Vertical():
             yield Static(text, markup=False)

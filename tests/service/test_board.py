@@ -10,11 +10,13 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.plan import Plan
+from dbbstation.service.board import Mark, SequenceOpened, Verdict
+from dbbstation.service.messages import Weight
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, Quit, Reject, Repeat, Skip, Start
+from dbbstation.station.commands import Accept, Judge, Quit, Reject, Repeat, Skip, Start
 from dbbstation.station.states import State
-from dbbstation.tui.board import Mark, SequenceOpened
-from dbbstation.tui.messages import Weight
+from dbbstation.tui.figures_panel import FiguresPanel
+from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.sentences import now
 from dbbstation.tui.set_up_panel import SetUpPanel
 from tests.tui.happenings import Happening, make_plan
@@ -159,3 +161,49 @@ def test_the_place_of_a_ball_under_the_spindle_is_where_the_machine_stands() -> 
     )
     rows = SetUpPanel().text(board).plain.splitlines()
     assert rows[:3] == ["under spindle put up", "at X -100 Y 0 Z -1008", "ball g"]
+
+
+def test_a_rejected_run_is_marked_and_its_trace_goes() -> None:
+    board = Happening().circle("t0", Direction.CCW).command(Reject()).board()
+    assert board.verdicts == {"t0-ccw-1": Verdict.REJECTED}
+    assert board.traces == {}
+    (row,) = FiguresPanel().text(board).plain.splitlines()[1:]
+    assert row.endswith(" x")
+
+
+def test_a_complete_circle_is_seen_about_its_own_centre() -> None:
+    trace = Happening().circle("t0", Direction.CCW).board().traces[Direction.CCW]
+    assert trace.centred is not None
+    # An ellipse of 12 µm is left where an offset of 20 µm was; live angles are good to some degrees.
+    assert trace.centred.largest_um == pytest.approx(12.0, abs=1.0)
+    assert trace.largest_um == pytest.approx(30.0, abs=3.0)
+    assert len(trace.centred) == len(trace)
+
+
+def test_what_is_over_is_not_red_any_more() -> None:
+    happening = Happening().circle("t0", Direction.CCW, 0.5)
+    happening.events += happening.sequencer.fail(InstrumentError("the line was closed"))
+    board = happening.board()
+    assert board.messages[-1].weight is Weight.FAULT
+    board.take(SequenceOpened(happening.schedule.tasks, happening.schedule.open, "session-7"))
+    assert {message.weight for message in board.messages} == {Weight.NOTE}
+
+
+def test_no_bar_is_no_fault_before_a_run() -> None:
+    board = Happening().board()
+    board.take(events.ReadingsSeen((events.Sample(0.0, None, "fault", "signal lost"),)))
+    panel = ReadingPanel(clock=lambda: 0.0)
+    assert panel.text(board).plain.splitlines()[1] == "no bar: signal lost"
+    board.take(events.StateChanged(State.ARMED, frozenset()))
+    assert panel.text(board).plain.splitlines()[1] == "FAULT signal lost"
+
+
+def test_a_verdict_that_is_taken_back_opens_its_task() -> None:
+    happening = Happening().circle("t0", Direction.CCW).command(Accept()).circle("t0", Direction.CW).command(Accept())
+    assert happening.board().marks[:2] == [Mark.ACCEPTED, Mark.ACCEPTED]
+    happening.command(Judge("t0", Direction.CCW, 1, accepted=False, reason="a bump"))
+    board = happening.board()
+    assert board.marks[:3] == [Mark.OPEN, Mark.ACCEPTED, Mark.NEXT]
+    assert "t0-ccw-1 does not count" in board.messages[-1].text
+    happening.command(Judge("t0", Direction.CCW, 1, accepted=True))
+    assert happening.board().marks[:3] == [Mark.ACCEPTED, Mark.ACCEPTED, Mark.NEXT]

@@ -55,6 +55,7 @@ def test_a_constant_that_was_written_into_the_files(run, three, longer):
     assert offset["value"] == pytest.approx(-0.005, abs=2 * offset["uncertainty"])
 
 
+@pytest.mark.slow
 def test_a_centre_that_was_written_into_one_run(run, with_angles, tmp_path):
     """Bar lengths of a circle that lies 20 µm further along +Y, by the cosine law."""
     other = shutil.copytree(with_angles, tmp_path / "other")

@@ -184,6 +184,7 @@ def test_a_drift_is_told_from_a_constant(reference):
     assert found.effects[found.there[0].name].share > 0.9
 
 
+@pytest.mark.slow
 def test_what_changes_its_sign_with_the_direction(reference):
     shop = Workshop(8)
 

@@ -99,9 +99,8 @@ class Change:
 
     def columns(self, point: tuple[float, ...]) -> NDArray[np.float64]:
         """Reading of B less that of A by each amplitude of each way of being at work, shape (n, p)."""
-        return self._columns(self._of(0, point) if len(self._whens) > 1 else None, self._of(1, point))
-
-    def _columns(self, of_a: NDArray[np.float64] | None, of_b: NDArray[np.float64]) -> NDArray[np.float64]:
+        of_a = self._of(0, point) if len(self._whens) > 1 else None
+        of_b = self._of(1, point)
         found = []
         for when in self._whens:
             own = when.of_b * of_b

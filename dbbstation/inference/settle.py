@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.bank import Bank
+from dbbstation.inference.bank import Bank, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
 from dbbstation.inference.looks import looked_for
 from dbbstation.inference.patterns import patterns
@@ -121,6 +121,7 @@ def settle(
     most_expanded: int = MOST_EXPANDED,
     colours: bool = True,
     most_looks: int = MOST_LOOKS,
+    in_time: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns on a channel.
@@ -132,9 +133,10 @@ def settle(
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
         colours: where noise is not white, begin a second time as if it were; see below.
         most_looks: looks at what is left, one beside what the other brought, at the most.
+        in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
         progress: told what is being done.
     """
-    options = _Options(look=look, static=static, most_expanded=most_expanded, most_looks=most_looks)
+    options = _Options(look=look, static=static, most_expanded=most_expanded, most_looks=most_looks, in_time=in_time)
     found = _settled(_begun(channel, options), (), options, progress)
     if found.noise.is_white or not (look and colours):
         return found
@@ -142,7 +144,7 @@ def settle(
     # hides it: the other way round, first everything that stands out of white noise, may end at something more probable.
     bank = _begun(channel, options)
     bank.measure_noise(white=True)
-    members = _looked(bank, (), {}, progress, options.most_looks, white=True)
+    members = _looked(bank, (), {}, progress, options.most_looks, white=True, in_time=options.in_time)
     bank.measure_noise()
     comparison = bank.beside().comparison(bank.target)
     members = grown(comparison, bank.causes, members)
@@ -159,6 +161,7 @@ class _Options:
     static: bool
     most_expanded: int
     most_looks: int
+    in_time: bool
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
@@ -193,11 +196,11 @@ def _settled(bank: Bank, best: tuple[Member, ...], options: _Options, progress: 
     for number in range(MOST_ROUNDS):
         bank.measure_noise()
         lasting: tuple[Member, ...] = ()
-        if looking and not looked:
+        if looking and options.in_time and not looked:
             # Stretches of time can stand for whatever has a history. So effects that follow variables have a start of their own.
             lasting = _looked(bank, _grown_in(bank), refused, progress, options.most_looks, in_time=False)
         if looking:
-            best = _looked(bank, best, refused, progress, options.most_looks)
+            best = _looked(bank, best, refused, progress, options.most_looks, in_time=options.in_time)
         progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
@@ -338,15 +341,18 @@ def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, member: Member) -
     """Lay out a law at its best values in the best hypothesis, or beside it in the place of what it competes with."""
     target, law = bank.target, bank.laws[member.cause.name]
     others = best.without(member.cause.name)
-    for _ in range(STEPS if law.grids else 1):
+    for _ in range(STEPS if law.grids or law.at else 1):
         values = beside.comparison(target).estimates([member, *others]).values[: len(member.columns)]
         width = len(member.variant.columns)
         nonlinear = moved(law, member, values)
         if not values[:width].any():
             return
-        bank.refine(law.name, nonlinear, values[:width])
+        every = np.zeros(len(law.plausible))
+        every[amplitudes_of(member.variant)] = values[:width]
+        bank.refine(law.name, nonlinear, every)
         cause = next(cause for cause in bank.causes if cause.name == law.name)
-        member = replace(member, cause=cause, variant=cause.variants[0])
+        same = next(variant for variant in cause.variants if variant.label == member.variant.label)
+        member = replace(member, cause=cause, variant=same)
 
 
 def moved(law: Law, member: Member, values: NDArray[np.float64]) -> tuple[float, ...]:
@@ -359,7 +365,7 @@ def moved(law: Law, member: Member, values: NDArray[np.float64]) -> tuple[float,
 
 
 STEPS = 3
-"""Times that the nonlinear parameters of a law are improved."""
+"""Times that the nonlinear parameters of a law are improved, and amplitudes to which its effect is not proportional."""
 
 
 def _negative(settled: Settled) -> dict[str, str]:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.compare_pairs import Pair
+    from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.machine.geometry import Machine
 
 SAME_TEMPERATURE_K = 0.5

@@ -22,14 +22,11 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.trace.circle import RawCircle
 
-SECTORS = 720
-"""Common angles per turn at the most: every half degree."""
+SECTORS = 180
+"""Common angles per turn at the most: every two degrees, so that 30 undulations per turn are well seen."""
 
 PER_SECTOR = 2
 """Samples per sector that the shortest run must have."""
-
-FINE = 7200
-"""Points of a smooth curve between which straight lines are exact to a hundredth of a nanometre."""
 
 SAME_PLACE_MM = 0.5
 """Centres of one circle may lie so far apart: CMM sheets of one plate, or the sheet and the drawing of it."""
@@ -148,28 +145,50 @@ def common_sectors(raws: Sequence[RawCircle]) -> int:
     return min(SECTORS, min(len(raw) for raw in raws) // PER_SECTOR)
 
 
-def at_common_angles(raw: RawCircle, sectors: int) -> NDArray[np.float64]:
-    """Raw length less commanded length in the middle of each sector, shape (sectors,) [mm]; NaN without a sample.
+@dataclass(frozen=True, eq=False)
+class Sectors:
+    """Takes samples of one turn to the middles of equal sectors.
 
     A sector's samples are averaged. They do not lie evenly about the sector's middle, nor alike in both sessions, and a
     circle that is 0.1 mm off its centre changes by 0.4 µm in a quarter of a degree. Every sample is therefore moved to
     the middle along the run's own smooth curve, which leaves its noise as it is.
+
+    Attributes:
+        count: of sectors.
+        there: those that have a sample, shape (q,).
+        group: number of each sample's sector among these, shape (n,).
+        moved: what averages of these sectors, shape (q,), change by on the way to the middles, shape (q, q).
     """
-    circle = raw.circle
-    theta = raw.theta_deg
-    poses = circle.poses(theta)
-    deviation = raw.length_mm - np.linalg.norm(poses[:, :3] - np.array(circle.ball_mm), axis=1)
-    sector = np.minimum((theta * (sectors / FULL_TURN_DEG)).astype(np.int64), sectors - 1)
-    there, group = np.unique(sector, return_inverse=True)
-    highest, _ = bands(len(there))
-    mean_theta = np.radians(means(theta, group))
-    smooth, *_ = np.linalg.lstsq(basis(mean_theta, highest), means(deviation, group), rcond=None)
-    fine = np.linspace(0.0, FULL_TURN_DEG, FINE + 1)
-    curve = basis(np.radians(fine), highest) @ smooth
-    middle = (there + 0.5) * (FULL_TURN_DEG / sectors)
-    values = np.full(sectors, np.nan)
-    values[there] = means(deviation - np.interp(theta, fine, curve), group) + np.interp(middle, fine, curve)
-    return values
+
+    count: int
+    there: NDArray[np.int64]
+    group: NDArray[np.int64]
+    moved: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, theta_deg: NDArray[np.float64], count: int) -> Sectors:
+        """Sectors of samples at angles from +X, shape (n,)."""
+        sector = np.minimum((theta_deg * (count / FULL_TURN_DEG)).astype(np.int64), count - 1)
+        there, group = np.unique(sector, return_inverse=True)
+        highest, _ = bands(len(there))
+        curve = basis(np.radians(means(theta_deg, group)), highest)
+        middle = basis(np.radians((there + 0.5) * (FULL_TURN_DEG / count)), highest)
+        away = middle - means(basis(np.radians(theta_deg), highest), group)
+        return cls(count, there, group, away @ np.linalg.pinv(curve))
+
+    def at_middles(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of samples, shape (n,) or (n, p), in the middle of each sector, (count,) or (count, p); NaN without a sample."""
+        found = np.full((self.count, *values.shape[1:]), np.nan)
+        averages = means(values, self.group)
+        found[self.there] = averages + self.moved @ averages
+        return found
+
+
+def at_common_angles(raw: RawCircle, sectors: int) -> NDArray[np.float64]:
+    """Raw length less commanded length in the middle of each sector, shape (sectors,) [mm]; NaN without a sample."""
+    poses = raw.circle.poses(raw.theta_deg)
+    deviation = raw.length_mm - np.linalg.norm(poses[:, :3] - np.array(raw.circle.ball_mm), axis=1)
+    return Sectors.of(raw.theta_deg, sectors).at_middles(deviation)
 
 
 def _mean(runs: Sequence[Observation], sectors: int) -> NDArray[np.float64]:

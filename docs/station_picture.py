@@ -30,7 +30,7 @@ from dbbstation.station.commands import Accept, Start
 from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
-from dbbstation.tui.app import Shown
+from dbbstation.tui.shown import Shown
 from dbbstation.tui.still import still_svg
 from dbbstation.virtual.machine import VirtualMachine
 from dbbstation.virtual.truth import random_kinematics
@@ -75,7 +75,7 @@ def happened() -> tuple[Shown, list[Event | SequenceOpened]]:
         now_s += float(times[-1]) + 1.0
         if share == 1.0:
             events += sequencer.command(Accept())
-    return Shown(plan.name, inline.jig.bores), events
+    return Shown(plan.name, inline.jig.bores, tests=plan.tests), events
 
 
 def picture() -> str:

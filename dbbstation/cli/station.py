@@ -206,10 +206,12 @@ def _run(job: Job, open_station: Opener) -> int:
         click.Abort: a signal ended it.
     """
     from dbbstation.service.runner import Runner
-    from dbbstation.tui.app import Shown, StationApp
+    from dbbstation.tui.app import StationApp
+    from dbbstation.tui.shown import Shown
 
     runner = Runner(open_station)
-    app = StationApp(Shown(job.plan.plan.name, job.plan.jig.bores), runner)
+    shown = Shown(job.plan.plan.name, job.plan.jig.bores, tests=job.plan.to_domain().tests)
+    app = StationApp(shown, runner)
     with _stopped_politely(app) as stopped:
         app.run()
     if runner.crash is not None:

@@ -88,6 +88,7 @@ class Board:
         traces: of the test that was started last, by direction.
         running: direction of the run that is on its circle; None where none is.
         results: what completed runs say, the last ones.
+        latest: the last run of this sitting that showed its circle, by test and direction.
         verdicts: on runs that were judged here, by their names.
         completed: the run that waits for a verdict, or waited last.
         fault: what ended the sequence.
@@ -108,6 +109,7 @@ class Board:
     traces: dict[Direction, LiveTrace] = field(default_factory=dict)
     running: Direction | None = None
     results: deque[events.RunCompleted] = field(default_factory=lambda: deque(maxlen=2))
+    latest: dict[tuple[str, Direction], events.RunCompleted] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
     completed: events.RunCompleted | None = None
     fault: events.Fault | None = None
@@ -124,6 +126,11 @@ class Board:
     def accepted(self) -> int:
         """Planned runs that have an accepted recording."""
         return self.marks.count(Mark.ACCEPTED)
+
+    @property
+    def left(self) -> tuple[Task, ...]:
+        """Planned runs without an accepted recording."""
+        return tuple(task for task, mark in zip(self.tasks, self.marks, strict=True) if mark is not Mark.ACCEPTED)
 
     def take(self, event: events.Event | SequenceOpened) -> None:  # noqa: C901, PLR0912 - a line per event, nothing nested
         """Note what happened."""
@@ -213,6 +220,7 @@ class Board:
         self.completed = completed
         if completed.figures is not None:
             self.results.append(completed)
+            self.latest[completed.run.test, completed.run.direction] = completed
             trace = self.traces.get(completed.run.direction)
             if trace is not None:
                 trace.centre()

@@ -26,6 +26,26 @@ _FAR_UM = 9_999.9
 """Further from the nominal length a deviation in µm says nothing."""
 
 
+class Age:
+    """Tells a reading that came just now from one that only still stands there.
+
+    Args:
+        clock: real time [s].
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._total = 0
+        self._new_s = clock()
+
+    def stale_s(self, board: Board) -> float | None:
+        """Return for how long no reading has come; None where the last one is as good as live."""
+        if board.rate.total != self._total:
+            self._total, self._new_s = board.rate.total, self._clock()
+        old_s = self._clock() - self._new_s
+        return old_s if old_s > _STALE_S else None
+
+
 class ReadingPanel(Panel):
     """Two rows.
 
@@ -37,22 +57,17 @@ class ReadingPanel(Panel):
 
     def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
-        self._clock = clock
-        self._total = 0
-        self._new_s = clock()
+        self._age = Age(clock)
 
     def text(self, board: Board) -> Content:
         """Return length and deviation, below them status, rate and losses."""
-        if board.rate.total != self._total:
-            self._total, self._new_s = board.rate.total, self._clock()
+        old_s = self._age.stale_s(board)
         sample = board.sample
         if sample is None:
             return lines(Content.styled("no reading yet", "dim"), Content(""))
-        old_s = self._clock() - self._new_s
-        stale = old_s > _STALE_S
         return lines(
-            Content(" ").join([_length(sample, stale=stale), _deviation(sample, board)]),
-            Content(" · ").join(_quality(sample, board, old_s if stale else None)),
+            Content(" ").join([_length(sample, stale=old_s is not None), _deviation(sample, board)]),
+            Content(" · ").join(_quality(sample, board, old_s)),
         )
 
 

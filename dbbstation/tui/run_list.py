@@ -13,7 +13,7 @@ from dbbstation.tui.panel import Panel, lines
 if TYPE_CHECKING:
     from dbbstation.service.board import Board
 
-_SIGNS = {
+SIGNS = {
     Mark.OPEN: ("·", "dim"),
     Mark.NEXT: ("›", "bold $text-primary"),
     Mark.RUNNING: ("▶", "bold $text-primary"),
@@ -54,7 +54,7 @@ class RunList(Panel):
 
 
 def _cell(direction: str, mark: Mark) -> Content:
-    sign, style = _SIGNS[mark]
+    sign, style = SIGNS[mark]
     return Content.assemble(f"{direction:3} ", (f"{sign} {mark.value}".ljust(_CELL - 4), style))
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.service.board import SequenceOpened
     from dbbstation.station.commands import Command
     from dbbstation.station.events import Event
-    from dbbstation.tui.app import Shown
+    from dbbstation.tui.shown import Shown
 
 
 _ROUNDS = 4
@@ -55,7 +55,12 @@ class Happened:
 
 
 async def still_svg(
-    shown: Shown, events: Sequence[Event | SequenceOpened], *, size: tuple[int, int] = (120, 40), theme: str = DARK
+    shown: Shown,
+    events: Sequence[Event | SequenceOpened],
+    *,
+    size: tuple[int, int] = (120, 40),
+    theme: str = DARK,
+    press: Sequence[str] = (),
 ) -> str:
     """Return the screen after these events as SVG.
 
@@ -64,11 +69,14 @@ async def still_svg(
         events: what happened.
         size: columns and rows.
         theme: dark or light.
+        press: keys pressed after that.
     """
     app = StationApp(shown, Happened(events), clock=lambda: 0.0)
-    async with app.run_test(size=size):
+    async with app.run_test(size=size) as pilot:
         app.theme = theme
         app.look()
+        if press:
+            await pilot.press(*press)
         # Once for the parts, once for heights that follow their text, once for what was drawn for other heights.
         for _ in range(_ROUNDS):
             laid_out = asyncio.Event()

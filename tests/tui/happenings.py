@@ -13,7 +13,7 @@ from dbbstation.station.events import Event
 from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
-from dbbstation.tui.app import Shown
+from dbbstation.tui.shown import Shown
 
 BORES = {1: (0.0, 100.0), 2: (-100.0, 100.0), 3: (-100.0, 0.0), 9: (0.0, 0.0), 7: (100.0, 0.0), 5: (0.0, -100.0)}
 RATE_HZ = 20.0
@@ -92,4 +92,4 @@ class Happening:
         return board
 
     def shown(self) -> Shown:
-        return Shown(self.plan.name, BORES)
+        return Shown(self.plan.name, BORES, tests=self.plan.tests)

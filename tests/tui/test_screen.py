@@ -24,8 +24,9 @@ from dbbstation.service.runner import Runner
 from dbbstation.station.assembly import Job
 from dbbstation.station.events import Event, FeedInSeen, Observer
 from dbbstation.station.states import State
-from dbbstation.tui.app import Shown, StationApp
+from dbbstation.tui.app import StationApp
 from dbbstation.tui.question import GiveUpQuestion
+from dbbstation.tui.shown import Shown
 from dbbstation.tui.trace_view import TraceView
 
 if TYPE_CHECKING:
@@ -84,7 +85,9 @@ class Bench:
     ) -> None:
         """Open a screen and play on it; the screen is closed whatever happens."""
         runner = Runner(opener(self.job, ENCODER, self.place.port, helper=helper or self.place.helper))
-        app = StationApp(Shown(self.job.plan.plan.name, self.job.plan.jig.bores), runner)
+        app = StationApp(
+            Shown(self.job.plan.plan.name, self.job.plan.jig.bores, tests=self.job.plan.to_domain().tests), runner
+        )
 
         async def run() -> None:
             async with app.run_test(size=size) as pilot:

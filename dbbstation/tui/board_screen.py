@@ -1,0 +1,122 @@
+"""A screen that shows the board: drawn when it is the topmost of its kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar, Protocol
+
+from textual.screen import Screen
+
+from dbbstation.station.commands import Accept, Command, Pause, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.states import RECORDING
+from dbbstation.tui.panel import Panel
+from dbbstation.tui.question import GiveUpQuestion
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from textual.binding import BindingType
+
+    from dbbstation.service.board import Board
+
+COMMANDS: dict[str, Command] = {
+    "start": Start(),
+    "touched": Start(remounted=True),
+    "accept": Accept(),
+    "repeat": Repeat(),
+    "reject": Reject(),
+    "skip": Skip(),
+    "pause": Pause(),
+    "resume": Resume(),
+}
+
+_GIVES_UP = {"repeat": "Repeat", "reject": "Reject"}
+"""Commands that end a running circle, as the question before them says."""
+
+
+class Desk(Protocol):
+    """What a screen needs of the app; `StationApp` is one."""
+
+    board: Board
+
+    def send(self, command: Command) -> None:
+        """Pass a command on to the sequence."""
+
+    def draw(self) -> None:
+        """Draw the screen on top."""
+
+
+class BoardScreen(Screen[None]):
+    """Panels and whatever else is made from the board.
+
+    Args:
+        desk: has the board, and takes commands.
+    """
+
+    help_name: ClassVar[str] = ""
+    """Under which the texts of help have it."""
+
+    def __init__(self, desk: Desk) -> None:
+        super().__init__()
+        self.desk = desk
+        self._keys: object = None
+
+    def draw(self) -> None:
+        """Draw the board; the footer only where other keys mean something now."""
+        for panel in self.query(Panel):
+            panel.show(self.desk.board)
+        keys = self.keys()
+        if keys != self._keys:
+            self._keys = keys
+            self.refresh_bindings()
+
+    def keys(self) -> object:
+        """Return what decides which keys mean something; compared with what it was."""
+        board = self.desk.board
+        return board.allowed, board.state, board.fault is None
+
+
+class RunScreen(BoardScreen):
+    """A screen in front of the machine: its keys send what is told to the run of now."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("enter", "tell('start')", "Start"),
+        ("m", "tell('touched')", "New mounting"),
+        ("a", "tell('accept')", "Accept"),
+        ("r", "tell('repeat')", "Repeat"),
+        ("x", "tell('reject')", "Reject"),
+        ("s", "tell('skip')", "Skip"),
+        ("p", "tell('pause')", "Pause"),
+        ("p", "tell('resume')", "Go on"),
+    ]
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Only keys that mean something now stand in the footer and do something."""
+        if action == "tell":
+            return type(COMMANDS[str(parameters[0])]) in self.desk.board.allowed
+        return super().check_action(action, parameters)
+
+    def action_tell(self, name: str) -> None:
+        """Send a command, after a question where it gives up a circle that is being recorded."""
+
+        def answered(sure: bool | None) -> None:  # noqa: FBT001 - answer of a question
+            if sure:
+                self.desk.send(COMMANDS[name])
+
+        if name in _GIVES_UP and self.desk.board.state in RECORDING:
+            ask_to_give_up(self, _GIVES_UP[name], answered)
+        else:
+            answered(sure=True)
+
+
+def ask_to_give_up(screen: BoardScreen, act: str, then: Callable[[bool | None], None]) -> None:
+    """Ask whether to give up the circle that is being recorded; one question at a time.
+
+    Args:
+        screen: knows the circle.
+        act: what was asked for, as a verb with a capital letter.
+        then: called with the answer.
+    """
+    if isinstance(screen.app.screen, GiveUpQuestion):
+        return
+    announced = screen.desk.board.announced
+    screen.app.push_screen(GiveUpQuestion(announced.run.label if announced else "", act), then)

@@ -1,0 +1,64 @@
+"""Help on a screen: what it shows, and a sentence for each key."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.containers import VerticalScroll
+from textual.content import Content
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+from dbbstation.tui.panel import lines
+from dbbstation.tui.texts import HELP, HELP_CLOSES, KEY_NAMES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from textual.app import ComposeResult
+    from textual.binding import BindingType
+
+_KEY = 8
+
+
+class HelpScreen(ModalScreen[None]):
+    """Stands before the screen that it explains.
+
+    Args:
+        name: under which the texts have that screen.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [("escape,f1,question_mark,q", "dismiss", "Close")]
+
+    DEFAULT_CSS = """
+    HelpScreen {
+        align: center middle;
+        & > VerticalScroll { width: 90%; max-width: 100; height: auto; max-height: 95%; padding: 0 2; background: $panel; border: thick $primary; }
+        & Static { width: 1fr; margin-bottom: 1; }
+    }
+    """
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._help = name
+
+    def compose(self) -> ComposeResult:
+        """Show the texts."""
+        here, everywhere = HELP[self._help], HELP["everywhere"]
+        with VerticalScroll():
+            yield Static(Content.styled(here.title, "bold"))
+            yield Static(Content(HELP_CLOSES))
+            yield Static(_keys(here.keys))
+            yield Static(Content.styled(everywhere.title, "bold"))
+            yield Static(_keys({key: text for key, text in everywhere.keys.items() if key not in here.keys}))
+            for paragraph in here.shows:
+                yield Static(Content(paragraph))
+
+
+def _keys(keys: Mapping[str, str]) -> Content:
+    return lines(
+        *(
+            Content.assemble((f"{KEY_NAMES.get(key, key.upper()):{_KEY}}", "bold"), sentence)
+            for key, sentence in keys.items()
+        )
+    )

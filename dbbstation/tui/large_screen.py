@@ -1,0 +1,94 @@
+"""Large figures: length, state and next action, to be read from two metres."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.content import Content
+from textual.widgets import Footer
+
+from dbbstation.station.states import RECORDING
+from dbbstation.tui.block_letters import HIGH, block_rows, columns
+from dbbstation.tui.board_screen import RunScreen
+from dbbstation.tui.now_line import NowLine
+from dbbstation.tui.panel import Panel, lines
+from dbbstation.tui.reading_panel import Age
+from dbbstation.tui.texts import LARGE_WORDS
+from dbbstation.tui.title_line import TitleLine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from textual.app import ComposeResult
+    from textual.binding import BindingType
+
+    from dbbstation.service.board import Board
+    from dbbstation.tui.board_screen import Desk
+    from dbbstation.tui.shown import Shown
+
+NO_LENGTH = "---.----"
+_WIDEST = "hands off"
+
+
+class LargeFigures(Panel):
+    """Three rows of large letters, as large as all of them fit.
+
+    Args:
+        clock: real time, for telling an old reading [s].
+    """
+
+    DEFAULT_CSS = "LargeFigures { height: 1fr; padding: 0 1; }"
+
+    def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
+        super().__init__(id=id)
+        self._age = Age(clock)
+
+    def text(self, board: Board) -> Content:
+        """Return length, state and next action."""
+        state, action = LARGE_WORDS[board.state]
+        length = self._length(board)
+        # One size for all states: letters that change their size are harder to read than small ones.
+        widest = max(columns(text) for text in (length, NO_LENGTH, _WIDEST))
+        room = self.content_size
+        scale = max(min(room.width // widest, room.height // (3 * HIGH + 2)), 1)
+        gap = max((room.height - 3 * HIGH * scale) // 2, 0)
+        rows: list[Content] = []
+        styles = ("bold", "$text-primary", "$text-warning" if board.state in RECORDING else "$text-success")
+        for text, style in zip((length, state, action), styles, strict=True):
+            rows += [Content.styled(row, style) for row in block_rows(text, scale)]
+            rows += [Content("")] * min(gap, scale)
+        return lines(*rows)
+
+    def _length(self, board: Board) -> str:
+        stale = self._age.stale_s(board) is not None
+        sample = board.sample
+        if sample is None or stale or sample.length_mm is None or sample.status != "ok":
+            return NO_LENGTH
+        return f"{sample.length_mm:.4f}"
+
+
+class LargeScreen(RunScreen):
+    """The trace makes room for letters; the keys are those beside the machine.
+
+    Args:
+        desk: has the board, and takes commands.
+        shown: plan and plate.
+        clock: real time, for telling an old reading [s].
+    """
+
+    help_name = "large"
+
+    BINDINGS: ClassVar[list[BindingType]] = [("escape", "app.large", "Back")]
+
+    def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(desk)
+        self._show = shown
+        self._clock = clock
+
+    def compose(self) -> ComposeResult:
+        """Put the parts where they belong."""
+        yield TitleLine(self._show.plan, id="large-title")
+        yield NowLine(id="large-now")
+        yield LargeFigures(clock=self._clock, id="large-figures")
+        yield Footer(show_command_palette=False)

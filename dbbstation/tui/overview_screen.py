@@ -1,0 +1,146 @@
+"""All tests of the plan: a map of the plate, how each run stands, what is left; another test, another verdict."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.binding import Binding
+from textual.containers import Horizontal
+from textual.widgets import Footer
+
+from dbbstation.plan.circle import Direction
+from dbbstation.service.board import Verdict
+from dbbstation.station.commands import GoTo, Judge
+from dbbstation.tui.board_screen import BoardScreen
+from dbbstation.tui.overview_panels import Choice, ChosenRun, LeftLine, PlateMap, TestList
+from dbbstation.tui.reason_question import ReasonQuestion
+from dbbstation.tui.title_line import TitleLine
+
+if TYPE_CHECKING:
+    from textual.app import ComposeResult
+    from textual.binding import BindingType
+
+    from dbbstation.station.events import RunCompleted
+    from dbbstation.tui.board_screen import Desk
+    from dbbstation.tui.shown import Shown
+
+_VERDICT_BEFORE = {"take_back": Verdict.ACCEPTED, "accept_again": Verdict.REJECTED}
+"""Which verdict a key takes back."""
+
+
+class OverviewScreen(BoardScreen):
+    """Pushed over the screen of now, and popped.
+
+    Args:
+        desk: has the board, and takes commands.
+        shown: plan and plate.
+    """
+
+    help_name = "overview"
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        # The line above the footer says that arrow keys choose.
+        Binding("up", "choose(-1)", "Test above", show=False),
+        Binding("down", "choose(1)", "Test below", show=False),
+        Binding("left", "turn(0)", "First direction", show=False),
+        Binding("right", "turn(1)", "Second direction", show=False),
+        ("enter", "go_to", "Go to"),
+        ("x", "take_back", "Does not count"),
+        ("a", "accept_again", "Counts again"),
+        ("o,escape", "back", "Back"),
+    ]
+
+    DEFAULT_CSS = """
+    OverviewScreen {
+        #plate-and-tests { height: 1fr; }
+        #plate { width: 45%; min-width: 38; }
+        #tests { width: 1fr; min-width: 40; }
+    }
+    """
+
+    def __init__(self, desk: Desk, shown: Shown) -> None:
+        super().__init__(desk)
+        self._show = shown
+        announced = desk.board.announced
+        names = list(shown.tests)
+        at = names.index(announced.run.test) if announced and announced.run.test in names else 0
+        directions = shown.tests[names[at]].directions if names else ()
+        way = directions.index(announced.run.direction) if announced and announced.run.direction in directions else 0
+        self.choice = Choice(names, at, way)
+
+    def compose(self) -> ComposeResult:
+        """Put the parts where they belong."""
+        yield TitleLine(self._show.plan, id="overview-title")
+        yield LeftLine(self._show, id="left")
+        with Horizontal(id="plate-and-tests"):
+            yield PlateMap(self._show, self.choice, id="plate")
+            yield TestList(self.choice, id="tests")
+        yield ChosenRun(self._show, self.choice, id="chosen")
+        yield Footer(show_command_palette=False)
+
+    def keys(self) -> object:
+        """Return what decides which keys mean something: also the choice, and the verdict on it."""
+        run = self._run()
+        verdict = self.desk.board.verdicts.get(run.run.label) if run else None
+        return super().keys(), self.choice.at, self.choice.way, verdict
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Only keys that mean something now stand in the footer and do something."""
+        board = self.desk.board
+        if action == "go_to":
+            return GoTo in board.allowed and bool(self.choice.tests)
+        if action in _VERDICT_BEFORE:
+            run = self._run()
+            return (
+                Judge in board.allowed
+                and run is not None
+                and board.verdicts.get(run.run.label) is _VERDICT_BEFORE[action]
+            )
+        return super().check_action(action, parameters)
+
+    def action_choose(self, steps: int) -> None:
+        """Choose a test above or below."""
+        self.choice.at = min(max(self.choice.at + steps, 0), max(len(self.choice.tests) - 1, 0))
+        self.draw()
+
+    def action_turn(self, way: int) -> None:
+        """Choose a direction."""
+        self.choice.way = way
+        self.draw()
+
+    def action_go_to(self) -> None:
+        """Let the chosen run be measured next, and look at that."""
+        self.desk.send(GoTo(self.choice.test, self._direction()))
+        self.action_back()
+
+    def action_take_back(self) -> None:
+        """Take an accepted run back, for a reason."""
+        completed = self._run()
+        if completed is None:
+            return
+
+        def answered(reason: str | None) -> None:
+            if reason:
+                self._judge(completed, accepted=False, reason=reason)
+
+        self.app.push_screen(ReasonQuestion(completed.run.label), answered)
+
+    def action_accept_again(self) -> None:
+        """Let a rejected run count."""
+        completed = self._run()
+        if completed is not None:
+            self._judge(completed, accepted=True, reason="")
+
+    def action_back(self) -> None:
+        """Go back to the screen below."""
+        self.dismiss()
+
+    def _judge(self, completed: RunCompleted, *, accepted: bool, reason: str) -> None:
+        run = completed.run
+        self.desk.send(Judge(run.test, run.direction, run.repeat, accepted, reason))
+
+    def _direction(self) -> Direction:
+        return self.choice.direction(self._show)
+
+    def _run(self) -> RunCompleted | None:
+        return self.desk.board.latest.get((self.choice.test, self._direction())) if self.choice.tests else None

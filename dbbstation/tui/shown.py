@@ -1,0 +1,28 @@
+"""What screens show that no event tells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.plan.plan import PlannedTest
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Plan and plate.
+
+    Attributes:
+        plan: its name.
+        bores: number of each bore of the jig plate with its x, y on the plate [mm].
+        cell_aspect: height of a terminal's cell over its width.
+        tests: of the plan, by name.
+    """
+
+    plan: str
+    bores: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    cell_aspect: float = 2.0
+    tests: Mapping[str, PlannedTest] = field(default_factory=dict)

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.diagnosis.drive.channel import METHOD_SHARE
 from dbbstation.diagnosis.drive.findings import DriveFinding, Effect, Part
+from dbbstation.diagnosis.drive.pulses import pulse_parts
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.read_off import OUT, read_off
 from dbbstation.inference.verdict import Value, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import Explained
@@ -67,7 +66,8 @@ class Verdicts:
             if self._source_of[one.name] or one.verdict is not Verdict.IDENTIFIED or not one.spans:
                 continue
             span = one.spans[0]
-            variable = f"{span.variable} by direction" if one.family is Family.BY_DIRECTION else span.variable
+            turns = one.family in {Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION}
+            variable = f"{span.variable} by direction" if turns else span.variable
             found.append(Effect(one.name, variable, one.probability, one.rms, span.low, span.high, span.unit))
         return tuple(sorted(found, key=lambda e: -e.rms_n))
 
@@ -83,7 +83,7 @@ class Verdicts:
 
     def _finding(self, source: DriveSource) -> DriveFinding:
         own = self._of[source.name]
-        there = [f for f in own if f.verdict in CLAIMS and f.name in self.named]
+        there = [self._as_sure_as_it_is(f) for f in own if f.verdict in CLAIMS and f.name in self.named]
         alike = self._alike(source, there or own)
         if there and source.name == COULOMB and not self._several:
             alike = (*alike, "viscous friction")
@@ -102,7 +102,7 @@ class Verdicts:
         best = max(there or own, key=lambda f: f.log_factor, default=None)
         pulses = [f for f in there if f.family is Family.PULSES]
         parts = tuple(part for f in there if f not in pulses for part in self._parts(f))
-        parts += tuple(self._pulses(pulses)) if pulses else ()
+        parts += tuple(pulse_parts(self._explained, [f.name for f in pulses])) if pulses else ()
         parameters = self._values(best) if best is not None else {}
         if len(there) > 1 and best is not None and best.family is None:
             parameters = {k: v for f in reversed(there) for k, v in self._values(f).items()}
@@ -119,6 +119,22 @@ class Verdicts:
             parts=parts,
             text=text,
         )
+
+    def _as_sure_as_it_is(self, finding: Finding) -> Finding:
+        """A finding whose values are known as well as stretches and bands agree on them: noise alone would call them surer."""
+        if finding.verdict is not Verdict.IDENTIFIED or finding.name not in self._drive.of_law:
+            return finding
+        after = self._explained.after
+        own = after.columns_of(finding.name)
+        values, covariance = after.values[own], after.covariance[own, own]
+        sigmas = float(np.sqrt(values @ np.linalg.solve(covariance, values)))
+        if sigmas >= OUT:
+            return finding
+        why = (
+            f"Its size differs between parts of the recording, or between bands, so that it is only {sigmas:.2g} standard "
+            "uncertainties out: something that is not in the model changes it, or stands behind it."
+        )
+        return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
 
     def _is_member(self, finding: Finding) -> bool:
         return finding.name in self._explained.settled.best.names
@@ -230,71 +246,3 @@ class Verdicts:
         if finding.name in self._drive.of_law:
             return [Part(self._drive.of_law[finding.name][1].label, self._values(finding))]
         return [Part(finding.name, dict(finding.values))]
-
-    def _pulses(self, findings: Sequence[Finding]) -> list[Part]:
-        """Stretches of time in which the force differs from the level that it has most of the time.
-
-        Stretches that were found may overlap; what they are together has levels, of which neighbours that do not differ by
-        `APART` standard uncertainties are one.
-        """
-        after, recordings = self._explained.after, self._drive.recordings
-        columns = np.concatenate([np.arange(o.start, o.stop) for o in (after.columns_of(f.name) for f in findings)])
-        inside = after.samples[:, columns]
-        values, covariance = after.values[columns], after.covariance[np.ix_(columns, columns)]
-        edges = np.concatenate([[0], np.flatnonzero(np.any(np.diff(inside, axis=0) != 0.0, axis=1)) + 1, [len(inside)]])
-        levels = [(int(a), int(b), inside[a]) for a, b in pairwise(edges)]
-
-        def differ(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-            less = one - other
-            return abs(float(less @ values)) > APART * float(np.sqrt(max(less @ covariance @ less, 1e-300)))
-
-        joined: list[tuple[int, int, NDArray[np.float64]]] = []
-        for first, last, level in levels:
-            if joined and not differ(level, joined[-1][2]):
-                before = joined.pop()
-                share = (last - first) / (last - before[0])
-                first, level = before[0], share * level + (1.0 - share) * before[2]  # noqa: PLW2901 - one level of both
-            joined.append((first, last, level))
-        joined = _without_edges(joined, values)
-        order = sorted(joined, key=lambda one: float(one[2] @ values))
-        counts = np.cumsum([last - first for first, last, _ in order])
-        usual = order[int(np.searchsorted(counts, 0.5 * counts[-1]))][2]
-        times, apart = recordings.time_s, recordings.samples_apart_s
-        found = []
-        for first, last, level in joined:
-            if not differ(level, usual):
-                continue
-            less = level - usual
-            size = Value(float(less @ values), float(np.sqrt(less @ covariance @ less)), "N")
-            ends = (float(times[first]), float(times[last - 1]))
-            found.append(Part("", {"force_n": size, "duration_s": Value(ends[1] - ends[0] + apart, apart, "s")}, ends))
-        return found
-
-
-def _without_edges(
-    levels: Sequence[tuple[int, int, NDArray[np.float64]]], values: NDArray[np.float64]
-) -> list[tuple[int, int, NDArray[np.float64]]]:
-    """Levels in time without those of one sample between two others: the edge of a pulse within the band, which is round.
-
-    An edge goes to the level beside it that it is nearer to; a single sample with the same level on both sides is a pulse.
-    """
-    sizes = [float(level @ values) for *_, level in levels]
-    found: list[tuple[int, int, NDArray[np.float64]]] = []
-    waiting = None
-    for k, (first, last, level) in enumerate(levels):
-        begin = first if waiting is None else waiting
-        waiting = None
-        between = 0 < k < len(levels) - 1 and min(sizes[k - 1], sizes[k + 1]) < sizes[k] < max(
-            sizes[k - 1], sizes[k + 1]
-        )
-        if last - first > 1 or not between:
-            found.append((begin, last, level))
-        elif abs(sizes[k] - sizes[k - 1]) < abs(sizes[k + 1] - sizes[k]):
-            found[-1] = (found[-1][0], last, found[-1][2])
-        else:
-            waiting = first
-    return found
-
-
-APART = 4.0
-"""Standard uncertainties by which levels of a force in time must differ to be two: one in 15,000 by chance."""

@@ -44,7 +44,6 @@ def sources(summary):
     return {source["name"]: source for source in summary["sources"]}
 
 
-@pytest.mark.xfail(strict=True, reason="half of the pulses pass for noise whose neighbours resemble each other")
 def test_25_pulses_that_were_left_out_are_found_with_their_times(recorded):
     summary = answered(recorded("drives/emps-pulses-left-out.csv"))
     transient = sources(summary)["transient-force"]
@@ -115,9 +114,6 @@ def test_a_motor_to_and_fro(recorded):
         assert abs(number["value"] - 0.81) < 3.0 * number["uncertainty"]
 
 
-@pytest.mark.xfail(
-    strict=True, reason="stretches of time are called in for its lost motion, and Coulomb friction is left open"
-)
 def test_a_damper_with_play_is_not_taken_for_a_wrong_sign(recorded):
     summary = answered(recorded("drives/friction-damper.csv"))
     found = sources(summary)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from dbbstation.cli.output import log_said
+from dbbstation.quality.summary import findings_summary
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, GoTo, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import State
@@ -51,6 +52,8 @@ _ASKED = {
     State.PAUSED: "Enter: go on   q: quit",
 }
 
+_ASKED_OF_WRONG = "Enter: repeat   a: accept all the same   x: reject   q: quit"
+
 
 class Talk:
     """Tells a person what happens; an observer of the station.
@@ -65,6 +68,7 @@ class Talk:
         self._terminal = terminal
         self._quarter = 0
         self._drawn = False
+        self._wrong = False
         self._centre = _OF_MACHINE
 
     def __call__(self, event: events.Event) -> None:
@@ -76,8 +80,11 @@ class Talk:
             return
         for line in _lines(event, self._centre):
             self._say(line)
+        if isinstance(event, events.RunCompleted):
+            self._wrong = bool(event.wrong)
         if self._asking and isinstance(event, events.StateChanged) and event.state in _ASKED:
-            self._say(f"  {_ASKED[event.state]}")
+            doubtful = self._wrong and event.state is State.COMPLETE
+            self._say(f"  {_ASKED_OF_WRONG if doubtful else _ASKED[event.state]}")
 
     def _progress(self, event: events.Progress) -> None:
         share = min(event.swept_deg / event.of_deg, 1.0)
@@ -150,6 +157,7 @@ class Summary:
         if completed is None:
             return told
         told |= {"samples": completed.samples, "lost": completed.lost, "problem": completed.problem or None}
+        told["findings"] = findings_summary(completed.findings)
         if completed.figures is not None:
             told |= {
                 "centre_deviation_um": completed.figures.centre_deviation_um,
@@ -171,6 +179,7 @@ class Keyboard:
         self._send = send
         self._lines = lines or sys.stdin
         self._state = State.BETWEEN
+        self._wrong = False
         # A thread that waits for a line cannot be woken; as a daemon it ends with the program.
         self._thread = threading.Thread(target=self._listen, name="keyboard", daemon=True)
 
@@ -182,11 +191,17 @@ class Keyboard:
         """Remember the state."""
         if isinstance(event, events.StateChanged):
             self._state = event.state
+        elif isinstance(event, events.RunCompleted):
+            self._wrong = bool(event.wrong)
+
+    def _on_enter(self) -> Command | None:
+        doubtful = self._state is State.COMPLETE and self._wrong
+        return Repeat() if doubtful else _ON_ENTER.get(self._state)
 
     def _listen(self) -> None:
         for line in self._lines:
             word = line.strip()
-            command = _command_of(word) if word else _ON_ENTER.get(self._state)
+            command = _command_of(word) if word else self._on_enter()
             if command is not None:
                 self._send(command)
             elif word:
@@ -226,7 +241,9 @@ def _lines(event: events.Event, centre: str) -> list[str]:
             | events.FeedInMissed()
             | events.RunRestored()
         ):
-            return [f"  {event.run.label}: {_of_run(event, centre)}"]
+            wrong = event.wrong if isinstance(event, events.RunCompleted) else ()
+            texts = [_of_run(event, centre), *(f"{finding.name} wrong: {finding.text}" for finding in wrong)]
+            return [f"  {event.run.label}: {text}" for text in texts]
     return []
 
 

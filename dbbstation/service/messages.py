@@ -36,6 +36,10 @@ def message_of(event: object) -> Message | None:  # noqa: PLR0911 - a line per e
             return Message(Weight.NOTE, f"{event.run.label} accepted")
         case events.RunRejected():
             return Message(Weight.NOTE, f"{event.run.label} does not count, its recording is kept: {event.reason}")
+        case events.RunCompleted() if event.wrong:
+            return Message(
+                Weight.WARNING, f"{event.run.label}: " + "; ".join(f"{f.name}: {f.text}" for f in event.wrong)
+            )
         case events.RunCompleted(problem=problem) if problem:
             return Message(Weight.WARNING, f"{event.run.label}: {problem_alone(event)}")
         case events.RunRestored():

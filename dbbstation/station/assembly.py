@@ -11,6 +11,7 @@ from dbbstation.files.recordings.bar_reach import unlike_bar
 from dbbstation.files.recordings.session_text import SessionDetails
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
+from dbbstation.station.judging import RunJudge
 from dbbstation.station.opening import last_end, open_session
 from dbbstation.station.preflight import check_plan, check_range
 from dbbstation.station.schedule import Schedule
@@ -116,16 +117,19 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     # Real runs bear the computer's time, so that they fit what thermometers log.
     now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
     storage = Storage(writer, now, kept)
+    judge = RunJudge(writer, kept)
     sequencer = Sequencer(
         plan,
         schedule,
         storage.recorded,
         programs=names,
         patience=job.patience,
-        waiting=unjudged(writer.session),
+        judge=judge.judge,
+        waiting=unjudged(writer.session, judge.judge),
         rate_hz=job.rate_hz,
     )
     station = Station(sequencer, source)
     station.subscribe(storage)
+    station.subscribe(judge)
     station.regularly(storage.sync_if_due)
     return Workplace(station, schedule, writer, storage)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Ball
     from dbbstation.plan.sampling import Sampling
+    from dbbstation.quality.finding import Finding
     from dbbstation.station.commands import Command
     from dbbstation.station.states import State
     from dbbstation.trace.analysis import CircleFigures
@@ -177,6 +178,7 @@ class RunCompleted:
         lost: samples that the line lost during it.
         figures: of its circle; None where there is none.
         problem: why it cannot be used; empty where it can.
+        findings: all that was looked for in its circle; empty where it has none.
     """
 
     run: RunId
@@ -184,6 +186,12 @@ class RunCompleted:
     lost: int
     figures: CircleFigures | None
     problem: str
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def wrong(self) -> tuple[Finding, ...]:
+        """Findings that pass their limit: reasons to measure the run again."""
+        return tuple(finding for finding in self.findings if finding.wrong)
 
 
 @dataclass(frozen=True)

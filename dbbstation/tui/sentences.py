@@ -57,7 +57,7 @@ def _verdict(board: Board) -> str:
     if wrong:
         more = f" ({len(wrong) - 1} more)" if len(wrong) > 1 else ""
         return f"{name}, {wrong[0].name} wrong{more}: {_ended(wrong[0].text)} R measures it again, A accepts it all the same."
-    return f"{name} is complete, nothing wrong was found: A accepts it, R measures it again, X rejects it and goes on."
+    return f"{name} is complete: A accepts it, R measures it again, X rejects it and goes on."
 
 
 def _flawed(board: Board) -> str:

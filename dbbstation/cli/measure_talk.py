@@ -12,7 +12,7 @@ import click
 from dbbstation.cli.output import log_said
 from dbbstation.quality.summary import findings_summary
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, GoTo, Pause, Quit, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import Accept, GoTo, Note, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import State
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ _WORDS: dict[str, Command] = {
     "q": Quit(),
 }
 _ASKED = {
-    State.ANNOUNCED: "Enter: ready, start the circle   m: ready, the holder was touched   s: skip   g TEST: go to   p: pause   q: quit",
+    State.ANNOUNCED: "Enter: ready, start the circle   m: ready, the holder was touched   s: skip   g TEST: go to   n TEXT: note   t 20.5: temperature   p: pause   q: quit",
     State.COMPLETE: "Enter: accept   r: repeat   x: reject   q: quit",
     State.FLAWED: "Enter: repeat   x: reject   q: quit",
     State.PAUSED: "Enter: go on   q: quit",
@@ -215,16 +215,36 @@ def _command_of(line: str) -> Command | None:
     word, _, rest = line.partition(" ")
     if word.lower() == "g" and rest.strip():
         return GoTo(rest.strip())
+    if word.lower() == "n" and rest.strip():
+        return Note(rest.strip())
+    if word.lower() == "t" and rest.strip():
+        return _temperature(rest.strip())
     return _WORDS.get(word[:1].lower())
 
 
-def _lines(event: events.Event, centre: str) -> list[str]:
+def _temperature(text: str) -> Note | None:
+    """Temperature of the shop as a note; None where it is no number or no shop has it."""
+    try:
+        degc = float(text.replace(",", "."))
+    except ValueError:
+        return None
+    return Note(ambient_temp_c=degc) if abs(degc) <= HOTTEST_DEGC else None
+
+
+HOTTEST_DEGC = 60.0
+"""No shop in which people measure is hotter, nor as far below zero [degC]."""
+
+
+def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a line per event, nothing nested
     """Return what there is to say of an event; `centre` is whose error the centre of a circle is."""
     match event:
         case events.RunAnnounced():
             head = f"{event.number} of {event.count}: test {event.run.test} {event.run.direction}"
             head += f" (repeat {event.run.repeat})" if event.run.repeat > 1 else ""
             return [head, *(f"  - {step}" for step in event.instructions)]
+        case events.Noted():
+            degc = "" if event.ambient_temp_c is None else f"{event.ambient_temp_c:g} °C"
+            return [f"  noted: {event.text or degc}"]
         case events.SessionFinished() if event.missing:
             return [f"left out, measure them another time: {', '.join(event.missing)}"]
         case events.SessionStopped() | events.Fault():

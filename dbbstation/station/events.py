@@ -221,6 +221,19 @@ class FeedInMissed:
 
 
 @dataclass(frozen=True)
+class Noted:
+    """Somebody noted something.
+
+    Attributes:
+        text: the remark; empty for a temperature alone.
+        ambient_temp_c: temperature of the shop now [degC]; None where it was not read.
+    """
+
+    text: str
+    ambient_temp_c: float | None
+
+
+@dataclass(frozen=True)
 class RunAccepted:
     """The run counts."""
 
@@ -320,6 +333,7 @@ Event: TypeAlias = (
     | RunCompleted
     | RunRestored
     | FeedInMissed
+    | Noted
     | RunAccepted
     | RunRejected
     | RunLate

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.plan.sampling import sampling
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, Command, GoTo, Judge, Pause, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import Accept, Command, GoTo, Judge, Note, Pause, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.detector import CircleWatch, EdgeDetector, Patience
 from dbbstation.station.instructions import instructions
 from dbbstation.station.run_record import RunRecord, unrecorded
@@ -123,6 +123,9 @@ class Sequencer:
                 self._to_next(cause)
             case GoTo() | Judge():
                 self._reorder(command)
+            case Note():
+                self._flush()
+                self._out.append(events.Noted(command.text, command.ambient_temp_c))
             case Pause():
                 self._edges = self._watch = None
                 self._move(cause)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import OutputError
-from dbbstation.files.recordings.entries import Counts
+from dbbstation.files.recordings.entries import Counts, Note
 from dbbstation.station import events
 from dbbstation.station.run_record import recording_of
 from dbbstation.trace.columns import STATUS_GOOD
@@ -68,6 +68,8 @@ class Storage:
                 self._writer.judge(self._entry(event.run), accepted=True)
             case events.RunRejected():
                 self._writer.judge(self._entry(event.run), accepted=False, reason=event.reason)
+            case events.Noted():
+                self._writer.note(Note(self._now(), event.text, event.ambient_temp_c))
             case events.SessionStopped() | events.Fault():
                 self.close()
             case _:

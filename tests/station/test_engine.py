@@ -3,7 +3,7 @@ from __future__ import annotations
 import errno
 import threading
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 import pytest
@@ -18,7 +18,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import Direction
 from dbbstation.station import events, storage
 from dbbstation.station.assembly import Job, assemble
-from dbbstation.station.commands import Accept, Quit, Repeat, Skip, Start
+from dbbstation.station.commands import Accept, Note, Quit, Repeat, Skip, Start
 from dbbstation.station.engine import Station
 from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
@@ -244,3 +244,17 @@ def test_a_clock_that_was_stepped_back_does_not_turn_the_order_of_runs(monkeypat
     seconds[0] += 60.0
     assert now() - first == timedelta(seconds=60)
     assert time_of_day(lambda: seconds[0], last=first)() >= first
+
+
+def test_what_is_noted_is_kept_with_its_time(plan_file: Path, tmp_path: Path) -> None:
+    workplace = assemble(Job(read_machine(MACHINE_FILE), read_inline_plan(plan_file), tmp_path / "session"), Script())
+    before = datetime.now(UTC)
+    for command in (Note("a draught from the gate"), Note(ambient_temp_c=21.5), Quit()):
+        workplace.station.send(command)
+    workplace.station.run()
+    workplace.close()
+    notes = read_session(tmp_path / "session").notes
+    assert [(note.text, note.ambient_temp_c) for note in notes] == [("a draught from the gate", None), ("", 21.5)]
+    assert all(before - timedelta(seconds=1) <= note.made <= datetime.now(UTC) for note in notes)
+    text = (tmp_path / "session" / "session.yaml").read_text(encoding="utf-8")
+    assert text.startswith("format: dbb-session/3")

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, StationError
-from dbbstation.files.recordings.session import RunEntry, RunState, SessionFolder, read_session
+from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.files.recordings.session import SessionFolder, read_session
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.model.observation import Observation
@@ -63,8 +64,8 @@ def load_sessions(
     warnings = _check_one_machine(sessions)
     _check_no_copies(sessions)
     every = {test for session in sessions for test in session.plan.tests}
-    _check_named(sessions, every, exclude, " to exclude")
-    _check_named(sessions, every, only)
+    check_named(sessions, every, exclude, " to exclude")
+    check_named(sessions, every, only)
     exclude = [*exclude, *(test for test in every if only and test not in only)]
     observations: list[Observation] = []
     problems: list[Problem] = []
@@ -80,7 +81,8 @@ def load_sessions(
             if began is not None and read.recording.temperature_degc:
                 logged.append((began, read.recording))
             try:
-                raw = cut(replace(read.recording, name=str(run.path)), session.circle(run))
+                lost = 0 if run.counts is None else run.counts.lost
+                raw = cut(replace(read.recording, name=str(run.path)), session.circle(run), counted_lost=lost)
                 observations.append(_observation(session, run, raw))
             except InputError as error:
                 problems += error.problems
@@ -224,7 +226,7 @@ def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
     return told
 
 
-def _check_named(sessions: Sequence[SessionFolder], every: set[str], named: Sequence[str], why: str = "") -> None:
+def check_named(sessions: Sequence[SessionFolder], every: set[str], named: Sequence[str], why: str = "") -> None:
     """Refuse names of tests that no session has."""
     unknown = [name for name in named if name not in every]
     if unknown:

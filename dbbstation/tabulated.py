@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.files.formats.number_language import NumberLanguage
+
 FEWEST_ROWS = 30
 """Rows that a comparison needs at the least: with fewer, a curve of seven functions beside noise says nothing."""
 
@@ -49,6 +51,7 @@ class Asked:
         variables: meaning by name of the columns that the difference may follow; None: all that qualify.
         run: column that tells runs apart; None where there is none.
         time: column that says when, `ROWS` for the order of the rows; None: it is guessed.
+        numbers: how numbers are written; None: a dot in them, and the separator that the header has most of.
     """
 
     measured: str
@@ -56,6 +59,7 @@ class Asked:
     variables: Mapping[str, Meaning | None] | None = None
     run: str | None = None
     time: str | None = None
+    numbers: NumberLanguage | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +113,7 @@ def load_tables(paths: Sequence[Path], asked: Asked) -> Tabulated:
     files: list[TableFile] = []
     for path in paths:
         try:
-            files.append(read_table(path, needed))
+            files.append(read_table(path, needed, asked.numbers))
         except InputError as error:
             faults += error.problems
     units = {name: meaning_of(name).unit for name in (asked.measured, asked.simulated)}

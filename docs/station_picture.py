@@ -23,13 +23,14 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
+from dbbstation.service.board import SequenceOpened
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named
 from dbbstation.station.commands import Accept, Start
+from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.tui.app import Shown
-from dbbstation.tui.board import SequenceOpened
 from dbbstation.tui.still import still_svg
 from dbbstation.virtual.machine import VirtualMachine
 from dbbstation.virtual.truth import random_kinematics
@@ -58,7 +59,7 @@ def happened() -> tuple[Shown, list[Event | SequenceOpened]]:
     truth = MachineModel(machine, (*kinematics, Fitted(play, np.array(PLAY_UM))))
     virtual = VirtualMachine(truth, plan, seed=SEED)
     schedule = Schedule(plan, lambda _test, _direction: 1)
-    sequencer = Sequencer(plan, schedule)
+    sequencer = Sequencer(plan, schedule, recording_of)
     events: list[Event | SequenceOpened] = [
         SequenceOpened(schedule.tasks, schedule.open, "2026-11-20-hexapod-7"),
         *sequencer.begin(),

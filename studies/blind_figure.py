@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
-from dbbstation.report.svg import as_svg
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -17,8 +17,10 @@ if TYPE_CHECKING:
 PANEL_IN = (4.2, 3.6)
 
 
-def reliability_figure(reliability: Mapping[str, Sequence[Mapping[str, Any]]]) -> bytes:
-    """Draw a reliability diagram for each table of `blind_reliability.reliability`, as SVG.
+def reliability_figure(
+    reliability: Mapping[str, Sequence[Mapping[str, Any]]], wanted: FigureFormat | Stamped = FigureFormat.SVG
+) -> bytes:
+    """Draw a reliability diagram for each table of `blind_reliability.reliability`.
 
     Bins have the same width whatever they span, since the outermost decide.
     """
@@ -30,7 +32,7 @@ def reliability_figure(reliability: Mapping[str, Sequence[Mapping[str, Any]]]) -
             axes.set_title(title)
         panels[0].set_ylabel("share that is there")
         panels[0].legend(loc="upper left")
-        return as_svg(figure)
+        return in_format(figure, wanted)
 
 
 def _panel(axes: Axes, table: Sequence[Mapping[str, Any]]) -> None:

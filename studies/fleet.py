@@ -45,12 +45,22 @@ def processes(count: int) -> Iterator[ProcessPoolExecutor]:
         try:
             yield pool
         except BaseException:
-            # The thread that hands out work finds its processes gone; that is what was asked for and no news to anybody.
-            threading.excepthook = lambda _: None
+            _say_nothing_of(pool)
             for child in multiprocessing.active_children():
                 child.terminate()
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _say_nothing_of(pool: ProcessPoolExecutor) -> None:
+    """Keep the thread that hands out a pool's work quiet: its processes are gone, which was asked for and is no news."""
+    before, handing_out = threading.excepthook, getattr(pool, "_executor_manager_thread", None)
+
+    def hook(fault: threading.ExceptHookArgs) -> None:
+        if fault.thread is not handing_out:
+            before(fault)
+
+    threading.excepthook = hook
 
 
 @contextmanager

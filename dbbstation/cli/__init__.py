@@ -22,8 +22,10 @@ DONE, FAILED, USAGE = 0, 1, 2
 _DEBUG, _VERBOSE, _SETTINGS = "--debug", "--verbose", "--settings"
 
 COMMANDS = {
+    "bar": "Read the bar on its calibrator, and keep what it read.",
     "calibrate": "Fit the machine's errors to recorded sessions.",
     "check": "Validate files of any format, and whole sessions.",
+    "circles": "Figures of measured circles after ISO 230-4, and findings.",
     "compare": "Where two sessions differ, and which variable that follows.",
     "compensate": "Compensate any NC program with a calibrated model.",
     "diagnose": "Find the physics that a calibration leaves out.",

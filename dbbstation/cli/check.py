@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,11 +13,12 @@ from dbbstation.cli.circle_options import approach_of, circle_options
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from dbbstation.errors import Problem
     from dbbstation.files.checking import Checked
     from dbbstation.nc.circle_program import Approach
+    from dbbstation.sources.contract import ErrorSource
 
 
 @click.command()
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 @source_file_option
 @chosen_tests_options
 @circle_options
+@click.option(
+    "--instrument", metavar="NAME", help="Say what this instrument sees of the plans' circles at their feeds."
+)
+@click.option("--profile", metavar="NAME", help="Variant of that instrument.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.option("--schema", metavar="FORMAT", help="Print the JSON Schema of a format, such as dbb-plan/2, and stop.")
 def check(
@@ -36,20 +41,28 @@ def check(
     step_deg: float,
     clearance_mm: float,
     bar_stays_on: bool,
+    instrument: str | None,
+    profile: str | None,
     as_json: bool,
     schema: str | None,
 ) -> None:
     r"""Validate machines, plans, jigs, models, settings, runs (.csv, .csv.part), recordings of drives and session folders.
 
     Every fault of every file is listed with line and column. A session is checked with its machine, its plan and all
-    its runs: hashes, checksums, units, and whether the machine can travel the plan's circles.
+    its runs: hashes, checksums, units, and whether the machine can travel the plan's circles. Its runs are judged as
+    `dbbstation circles --findings` does without a model: what is wrong with one comes as a note.
 
     Plans and one machine together are also dry-run: every program that `dbbstation program` would write with the same options
     is held against the travel of axes, angles and struts and against the feeds, on its whole way. All faults are listed.
 
+    With --instrument, each plan is told how many points per turn that instrument brings at the plan's feeds, and what is not
+    seen with them.
+
     \b
     Examples:
       dbbstation check plan.yaml machine.yaml
+      dbbstation check plan.yaml --instrument heidenhain-nd281b
+      dbbstation check my-gauge.yaml
       dbbstation check plan.yaml machine.yaml --exclude h --clearance-mm 50
       dbbstation check 2026-11-20-hexapod-7
       dbbstation check --schema dbb-plan/2 > dbb-plan-2.schema.json
@@ -65,11 +78,10 @@ def check(
     if not files:
         raise click.UsageError("name at least one file or session folder")
 
-    from dbbstation.files.checking import check as check_one
     from dbbstation.files.own_sources import every_source
 
     known = every_source(source_files)
-    results = [check_one(file, known) for file in files]
+    results = [_check_one(file, known) for file in files]
     machines = _sound(results, "dbb-machine")
     # Of several machines nobody has said which the plans are for.
     runs = [
@@ -81,26 +93,46 @@ def check(
         raise click.UsageError(
             "--test and --exclude choose tests of a dry run: give plans and one machine, without faults"
         )
+    if profile is not None and instrument is None:
+        raise click.UsageError("--profile is one of an instrument: give --instrument too")
+    seen = [] if instrument is None else _seen(_sound(results, "dbb-plan"), instrument, profile)
     problems = [problem for result in results for problem in result.problems]
     problems += [problem for run in runs for problem in run.problems]
     if as_json:
         print_json(
             {
-                "files": [
-                    {"file": str(r.path), "format": r.kind, "ok": not r.problems, "summary": r.summary} for r in results
-                ],
+                "files": [_file(result) for result in results],
                 "dry_runs": [
                     {"plan": str(r.plan), "machine": str(r.machine), "programs": r.programs, "ok": not r.problems}
                     for r in runs
                 ],
+                "sampling": [{"plan": str(one.plan), "circles": one.circles} for one in seen],
                 "problems": [asdict(problem) for problem in problems],
                 "warnings": [asdict(warning) for result in results for warning in result.warnings],
             }
         )
     else:
         _print(results, runs)
+        for one in seen:
+            for note in one.notes:
+                click.echo(f"{one.plan}: {note}")
     if problems:
         raise InputError(set(problems))
+
+
+def _file(result: Checked) -> dict[str, object]:
+    """Return what was found in a file; of a session also the findings of its runs."""
+    from dbbstation.quality.summary import findings_summary
+
+    told: dict[str, object] = {
+        "file": str(result.path),
+        "format": result.kind,
+        "ok": not result.problems,
+        "summary": result.summary,
+    }
+    if result.judgements:
+        told["runs"] = [{"run": one.run.label, "findings": findings_summary(one.findings)} for one in result.judgements]
+    return told
 
 
 def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:
@@ -132,6 +164,54 @@ class DryRun:
     machine: Path
     programs: int
     problems: list[Problem]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What an instrument sees of a plan.
+
+    Attributes:
+        plan: file of the plan.
+        circles: plain numbers, one entry per test.
+        notes: the same in sentences.
+    """
+
+    plan: Path
+    circles: list[dict[str, Any]]
+    notes: list[str]
+
+
+def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[Seen]:
+    from dbbstation.cli.sampling import sampling_data, sampling_notes
+    from dbbstation.files.formats.plan import read_plan
+    from dbbstation.instrument.library import load_instrument
+
+    protocol = load_instrument(instrument, profile)
+    read = [(file, read_plan(file)) for file in plans]
+    return [Seen(file, sampling_data(plan, protocol), list(sampling_notes(plan, protocol))) for file, plan in read]
+
+
+def _check_one(file: Path, known: Mapping[str, ErrorSource]) -> Checked:
+    """Check a file of any format, or a session; protocol files of instruments as their own reader does."""
+    from dbbstation.errors import InputError
+    from dbbstation.files.checking import Checked, check
+    from dbbstation.files.yaml.text import load_yaml
+
+    document = load_yaml(file, []) if file.suffix in {".yaml", ".yml"} else None
+    given = str(document.data.get("format", "")) if document is not None and isinstance(document.data, dict) else ""
+    if not given.startswith("dbb-instrument/"):
+        return check(file, known)
+    from dbbstation.instrument.library import load_variants
+
+    checked = Checked(file, kind=given)
+    try:
+        variants = load_variants(file)
+    except InputError as error:
+        checked.problems += error.problems
+    else:
+        names = ", ".join(one.profile for one in variants if one.profile)
+        checked.summary = f"instrument {variants[0].name}" + (f": {names}" if names else "")
+    return checked
 
 
 def _sound(results: Sequence[Checked], kind: str) -> list[Path]:

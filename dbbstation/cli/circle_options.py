@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ _OPTIONS = (
     shop_option(
         "--step-deg",
         setting="program.step_deg",
-        type=click.FloatRange(0.01, 5.0),
+        type=Finite(0.01, 5.0),
         default=0.1,
         show_default=True,
         help="Angle between points [deg].",
@@ -27,7 +28,7 @@ _OPTIONS = (
     shop_option(
         "--clearance-mm",
         setting="program.clearance_mm",
-        type=click.FloatRange(0.0),
+        type=Finite(0.0),
         default=20.0,
         show_default=True,
         help="Height of rapid moves above the first point [mm].",

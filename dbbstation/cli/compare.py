@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from dbbstation.recorded import Recorded
 
 
+STAGES = {"candidates": 1, "sets of causes": 30, "look": 60, "verdicts": 90}
+"""How much of a comparison is done when each stage begins [%]."""
+
+
 @click.command()
 @click.argument("a", type=click.Path(path_type=Path), metavar="A")
 @click.argument("b", type=click.Path(path_type=Path), metavar="B")
@@ -33,11 +37,11 @@ def compare(
     force: bool,
     as_json: bool,
 ) -> None:
-    r"""Put two sessions side by side, without a model: differences are B less A.
+    r"""Put two sessions side by side: where they differ, in what form, and by which cause; differences are B less A.
 
-    For last year against today, or a simulation against a recording. The result is where they differ, by how much
-    beyond the stated noise, mountings, CMM sheets and bars, and which variable the difference follows: time, height,
-    tilt, direction, a strut. It names no cause; `diagnose` does, one session at a time.
+    For last year against today, or a simulation against a recording. The readings of A are the simulation of B. What is
+    stated of noise, mountings, CMM sheets and bars is no difference. Error sources that may have changed, balls and bars that
+    sit elsewhere, and effects without a name compete by their probability, as in `diagnose`.
 
     \b
     Examples:
@@ -47,11 +51,14 @@ def compare(
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import stage_bar
-    from dbbstation.diagnosis.compare import compare as put_side_by_side
-    from dbbstation.diagnosis.compare_notes import notes_of
-    from dbbstation.diagnosis.compare_summary import comparison_summary
+    from dbbstation.diagnosed import default_candidates
+    from dbbstation.diagnosis.compare.comparison import compare as put_side_by_side
+    from dbbstation.diagnosis.compare.notes import notes_of
+    from dbbstation.diagnosis.compare.summary import comparison_summary
+    from dbbstation.diagnosis.diagnose import usable_sources
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.report.compare_figure import compare_figure
+    from dbbstation.sources.registry import known_sources, sources_named
 
     if figure is not None:
         refuse_existing(figure, force=force)
@@ -59,9 +66,10 @@ def compare(
     for name, recorded in (("A", one), ("B", other)):
         for warning in recorded.warnings:
             say(f"note: {name}: {warning}")
-    with stage_bar("comparison", {"runs": 0}) as progress:
-        progress(f"runs of {a.name} and {b.name}")
-        found = put_side_by_side(one.machine, one.observations, other.observations)
+    candidates = sources_named(default_candidates(known_sources()))
+    usable, lacking = usable_sources(one.machine, [*one.observations, *other.observations], candidates)
+    with stage_bar("comparison", STAGES) as progress:
+        found = put_side_by_side(one.machine, one.observations, other.observations, usable, lacking, progress)
     notes = notes_of(one.machine, other.machine, found.matching.pairs)
     summary = {"a": str(a), "b": str(b), **comparison_summary(found, notes)}
     if figure is not None:
@@ -104,40 +112,24 @@ def _print(summary: Mapping[str, Any]) -> None:
         click.echo(f"- not comparable: test {one['test']}: {one['text']}")
     click.echo()
     _print_runs(summary)
-    if summary["differ"]:
-        _print_organised(summary)
+    _print_causes(summary)
 
 
 def _print_runs(summary: Mapping[str, Any]) -> None:
     from dbbstation.cli.output import print_table
-    from dbbstation.diagnosis.compare_summary import chance_text
 
     click.echo(
-        "B less A [µm], largest first; ratio: rms over what noise and mountings allow; u: standard uncertainty by these"
+        "B less A [µm], largest first; found: rms of what was found; sigmas: how far that is out; u: standard uncertainty by noise, "
+        "balls and bars"
     )
-    titles = [
-        "test",
-        "dir",
-        "n",
-        "ratio",
-        "rms",
-        "noise",
-        "centre x",
-        "y",
-        "u",
-        "mean",
-        "u",
-        "G",
-        "peak",
-        "at deg",
-        "by chance",
-    ]
+    titles = ["test", "dir", "n", "found", "sigmas", "rms", "noise", "centre x", "y", "u", "mean", "u", "G", "peak"]
     rows = [
         [
             run["test"],
             run["direction"],
             run["number"],
-            f"{run['times_chance']:.1f}",
+            f"{run['found_rms_um']:.2f}",
+            f"{run['found_sigmas']:.0f}",
             f"{run['rms_um']:.2f}",
             f"{run['noise_rms_um']:.2f}",
             *(_tenths(shift) for shift in run["centre_shift_um"]),
@@ -147,11 +139,11 @@ def _print_runs(summary: Mapping[str, Any]) -> None:
             f"{run['circularity_um']:.1f}",
             _tenths(run["peak_um"]),
             f"{run['peak_theta_deg']:.0f}",
-            chance_text(run["probability"]) + (" differs" if run["differs"] else ""),
+            "differs" if run["differs"] else "",
         ]
         for run in summary["runs"]
     ]
-    print_table(titles, rows)
+    print_table([*titles, "at deg", ""], rows)
 
 
 def _tenths(value: float) -> str:
@@ -159,31 +151,39 @@ def _tenths(value: float) -> str:
     return f"{round(value, 1) + 0.0:.1f}"
 
 
-def _print_organised(summary: Mapping[str, Any]) -> None:
+def _print_causes(summary: Mapping[str, Any]) -> None:
     from dbbstation.cli.output import print_table
-    from dbbstation.diagnosis.compare import SMALLEST_SHARE
-    from dbbstation.diagnosis.compare_summary import chance_text
 
-    halves = summary["directions"]
-    if halves is not None:
+    there = [cause for cause in summary["causes"] if cause.get("where")]
+    if there:
         click.echo(
-            f"\nthe same in both directions {halves['same_um']:.2f} µm rms, opposite {halves['opposite_um']:.2f} µm rms "
-            f"(by chance {chance_text(halves['opposite_probability'])})"
+            "\nwhat the sessions differ by; share: of all that was found; opposite: part that changes its sign with the "
+            "direction; calibration: part that a new calibration would take up"
         )
-    click.echo(
-        "\nvariables that the difference follows, best first; share: of what is beyond chance; of µm²: of the plain sum of squares"
-    )
-    rows = [
-        [
-            one["variable"] + ("" if one["strut"] is None else f", strut {one['strut']}"),
-            f"{100 * one['share']:.0f} %",
-            f"{100 * one['share_of_um2']:.0f} %",
-            one["freedom"],
-            chance_text(one["probability"]),
+        rows = [
+            [
+                f"{cause['name']}, {cause['form']}" if cause["form"] else cause["name"],
+                cause["verdict"],
+                f"{cause['probability']:.3f}",
+                f"{cause['rms_um']:.2f}",
+                *(f"{100 * cause[key]:.0f} %" for key in ("share", "opposite", "taken_up")),
+                cause["where"]["text"],
+            ]
+            for cause in there
         ]
-        for one in summary["organised"]
-        if max(one["share"], one["share_of_um2"]) > SMALLEST_SHARE
-    ]
-    print_table(["variable", "share", "of µm²", "degrees of freedom", "by chance"], rows)
-    click.echo(f"\nin short: {summary['organised_text']}")
-    click.echo(f"No cause is named here: `dbbstation diagnose {summary['b']}` looks for one in a session.")
+        titles = ["cause", "verdict", "probability", "µm rms", "share", "opposite", "calibration", "where"]
+        print_table(titles, rows)
+        for cause in there:
+            if cause["text"]:
+                click.echo(f"{cause['name']}: {cause['text']}")
+        click.echo(f"\nin short: {summary['organised_text']}")
+        held = summary["held_out_rms_um"]
+        click.echo(
+            f"held-out tests: {held['before']:.2f} -> {held['after']:.2f} µm rms, once their balls and bars have settled"
+        )
+    click.echo(f"\n{summary['left']['text']}")
+    for verdict in ("ambiguous", "ruled-out", "not-testable"):
+        names = [c["name"] for c in summary["causes"] if c["named"] and c["verdict"] == verdict and not c.get("where")]
+        if names:
+            click.echo(f"{verdict}: {', '.join(dict.fromkeys(names))}")
+    click.echo(f"`dbbstation diagnose {summary['b']}` looks for causes in one session by itself.")

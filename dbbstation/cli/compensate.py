@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.correction import largest_correction_option
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
 
@@ -31,14 +32,14 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @shop_option(
     "--chord-um",
     setting="program.chord_um",
-    type=click.FloatRange(0.001, 1000.0),
+    type=Finite(0.001, 1000.0),
     default=0.1,
     show_default=True,
     help="Greatest distance between a straight move and the path [µm].",
 )
 @click.option(
     "--time-s",
-    type=float,
+    type=Finite(),
     metavar="S",
     help="Start of the program after the session's start [s], for models that depend on time.",
 )

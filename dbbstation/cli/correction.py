@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import click
-
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 from dbbstation.nc.limits import LARGEST_ALLOWED_MM, LARGEST_CORRECTION_MM
 
@@ -21,7 +20,7 @@ def largest_correction_option(function: _Function) -> _Function:
         "--largest-correction-mm",
         "largest_mm",
         setting="limits.largest_correction_mm",
-        type=click.FloatRange(0.0, LARGEST_ALLOWED_MM, min_open=True),
+        type=Finite(0.0, LARGEST_ALLOWED_MM, min_open=True),
         default=LARGEST_CORRECTION_MM,
         show_default=True,
         help="Refuse a model that shifts any point by more [mm].",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.figure_option import figure_option, format_of
+from dbbstation.cli.number_types import Finite
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -15,11 +16,13 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("recordings", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORDING.csv...")
-@click.option("--force-per-ampere", type=float, metavar="N/A", help="Force of the drive at 1 A, for motor_current_a.")
+@click.option(
+    "--force-per-ampere", type=Finite(), metavar="N/A", help="Force of the drive at 1 A, for motor_current_a."
+)
 @click.option("--sources", metavar="A,B,...", help="Causes to compare [default: all].")
 @click.option(
     "--cutoff-hz",
-    type=float,
+    type=Finite(),
     metavar="HZ",
     help="Bandwidth in which force and model are compared [default: chosen from the recording].",
 )
@@ -52,25 +55,30 @@ def drive(
       dbbstation drive strut3.csv --sources coulomb-friction,friction-asymmetry --json
     """
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import stage_bar
+    from dbbstation.cli.provenance import provenance
     from dbbstation.diagnosis.drive.identify import identify
     from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
     from dbbstation.diagnosis.drive.summary import drive_summary
-    from dbbstation.files.atomic import refuse_existing, write_bytes, write_text
+    from dbbstation.files.atomic import refuse_existing, write_bytes
+    from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.drive_csv import compared_csv, read_drive
 
-    for path in (out, figure):
-        if path is not None:
-            refuse_existing(path, force=force)
+    if out is not None:
+        refuse_existing_table(out, force=force)
+    if figure is not None:
+        refuse_existing(figure, force=force)
     known = known_drive_sources()
     named = drive_sources_named([name.strip() for name in sources.split(",")] if sources else known)
     files = [read_drive(path) for path in recordings]
     for warning in (warning for file in files for warning in file.warnings):
         say(f"note: {warning}")
     raw = [file.recording(force_per_ampere) for file in files]
-    found = identify(raw, named, cutoff_hz, lambda text: say(f"... {text}"))
+    with stage_bar("identification", STAGES) as progress:
+        found = identify(raw, named, cutoff_hz, progress)
     summary = drive_summary(found)
     if out is not None:
-        write_text(out, compared_csv(found.table()), force=force)
+        write_table(out, compared_csv(found.table()), provenance(), force=force)
         summary["compared"] = str(out)
     if figure is not None:
         from dbbstation.report.drive_figure import drive_figure
@@ -83,6 +91,10 @@ def drive(
         print_json(summary)
     else:
         _print(summary)
+
+
+STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-back stretch": 90}
+"""Stages of an identification, and the share of its time that has passed by then [%]."""
 
 
 def _print(summary: Mapping[str, Any]) -> None:

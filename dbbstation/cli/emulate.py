@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.instrument_options import chosen_protocol, protocol_options
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -23,12 +25,7 @@ _LOOK_S = 0.2
 
 
 @click.command()
-@click.option(
-    "--instrument",
-    required=True,
-    metavar="NAME",
-    help="Name of an instrument (`dbbstation instruments`), or a protocol file.",
-)
+@protocol_options(required=True)
 @click.option("--plan", "plan_file", required=True, type=click.Path(path_type=Path), help="Test plan.")
 @click.option("--machine", "machine_file", required=True, type=click.Path(path_type=Path), help="Nominal machine.")
 @click.option(
@@ -38,27 +35,27 @@ _LOOK_S = 0.2
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of everything random.")
 @click.option(
     "--rate-hz",
-    type=click.FloatRange(0.1, 100000.0),
+    type=Finite(0.1, 100000.0),
     help="Sampling rate [1/s], where it is not the instrument's usual one.",
 )
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of NC programs to run.")
 @click.option(
     "--time-scale",
-    type=click.FloatRange(0.01, 200.0),
+    type=Finite(0.01, 200.0),
     default=1.0,
     show_default=True,
     help="Factor by which machine and line run faster than real time.",
 )
 @click.option(
     "--noise-um",
-    type=click.FloatRange(min=0.0),
+    type=Finite(min=0.0),
     default=0.3,
     show_default=True,
     help="Standard deviation of the noise of a reading [µm].",
 )
 @click.option(
     "--bar-um",
-    type=click.FloatRange(min=0.0),
+    type=Finite(min=0.0),
     default=0.5,
     show_default=True,
     help="Standard deviation of the bar's length error [µm].",
@@ -68,6 +65,8 @@ _LOOK_S = 0.2
 def emulate(
     *,
     instrument: str,
+    profile: str | None,
+    zero_mm: float | None,
     plan_file: Path,
     machine_file: Path,
     truth: Path | None,
@@ -98,14 +97,14 @@ def emulate(
     """
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
-    from dbbstation.instrument.library import at_rate, load_instrument
+    from dbbstation.instrument.library import at_rate
     from dbbstation.virtual.cell import VirtualCell
     from dbbstation.virtual.control import CellCommands, ControlServer
     from dbbstation.virtual.machine import Sizes, VirtualMachine
     from dbbstation.virtual.wire import VirtualInstrument
     from dbbstation.virtual.wire_clock import ScaledClock
 
-    protocol = at_rate(load_instrument(instrument), rate_hz)
+    protocol = at_rate(chosen_protocol(instrument, profile, zero_mm), rate_hz)
     machine, plan = read_machine(machine_file), read_plan(plan_file)
     model = _truth(machine, truth, source_files, seed)
     virtual = VirtualMachine(model, plan, seed=seed, sizes=Sizes(noise_um / 1e3, bar_um / 1e3))

@@ -12,58 +12,73 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("name", required=False)
+@click.option("--profile", metavar="NAME", help="Variant of the instrument; the usual one where none is named.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def instruments(name: str | None, *, as_json: bool) -> None:
+def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None:
     """List the instruments that are known, or show one: NAME, or a protocol file.
 
     \b
     Examples:
       dbbstation instruments
       dbbstation instruments heidenhain-nd281b
+      dbbstation instruments keyence-dl-rs1a --profile gt-70a
       dbbstation instruments ./my-gauge.yaml
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
-    from dbbstation.instrument.library import known_instruments, load_instrument
+    from dbbstation.instrument.library import known_instruments, load_instrument, load_variants
 
     if name is not None:
-        protocol = load_instrument(name)
+        protocol = load_instrument(name, profile)
+        names = [one.profile for one in load_variants(name) if one.profile]
         if as_json:
-            print_json({**_summary(protocol), "protocol": protocol.model_dump(mode="json")})
+            print_json({**_summary(protocol), "profiles": names, "protocol": protocol.model_dump(mode="json")})
         else:
-            click.echo("\n".join(_details(protocol)))
+            click.echo("\n".join(_details(protocol, names)))
         return
-    known = [load_instrument(one) for one in known_instruments()]
+    if profile is not None:
+        raise click.UsageError("--profile is one of an instrument: name the instrument too")
+    known = [load_variants(one) for one in known_instruments()]
     if as_json:
-        print_json({"instruments": [_summary(one) for one in known]})
+        rows = [{**_summary(one[0]), "profiles": [each.profile for each in one if each.profile]} for one in known]
+        print_json({"instruments": rows})
         return
-    for one in known:
-        click.echo(
-            f"{one.name}\n    {one.title}\n    {one.line.text}, about {one.fastest_hz():.0f} readings per second"
-        )
+    for variants in known:
+        one, called = variants[0], ", ".join(each.profile for each in variants if each.profile)
+        open_ones = sum(not each.verified for each in one.references)
+        click.echo(f"{one.name}" + (f" ({called})" if called else ""))
+        click.echo(f"    {one.title}")
+        click.echo(f"    {one.line.text}, about {one.fastest_hz():.0f} readings per second")
+        if open_ones:
+            click.echo(f"    {open_ones} of {len(one.references)} statements about it are not verified")
 
 
 def _summary(protocol: Protocol) -> dict[str, object]:
     return {
         "name": protocol.name,
+        "profile": protocol.profile,
         "title": protocol.title,
         "line": protocol.line.model_dump(),
         "mode": protocol.ask.mode,
         "readings_per_second": protocol.fastest_hz(),
+        "not_verified": [one.says for one in protocol.references if not one.verified],
+        "has_checksum": protocol.has_checksum,
         "counts_samples": protocol.counter_modulus is not None,
         "range_mm": protocol.length.range_mm,
     }
 
 
-def _details(protocol: Protocol) -> list[str]:
+def _details(protocol: Protocol, profiles: list[str]) -> list[str]:
     low_mm, high_mm = protocol.length.range_mm
     asked = f"asked with {protocol.ask.request.hex(' ')}" if protocol.ask.request else "streams"
     counter = protocol.counter_modulus
     lines = [
         protocol.title,
+        *([f"  profile   {protocol.profile} (there are {', '.join(profiles)})"] if profiles else []),
         f"  line      {protocol.line.text}",
         f"  can be    {', '.join(str(rate) for rate in protocol.line.baud_choices) or protocol.line.baud} baud",
         f"  reading   {asked}, about {protocol.fastest_hz():.1f} per second",
         f"  range     {low_mm:g} to {high_mm:g} mm",
+        f"  checksum  {'yes' if protocol.has_checksum else 'none: a damaged digit is not noticed'}",
         f"  counter   {f'modulo {counter}: lost samples are seen' if counter else 'none'}",
     ]
     lines += ["", "Set on the instrument:", *(f"  - {step}" for step in protocol.setup)] if protocol.setup else []

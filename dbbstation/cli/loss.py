@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import click
-
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import from_settings, shop_option
 
 if TYPE_CHECKING:
@@ -22,7 +21,7 @@ def loss_option(function: _Function) -> _Function:
     return shop_option(
         "--largest-loss-percent",
         setting="limits.largest_loss_percent",
-        type=click.FloatRange(0.0, 100.0),
+        type=Finite(0.0, 100.0),
         help="A run that lost more of its samples is repeated [%]  [default: what the plan says, or 0.5].",
     )(function)
 

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.instrument_options import instrument_options
+from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.loss import loss_option, with_loss_limit
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
-from dbbstation.cli.session_options import session_details, session_options
+from dbbstation.cli.sampling import say_sampling
+from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,17 +38,18 @@ _AUTO_PATIENCE_S = 60.0
 @click.option("--auto", metavar="URL", help="Start each circle at this control address of `emulate`, accept every run.")
 @click.option(
     "--time-scale",
-    type=click.FloatRange(0.01, 200.0),
+    type=Finite(0.01, 200.0),
     default=1.0,
     show_default=True,
     help="The same factor as of `emulate`.",
 )
 @click.option(
     "--rate-hz",
-    type=click.FloatRange(0.1, 100000.0),
+    type=Finite(0.1, 100000.0),
     help="Sampling rate [1/s], where it is not the instrument's usual one.",
 )
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")
+@spy_option
 @loss_option
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
@@ -55,14 +58,18 @@ def measure(
     plan_file: Path,
     machine_file: Path,
     instrument: str,
+    profile: str | None,
+    zero_mm: float | None,
     port: str,
     baud: int | None,
+    spy: Path | None,
     out: Path,
     auto: str | None,
     time_scale: float,
     programs: Path | None,
     rate_hz: float | None,
     largest_loss_percent: float | None,
+    largest_bar_age_h: float | None,
     as_json: bool,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> None:
@@ -75,14 +82,14 @@ def measure(
     \b
     Examples:
       dbbstation measure --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
-        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar-length-mm 150.0003 --bar-uncertainty-um 0.5
+        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
       dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `emulate`)
     """
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
-    from dbbstation.files.recordings.session_writer import SessionDetails
+    from dbbstation.files.recordings.session_text import SessionDetails
     from dbbstation.instrument.driver import Instrument
-    from dbbstation.instrument.library import at_rate, load_instrument
+    from dbbstation.instrument.library import at_rate
     from dbbstation.station.assembly import Job, assemble
     from dbbstation.station.detector import Patience
     from dbbstation.station.programs import load_programs
@@ -90,7 +97,8 @@ def measure(
 
     clock = ScaledClock(time_scale)
     machine, plan = read_machine(machine_file), with_loss_limit(read_inline_plan(plan_file), largest_loss_percent)
-    protocol = at_rate(load_instrument(instrument), rate_hz)
+    chosen = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=stated_length_mm(told))
+    protocol = at_rate(chosen, rate_hz)
     job = Job(
         machine=machine,
         plan=plan,
@@ -99,10 +107,21 @@ def measure(
         programs={} if programs is None else load_programs(programs, plan.to_domain(), machine),
         patience=Patience() if auto is None else Patience(for_machine_s=_AUTO_PATIENCE_S * max(time_scale, 1.0)),
         clock=clock,
+        time_scale=time_scale,
+        rate_hz=protocol.fastest_hz(baud),
+        range_mm=protocol.length.range_mm,
     )
     job.check(str(plan_file))
+    say_sampling(plan.to_domain(), protocol, baud)
+    if auto is None:  # a virtual machine has a bar of known length
+        require_bar(job, largest_bar_age_h)
     hands = None if auto is None else VirtualHands(auto)
-    with Instrument(protocol, port, baud=baud, clock=clock, **driver_patience(time_scale)) as source:
+    with (
+        spying(spy, protocol, port) as log,
+        Instrument(
+            protocol, port, baud=baud, clock=clock, log=log, reconnect_s=RECONNECT_S, **driver_patience(time_scale)
+        ) as source,
+    ):
         workplace = assemble(job, source)
         if workplace.writer.runs and job.details != SessionDetails():
             click.echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.figure_option import figure_option, format_of
+from dbbstation.cli.number_options import number_language, number_options
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the table here, with the corrected simulation as a further column.",
 )
+@number_options
 @figure_option("Draw what differs here")
 @click.option("--force", is_flag=True, help="Overwrite these files.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -58,6 +60,8 @@ def mismatch(
     time: str | None,
     source_files: tuple[Path, ...],
     no_held_out: bool,
+    decimal: str | None,
+    separator: str | None,
     out: Path | None,
     figure: Path | None,
     force: bool,
@@ -73,30 +77,35 @@ def mismatch(
     Examples:
       dbbstation mismatch run.csv --measured measured_mm --simulated model_mm
       dbbstation mismatch day1.csv day2.csv --measured y_um --simulated y_sim_um --figure where.svg
+      dbbstation mismatch excel.csv --measured y_um --simulated y_sim_um --decimal ,
       dbbstation mismatch arm.csv --measured z_mm --simulated fk_mm --variables q1=deg,q2=deg,temperature --json
     """
     from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import stage_bar
+    from dbbstation.cli.provenance import provenance
     from dbbstation.diagnosis.table.mismatch import find_mismatch
     from dbbstation.diagnosis.table.summary import mismatch_summary
-    from dbbstation.files.atomic import refuse_existing, write_bytes, write_text
+    from dbbstation.files.atomic import refuse_existing, write_bytes
+    from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.tabulated import Asked, load_sources, load_tables, stated_variables
 
-    for path in (out, figure):
-        if path is not None:
-            refuse_existing(path, force=force)
-    asked = Asked(measured, simulated, stated_variables(variables) if variables else None, run, time)
+    if out is not None:
+        refuse_existing_table(out, force=force)
+    if figure is not None:
+        refuse_existing(figure, force=force)
+    numbers = number_language(decimal, separator) if decimal or separator else None
+    asked = Asked(measured, simulated, stated_variables(variables) if variables else None, run, time, numbers)
     tabulated = load_tables(data, asked)
     for note in tabulated.notes:
         say(f"note: {note}")
     sources, lacking = load_sources(source_files, tabulated.table)
     for name, why in lacking.items():
         say(f"note: {name} cannot be asked: {why}")
-    found = find_mismatch(
-        tabulated.table, sources, hold_out=not no_held_out, lacking=lacking, progress=lambda text: say(f"... {text}")
-    )
+    with stage_bar("comparison", STAGES_WHOLE if no_held_out else STAGES) as progress:
+        found = find_mismatch(tabulated.table, sources, hold_out=not no_held_out, lacking=lacking, progress=progress)
     summary = mismatch_summary(found)
     if out is not None:
-        write_text(out, _corrected(tabulated, found), force=force)
+        write_table(out, _corrected(tabulated, found), provenance(), force=force)
         summary["out"] = str(out)
     if figure is not None:
         from dbbstation.report.mismatch_figure import mismatch_figure
@@ -108,6 +117,10 @@ def mismatch(
     else:
         _print(summary)
 
+
+STAGES = {"look": 0, "sets of causes": 8, "held-out part": 15}
+STAGES_WHOLE = {"look": 0, "sets of causes": 50}
+"""Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
 
 CORRECTED, LEFT = "corrected", "left"
 """Columns that `--out` adds."""

@@ -9,22 +9,33 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.cli.instrument_options import instrument_options
+from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.provenance import provenance
 
 if TYPE_CHECKING:
-    from dbbstation.instrument.driver import Tally
     from dbbstation.instrument.reading import Reading
+    from dbbstation.instrument.reception import Tally
 
 
 @click.command()
 @instrument_options(required=True)
 @click.option("--count", type=click.IntRange(min=1), help="Number of readings after which to stop.")
-@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="Log every byte here, for `replay`.")
-@click.option("--force", is_flag=True, help="Overwrite the log file.")
+@spy_option
+@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="The same as --spy.")
+@click.option("--force", is_flag=True, help="Overwrite the file of --spy.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per reading, and one with the totals.")
 def monitor(
-    *, instrument: str, port: str, baud: int | None, count: int | None, log: Path | None, force: bool, as_json: bool
+    *,
+    instrument: str,
+    profile: str | None,
+    zero_mm: float | None,
+    port: str,
+    baud: int | None,
+    count: int | None,
+    spy: Path | None,
+    log: Path | None,
+    force: bool,
+    as_json: bool,
 ) -> None:
     """Show what an instrument measures, until Ctrl-C.
 
@@ -32,18 +43,15 @@ def monitor(
     Examples:
       dbbstation monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0
       dbbstation monitor --instrument streaming-encoder --port COM3 --count 100 --json
-      dbbstation monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0 --log bytes.txt
+      dbbstation monitor --instrument heidenhain-nd281b --port /dev/ttyUSB0 --spy bytes.txt
+      dbbstation monitor --instrument tesa-tt80 --profile tt80 --zero-mm 150.0003 --port /dev/ttyUSB1
     """  # noqa: D301 (click reads the escape)
-    from dbbstation.instrument.bytelog import ByteLog
     from dbbstation.instrument.driver import Instrument
-    from dbbstation.instrument.library import load_instrument
 
-    protocol = load_instrument(instrument)
+    protocol = chosen_protocol(instrument, profile, zero_mm)
     with ExitStack() as stack:
-        book = None
-        if log is not None:
-            book = stack.enter_context(ByteLog(log, instrument=instrument, port=port, force=force))
-        driver = stack.enter_context(Instrument(protocol, port, baud=baud, log=book))
+        book = stack.enter_context(spying(spy or log, protocol, port, force=force))
+        driver = stack.enter_context(Instrument(protocol, port, baud=baud, log=book, reconnect_s=RECONNECT_S))
         first_s: float | None = None
         try:
             for reading in driver.readings(count):
@@ -59,6 +67,7 @@ def _show(reading: Reading, t_s: float, *, as_json: bool) -> None:
     if as_json:
         row: dict[str, object] = {"t_s": round(t_s, 6), "length_mm": reading.length_mm, "status": reading.status}
         row |= {"lost": reading.lost, "counter": reading.counter, "said": reading.said}
+        row |= {"t_uncertainty_s": reading.t_uncertainty_s}
         click.echo(json.dumps(row))
         return
     length = f"{reading.length_mm:14.5f} mm" if reading.length_mm is not None else f"{'--':>14}   "
@@ -69,8 +78,15 @@ def _show(reading: Reading, t_s: float, *, as_json: bool) -> None:
 
 def _conclude(tally: Tally, *, as_json: bool) -> None:
     if as_json:
-        totals = {"readings": tally.readings, "lost": tally.lost, "garbage_bytes": tally.garbage_bytes}
+        totals: dict[str, object] = {
+            "readings": tally.readings,
+            "lost": tally.lost,
+            "garbage_bytes": tally.garbage_bytes,
+        }
+        totals |= {"rejected": tally.rejected, "reconnected": tally.reconnected}
         click.echo(json.dumps({"totals": totals, "provenance": provenance().data()}))
         return
     text = f"{tally.readings} readings, {tally.lost} lost, {tally.garbage_bytes} bytes not understood"
+    if tally.rejected:
+        text += f" ({', '.join(f'{count} by {reason}' for reason, count in sorted(tally.rejected.items()))})"
     click.echo(text + (f", for example {tally.garbage[:24].hex(' ')}" if tally.garbage else ""), err=True)

@@ -9,6 +9,7 @@ import click
 from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
 from dbbstation.cli.circle_options import approach_of, circle_options
 from dbbstation.cli.correction import largest_correction_option
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
 
@@ -33,7 +34,7 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @circle_options
 @click.option(
     "--time-s",
-    type=float,
+    type=Finite(),
     metavar="S",
     help="Start of the programs after the session's start [s], for models that depend on time.",
 )

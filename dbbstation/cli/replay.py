@@ -6,15 +6,24 @@ from pathlib import Path
 
 import click
 
+from dbbstation.cli.number_types import Finite
+
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "--instrument", metavar="NAME", help="Name of an instrument, or a protocol file [default: that of the log]."
 )
+@click.option("--profile", metavar="NAME", help="Variant of the instrument [default: that of the log].")
+@click.option(
+    "--zero-mm",
+    type=Finite(20.0, 2000.0),
+    default=None,
+    help="Length at which an instrument that has no room for it shows zero [mm]; without, lengths count from there.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def replay(file: Path, *, instrument: str | None, as_json: bool) -> None:
-    """Decode a byte log that `monitor --log` wrote: every reading, and everything that is not understood.
+def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: float | None, as_json: bool) -> None:
+    """Decode a byte log that `--spy` wrote (or `monitor --log`): every reading, and everything that is not understood.
 
     \b
     Examples:
@@ -23,13 +32,18 @@ def replay(file: Path, *, instrument: str | None, as_json: bool) -> None:
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
     from dbbstation.instrument.bytelog import logged_instrument, read_byte_log
-    from dbbstation.instrument.library import load_instrument
+    from dbbstation.instrument.library import load_instrument, with_zero
     from dbbstation.instrument.replay import replayed
 
-    name = instrument or logged_instrument(file)
+    of_log, profile_of_log = logged_instrument(file)
+    name = instrument or of_log
     if not name:
         raise click.UsageError("the log does not name its instrument: give --instrument")
-    rows = list(replayed(load_instrument(name), read_byte_log(file), where=str(file)))
+    # The profile of the log is one of the log's instrument.
+    protocol = load_instrument(name, profile or (profile_of_log if instrument in {None, of_log} else None))
+    if zero_mm is not None:
+        protocol = with_zero(protocol, zero_mm)
+    rows = list(replayed(protocol, read_byte_log(file), where=str(file)))
     readings = [row for row in rows if row.reading is not None]
     garbage = [row for row in rows if row.reading is None]
     lost = sum(row.reading.lost for row in rows if row.reading is not None)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from dbbstation.files.recordings.session import RunEntry, SessionFolder
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.recordings.session import SessionFolder
 
 _FOLDER = click.argument("folder", type=click.Path(path_type=Path), metavar="FOLDER")
 _RUN = click.argument("run", metavar="RUN")
@@ -17,7 +18,7 @@ _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result a
 
 @click.group()
 def session() -> None:
-    """List the runs of a session, accept or reject them afterwards, take in or seal recordings.
+    """List the runs of a session, accept or reject them afterwards, take in or seal recordings, change a plan on purpose.
 
     \b
     Examples:
@@ -32,7 +33,7 @@ def session() -> None:
 @_FOLDER
 @_JSON
 def list_runs(folder: Path, *, as_json: bool) -> None:
-    """List every run: when it was started, its mounting, its state, and why it was rejected.
+    """List every run: when it was started, its mounting, its state, its samples (received, lost, rejected), and why it was rejected.
 
     \b
     Examples:
@@ -55,6 +56,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
                 "started": None if run.started is None else run.started.isoformat(),
                 "state": run.state.value,
                 "reason": run.reason or None,
+                "counts": None if run.counts is None else run.counts.data(),
                 "file": run.path.relative_to(read.folder).as_posix(),
             }
             for run in read.runs
@@ -67,11 +69,12 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
             "" if run.started is None else run.started.strftime("%Y-%m-%d %H:%M:%S %Z").strip(),
             "" if run.mounting is None else str(run.mounting),
             run.state.value,
+            "" if run.counts is None else run.counts.text,
             run.reason,
         ]
         for run in read.runs
     ]
-    print_table(["run", "started", "mounting", "state", "why"], rows)
+    print_table(["run", "started", "mounting", "state", "samples", "why"], rows)
     click.echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
 
 
@@ -137,13 +140,53 @@ def take_in(folder: Path, *, as_json: bool) -> None:
 
 @session.command()
 @_FOLDER
+@click.option("--reason", required=True, help="Why, in a few words; it stands in the session file.")
+@click.option("--plan", type=click.Path(path_type=Path), help="Plan that takes the place of the session's.")
+@click.option("--machine", type=click.Path(path_type=Path), help="Machine that takes the place of the session's.")
+@_JSON
+def amend(folder: Path, *, reason: str, plan: Path | None, machine: Path | None, as_json: bool) -> None:
+    """Change what was sealed on purpose, and note why.
+
+    Plan and machine of a session are sealed when it is made: a change without a note is refused by every command. This takes the
+    session as it stands now, with another plan or machine where they are given. The file as it was stays in the folder
+    `sealed`. The session file says what was changed, when and why, with both hashes; `dbbstation check` shows it. A list of runs
+    that was changed by hand is taken as it stands in the same way.
+
+    \b
+    Examples:
+      dbbstation session amend 2026-11-20-hexapod-7 --reason "joint 3 measured again" --machine measured.yaml
+      dbbstation session amend 2026-11-20-hexapod-7 --reason "ball 4-short was 0.1 mm off in the sheet"
+    """  # noqa: D301 (click reads the escape)
+    from datetime import UTC, datetime
+
+    from dbbstation.cli.output import print_json
+    from dbbstation.files.recordings.amending import amend as noted
+
+    if not reason.strip():
+        raise click.UsageError("say why with --reason: whoever reads the session later will ask")
+    found = noted(folder, reason.strip(), made=datetime.now(UTC).replace(microsecond=0), plan=plan, machine=machine)
+    if as_json:
+        changed = [
+            {"what": one.what, "former_sha256": one.former_sha256, "sha256": one.sha256, "former": one.former or None}
+            for one in found
+        ]
+        print_json({"session": str(folder), "reason": reason.strip(), "changed": changed})
+        return
+    for one in found:
+        kept = f", as it was: {one.former}" if one.former else ""
+        click.echo(f"{one.what}: amended{kept}")
+
+
+@session.command()
+@_FOLDER
 @click.option("--dry-run", is_flag=True, help="Say which runs would get a hash, and write nothing.")
 @_JSON
 def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
-    """Write the hashes of recordings that were made elsewhere into the session file.
+    """Seal a session that was recorded elsewhere or by an older program.
 
-    A session file written by hand needs no hashes: this adds one to each run that has none, and leaves everything else
-    in the file as it is. From then on a changed recording is noticed.
+    A session file written by hand needs no hashes. This adds one for each run that has none, for machine, plan and jig, and a
+    chain through all runs. It leaves everything else in the file as it is. Copies of machine, plan and jig go into the folder
+    `sealed`. From then on a changed recording or plan is noticed, and runs that were taken out or exchanged.
 
     \b
     Examples:
@@ -151,20 +194,22 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
       dbbstation session seal from-the-old-program
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
-    from dbbstation.files.atomic import write_text
     from dbbstation.files.recordings.sealing import sealing
 
     found = sealing(folder)
-    if found.files and not dry_run:
-        write_text(found.path, found.text, force=True, rewrites=True)
+    if found.anything and not dry_run:
+        found.write()
     if as_json:
-        print_json({"session": str(found.path), "sealed": [] if dry_run else found.files, "without_hash": found.files})
+        told = {"without_hash": found.files, "linked": found.linked, "files": dict(found.seal.files)}
+        print_json({"session": str(found.path), "sealed": [] if dry_run else found.files, **told})
         return
     done = "would be sealed" if dry_run else "sealed"
     for file in found.files:
         click.echo(f"{file}: {done}")
-    if not found.files:
-        click.echo("every run has a hash already")
+    if not found.anything:
+        click.echo("every run and file is sealed already")
+    else:
+        click.echo(f"{len(found.seal.files)} files and {found.seal.runs} runs: {done}")
 
 
 def _name(run: RunEntry) -> str:
@@ -183,7 +228,7 @@ def _tell(name: str, run: RunEntry, *, as_json: bool) -> None:
 
 def _missing(read: SessionFolder) -> list[tuple[str, str]]:
     """Tests and directions of the plan without an accepted run."""
-    from dbbstation.files.recordings.session import RunState
+    from dbbstation.files.recordings.entries import RunState
 
     done = {(run.test, run.direction) for run in read.in_state(RunState.ACCEPTED)}
     planned = [(name, direction) for name, test in read.plan.tests.items() for direction in test.directions]

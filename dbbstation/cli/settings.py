@@ -57,9 +57,10 @@ def built_in() -> dict[str, Any]:
     from dbbstation.nc.compensate import CHORD_MM
     from dbbstation.nc.limits import LARGEST_CORRECTION_MM
     from dbbstation.plan.plan import LARGEST_LOSS_PERCENT
+    from dbbstation.station.bar_known import USUAL_AGE_H
 
     return {
-        **dict.fromkeys(("instrument", "port", "baud", "serial_number")),
+        **dict.fromkeys(("instrument", "profile", "port", "baud", "serial_number")),
         **{
             f"bar.{key}": None
             for key in ("serial_number", "calibrated_length_mm", "calibrator_uncertainty_mm", "temp_c")
@@ -70,6 +71,7 @@ def built_in() -> dict[str, Any]:
         "program.clearance_mm": USUAL_APPROACH.clear_mm,
         "limits.largest_correction_mm": LARGEST_CORRECTION_MM,
         "limits.largest_loss_percent": LARGEST_LOSS_PERCENT,
+        "limits.largest_bar_age_h": USUAL_AGE_H,
         "numbers.decimal": PLAIN.decimal,
         "numbers.separator": PLAIN.separator,
     }
@@ -120,9 +122,11 @@ def _print(found: Settings) -> None:
 
 def _template() -> str:
     """Return the example of the format with every value commented out: a `#` with nothing after it but the key."""
+    from dbbstation.files.formats.settings_schema import SettingsFile
     from dbbstation.files.shipped import shipped_folder
+    from dbbstation.files.yaml.schema import format_of
 
     text = (shipped_folder("fixtures") / "settings" / "every-key.yaml").read_text(encoding="utf-8")
-    head, format_line, rest = text.partition("format: dbb-settings/1\n")
+    head, format_line, rest = text.partition(f"format: {format_of(SettingsFile)}\n")
     hint = "# Take away the # in front of what you set; where a line is indented, in front of the line above it too.\n"
     return head + hint + format_line + re.sub(r"^(?=[^#\n])", "#", rest, flags=re.MULTILINE)

@@ -38,12 +38,22 @@ class ShopOption(click.Option):
         declarations: as `click.Option` takes them.
         setting: key in the settings, with dots.
         factor: from the setting's unit to the option's.
+        goes_with: another option of the command; where the command line has that one, the setting is of something else.
         more: as `click.Option` takes it.
     """
 
-    def __init__(self, declarations: Any, *, setting: str, factor: float = 1.0, **more: Any) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        declarations: Any,  # noqa: ANN401 - as click has it
+        *,
+        setting: str,
+        factor: float = 1.0,
+        goes_with: str = "",
+        **more: Any,  # noqa: ANN401 - as click has it
+    ) -> None:
         super().__init__(declarations, **more)
         self.setting = setting
+        self._goes_with = goes_with
         self._factor = factor
 
     def consume_value(self, ctx: click.Context, opts: Mapping[str, Any]) -> tuple[Any, ParameterSource]:
@@ -64,7 +74,7 @@ class ShopOption(click.Option):
     def _found(self, ctx: click.Context, opts: Mapping[str, Any], options: Iterable[ShopOption]) -> Setting | None:
         block = self.setting.partition(".")[0]
         given = {option.setting.partition(".")[0] for option in options if option.name in opts}
-        if block in _ONE_THING & given:
+        if block in _ONE_THING & given or self._goes_with in opts:
             return None
         return _settings(ctx, opts).values.get(self.setting)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.source_files import source_file_option
 
 
@@ -17,7 +18,13 @@ from dbbstation.cli.source_files import source_file_option
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder to make.")
 @chosen_tests_options
 @click.option("--samples", default=720, show_default=True, type=click.IntRange(36), help="Samples per turn.")
-@click.option("--interval-s", default=200.0, show_default=True, help="Time from the start of one run to the next [s].")
+@click.option(
+    "--interval-s",
+    type=Finite(),
+    default=200.0,
+    show_default=True,
+    help="Time from the start of one run to the next [s].",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
 def simulate(
     *,

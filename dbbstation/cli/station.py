@@ -12,21 +12,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.instrument_options import instrument_options
+from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.loss import loss_option, with_loss_limit
+from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
-from dbbstation.cli.session_options import session_details, session_options
+from dbbstation.cli.sampling import say_sampling
+from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 from dbbstation.cli.shop import from_settings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
+    from dbbstation.instrument.bytelog import ByteLog
     from dbbstation.instrument.protocol import Protocol
+    from dbbstation.service.runner import Opener, OpenStation
     from dbbstation.station.assembly import Job
     from dbbstation.station.events import Observer
     from dbbstation.tui.app import StationApp
-    from dbbstation.tui.runner import Opener, OpenStation
 
 _DEMO = {"plan": "protocols/plans/ten-minute-check.yaml", "machine": "fixtures/machines/reference.yaml"}
 _DEMO_INSTRUMENT = "streaming-encoder"
@@ -43,11 +46,12 @@ _DEMO_SEED = 3
 @click.option("--virtual", is_flag=True, help="Use a virtual machine and instrument.")
 @click.option(
     "--time-scale",
-    type=click.FloatRange(0.01, 50.0),
+    type=Finite(0.01, 50.0),
     default=1.0,
     show_default=True,
     help="Factor by which the virtual machine runs faster than real time, with --virtual.",
 )
+@spy_option
 @loss_option
 @session_options
 def station(
@@ -55,12 +59,16 @@ def station(
     plan_file: Path | None,
     machine_file: Path | None,
     instrument: str | None,
+    profile: str | None,
+    zero_mm: float | None,
     port: str | None,
     baud: int | None,
+    spy: Path | None,
     out: Path | None,
     virtual: bool,
     time_scale: float,
     largest_loss_percent: float | None,
+    largest_bar_age_h: float | None,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
@@ -72,7 +80,7 @@ def station(
       dbbstation station --virtual                     try it without hardware
       dbbstation station --virtual --time-scale 10     the same, ten times faster
       dbbstation station --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
-        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar-length-mm 150.0003 --bar-uncertainty-um 0.5
+        --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
     """
     # The shop's instrument stands elsewhere: a virtual one brings its own line.
     port = None if virtual and from_settings("port") else port
@@ -84,7 +92,6 @@ def station(
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.shipped import shipped_folder
-    from dbbstation.instrument.library import load_instrument
     from dbbstation.station.assembly import Job
 
     def demo(what: str) -> Path:
@@ -94,12 +101,15 @@ def station(
     plan_file = plan_file or demo("plan")
     machine = read_machine(machine_file or demo("machine"))
     plan = with_loss_limit(read_inline_plan(plan_file), largest_loss_percent)
-    protocol = load_instrument(instrument or _DEMO_INSTRUMENT)
+    name = instrument or _DEMO_INSTRUMENT
+    protocol = chosen_protocol(name, profile, zero_mm, bar_length_mm=stated_length_mm(told))
     details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
     with ExitStack() as stack:
-        job = Job(machine, plan, folder, details)
+        job = Job(machine, plan, folder, details, rate_hz=protocol.fastest_hz(baud), range_mm=protocol.length.range_mm)
         job.check(str(plan_file))
+        if not virtual:
+            require_bar(job, largest_bar_age_h)
         helper = None
         if virtual:
             from dataclasses import replace
@@ -110,8 +120,10 @@ def station(
             place = stack.enter_context(
                 virtual_place(machine, plan.to_domain(), protocol, time_scale=time_scale, seed=_DEMO_SEED)
             )
-            job, port, helper = replace(job, clock=place.clock), place.port, place.helper
-        return _run(job, opener(job, protocol, str(port), baud=baud, helper=helper, time_scale=time_scale))
+            job, port, helper = replace(job, clock=place.clock, time_scale=time_scale), place.port, place.helper
+        say_sampling(plan.to_domain(), protocol, baud)
+        log = stack.enter_context(spying(spy, protocol, str(port)))
+        return _run(job, opener(job, protocol, str(port), baud=baud, helper=helper, time_scale=time_scale, log=log))
 
 
 def _check_options(
@@ -150,6 +162,7 @@ def opener(
     baud: int | None = None,
     helper: Observer | None = None,
     time_scale: float = 1.0,
+    log: ByteLog | None = None,
 ) -> Opener:
     """Return what opens instrument and session, each time anew.
 
@@ -160,15 +173,19 @@ def opener(
         baud: where it is not set to the usual rate.
         helper: told of everything after storage, before the screen.
         time_scale: of the job's clock.
+        log: where every byte is written down.
     """
     from dbbstation.cli.measure_talk import Log
     from dbbstation.instrument.driver import Instrument
+    from dbbstation.service.runner import OpenStation
     from dbbstation.station.assembly import assemble
-    from dbbstation.tui.runner import OpenStation
 
     @contextmanager
     def opened() -> Iterator[OpenStation]:
-        with Instrument(protocol, port, baud=baud, clock=job.clock, **driver_patience(time_scale)) as source:
+        patience = driver_patience(time_scale)
+        with Instrument(
+            protocol, port, baud=baud, clock=job.clock, log=log, reconnect_s=RECONNECT_S, **patience
+        ) as source:
             workplace = assemble(job, source)
             workplace.station.subscribe(Log())
             if helper is not None:
@@ -188,8 +205,8 @@ def _run(job: Job, open_station: Opener) -> int:
         StationError: the fault that ended the sequence, where nothing was done about it.
         click.Abort: a signal ended it.
     """
+    from dbbstation.service.runner import Runner
     from dbbstation.tui.app import Shown, StationApp
-    from dbbstation.tui.runner import Runner
 
     runner = Runner(open_station)
     app = StationApp(Shown(job.plan.plan.name, job.plan.jig.bores), runner)

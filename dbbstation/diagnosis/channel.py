@@ -15,11 +15,11 @@ import numpy as np
 from dbbstation.calibration.checks.scatter import LEAST_STATED_MM
 from dbbstation.calibration.fit.calibrate import LISTED_WITHIN, SMALLEST_NOISE_MM
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
+from dbbstation.diagnosis.parts import parts_of
 from dbbstation.inference.harmonics import noise_left_by
 from dbbstation.inference.model_comparison import Cause, Variant
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import Block, compress, with_random
-from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -319,9 +319,7 @@ class Channel:
         shared: Sequence[str],
         nonlinear: tuple[float, ...],
     ) -> list[Variant]:
-        """Forms of a source at one point: all amplitudes, those of each part (a strut) alone, one for all struts.
-
-        What wears or was made badly is often one strut, or all alike; all others free beside it would hide what is faint.
+        """Forms of a source at one point, by its parts.
 
         Args:
             source: the cause.
@@ -338,22 +336,18 @@ class Channel:
             samples[rows, place : place + count] = derivative
         columns = self.columns.add(samples)
         plausible = np.tile([p.plausible for p in amplitudes], len(sets))
-        parts = np.array([p.alone_with for p in amplitudes] * len(sets))
         whole = Variant(columns, plausible, nonlinear, law=source.varies_with)
-        kinds = [[whole]]
-        if len(set(parts.tolist())) > 1:
-            kinds.append(
-                [
-                    replace(whole, columns=columns[own], plausible=plausible[own], label=part, whole=columns)
-                    for part, own in ((part, parts == part) for part in sorted(set(parts.tolist())))
-                ]
-            )
-        if len(sets) == 1 and [p.strut for p in amplitudes] == list(range(1, STRUTS + 1)):
-            alike = self.columns.add(samples.sum(axis=1, keepdims=True))
-            kinds.append(
-                [replace(whole, columns=alike, plausible=plausible[:1], label="all struts alike", whole=columns)]
-            )
-        return [replace(one, log_weight=-float(np.log(len(kinds) * len(kind)))) for kind in kinds for one in kind]
+        found = []
+        for part in parts_of(amplitudes, len(sets)):
+            form = replace(whole, label=part.label, log_weight=part.log_weight)
+            if part.alike:
+                alike = self.columns.add(samples.sum(axis=1, keepdims=True))
+                form = replace(form, columns=alike, plausible=plausible[:1], whole=columns)
+            elif part.label:
+                some = list(part.amplitudes)
+                form = replace(form, columns=columns[some], plausible=plausible[some], whole=columns)
+            found.append(form)
+        return found
 
 
 def _spacing(parameter: Parameter, value: float) -> float:

@@ -115,7 +115,7 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
     text = f"An unmodelled effect, organised by {curve.variable}, {where}."
     rms_um = 1e3 * left.rms if is_missing_physics(left) else curve.unconcealed_um
     gain = settled.best.log_factor(member.cause.name)
-    return Unexplained(rms_um, shape.strut, curve.variable, gain, text, curve)
+    return Unexplained(rms_um, shape.strut, curve.follows, gain, text, curve)
 
 
 def _where(observations: Sequence[Observation], found: Remainder) -> tuple[float, str]:

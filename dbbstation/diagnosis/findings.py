@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 from dbbstation.inference.verdict import Value, Verdict
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
+    from dbbstation.diagnosis.shapes import Follows
     from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.held_out import HeldOut
@@ -100,26 +101,42 @@ class Curve:
     """An error without a name as a function of what organises it.
 
     Attributes:
-        variable: what it is a function of.
-        unit: of that.
+        follows: what it is a function of, and what it moves.
+        unit: of the variable.
         strut: 1 to 6; None where all struts follow it, or no strut's error is meant.
         form: which of its kind, such as the period of a wave or the place of a step, in words; empty where there is one.
-        period_mm: of a wave of strut length [mm]; None for what is none.
+        period: of a wave [unit of the variable]; None for what is none.
+        direction: in which what it moves does so most, 3 to 6 numbers as `convention` says; empty where that is one number.
         convention: what was taken out of it because fitted parameters make that, in words; empty where nothing was.
         readings_um: root mean square of what it does to the readings [µm].
         unconcealed_um: of what the fitted machine parameters leave of that [µm].
         points: least first; between them the curve is straight, or a wave.
     """
 
-    variable: str
+    follows: Follows
     unit: str
     strut: int | None
     form: str
-    period_mm: float | None
+    period: float | None
+    direction: tuple[float, ...]
     convention: str
     readings_um: float
     unconcealed_um: float
     points: tuple[CurvePoint, ...]
+
+    @property
+    def variable(self) -> str:
+        """What it follows, as printed."""
+        return str(self.follows)
+
+    @property
+    def period_mm(self) -> float | None:
+        """Period of a wave of strut length [mm]; None for all others."""
+        return self.period if self.follows.variable == "strut-length" else None
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as plain values for JSON."""
+        return {"variable": self.variable, "period_mm": self.period_mm, **asdict(self)}
 
 
 @dataclass(frozen=True)
@@ -129,7 +146,7 @@ class Unexplained:
     Attributes:
         rms_um: beyond noise, in the low harmonics [µm].
         strut: 1 to 6; None where it is not one strut's.
-        variable: what organises it; None where nothing does clearly.
+        follows: what organises it; None where nothing does clearly.
         gain: log evidence of that description.
         text: one sentence for people.
         curve: the error along the variable; None where nothing organises it clearly.
@@ -137,10 +154,15 @@ class Unexplained:
 
     rms_um: float
     strut: int | None
-    variable: str | None
+    follows: Follows | None
     gain: float
     text: str
     curve: Curve | None = None
+
+    @property
+    def variable(self) -> str | None:
+        """What organises it, as printed; None where nothing does clearly."""
+        return None if self.follows is None else str(self.follows)
 
 
 @dataclass(frozen=True)

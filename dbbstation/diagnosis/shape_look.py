@@ -15,7 +15,18 @@ import numpy as np
 from scipy.fft import next_fast_len, rfft
 from scipy.sparse import csr_array
 
-from dbbstation.diagnosis.shapes import BALL, EVERY, PLAUSIBLE_MM, READING, TABLE, TOOL, Ranges, Samples, Shape
+from dbbstation.diagnosis.shapes import (
+    BALL,
+    EVERY,
+    OF_STRUTS,
+    PLAUSIBLE_MM,
+    READING,
+    TABLE,
+    TOOL,
+    Ranges,
+    Samples,
+    Shape,
+)
 from dbbstation.inference.forms import Bump, Form, Lobes, PlaneStep, Step, Wave, WaveOfTurn
 from dbbstation.inference.square_root import free_directions
 from dbbstation.machine.geometry import STRUTS
@@ -145,7 +156,7 @@ class Look:
         gain = np.vstack([run.gain[moves] for run in self._runs])
         if strut is not None:
             gain = gain[:, strut - 1 : strut]
-            values = values[:, strut - 1] if variable.startswith("strut-") else values
+            values = values[:, strut - 1] if variable in OF_STRUTS else values
         gain = gain * (PLAUSIBLE_MM / self._noise)
         _, piece, number = np.unique(pieces(values), return_inverse=True, return_counts=True)
         add = csr_array((np.ones(len(piece)), (piece, np.arange(len(piece)))), shape=(len(number), len(piece)))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from dbbstation.inference.forms import Form, Hats, Lobes, Plane, Proportional, Sign, Spring
+from dbbstation.inference.forms import Form, Hats, Lobes, Plane, Proportional, Sign, Spring, Wave
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
@@ -69,8 +69,10 @@ UNITS = {
     "tilt of the platform": "deg",
     "position of the platform towards a place": "mm",
 }
-"""Variables that an error may follow, and their units. Printed names begin with them: what kind of curve, and what
-moves where it is no strut, come behind."""
+"""Variables that an error may follow, and their units."""
+
+TEMPERATURES = tuple(name for name, unit in UNITS.items() if unit == "degC")
+"""Those that thermometers log."""
 
 OF_STRUTS = (
     "strut-length",
@@ -99,6 +101,32 @@ class Samples:
     gain: dict[str, NDArray[np.float64]]
 
 
+@dataclass(frozen=True)
+class Follows:
+    """What an unmodelled error is a function of, and what it moves.
+
+    Attributes:
+        variable: one of `UNITS`.
+        kind: of curve, such as `wave`; empty for the usual one.
+        moves: what moves.
+    """
+
+    variable: str
+    kind: str = ""
+    moves: str = EVERY
+
+    def __str__(self) -> str:
+        """Variable, kind of curve and what moves, as printed."""
+        kind = f" {self.kind}" if self.kind else ""
+        own = (self.variable, self.moves) in ITS_OWN
+        return f"{self.variable}{kind}{'' if own else BEHIND.get(self.moves, '')}"
+
+    @property
+    def moves_struts(self) -> bool:
+        """Whether it is an error of strut lengths, of one or of all."""
+        return self.moves in {EVERY, SIGNED}
+
+
 @dataclass(frozen=True, eq=False)
 class Shape:
     """One family of curves.
@@ -120,17 +148,14 @@ class Shape:
     tried: float = 1.0
 
     @property
-    def name(self) -> str:
-        """Variable, kind of curve and what moves, as printed."""
-        kind = f" {self.kind}" if self.kind else ""
-        own = (self.variable, self.moves) in ITS_OWN
-        return f"{self.variable}{kind}{'' if own else BEHIND.get(self.moves, '')}"
+    def follows(self) -> Follows:
+        """What it is a function of, and what it moves."""
+        return Follows(self.variable, self.kind, self.moves)
 
     @property
     def period(self) -> float | None:
-        """Of a wave of strut length [mm]; None for all others."""
-        frequency = getattr(self.form, "frequency", None)
-        return 1.0 / frequency if frequency and self.variable == "strut-length" else None
+        """Of a wave [unit of the variable]; None for all others."""
+        return 1.0 / self.form.frequency if isinstance(self.form, Wave) else None
 
     def columns(self, samples: Samples) -> NDArray[np.float64]:
         """Effect of each amplitude on the readings of a run: directions that move times curves, shape (n, d p)."""
@@ -172,20 +197,6 @@ ITS_OWN = {
     ("tilt of the platform", TOOL),
 }
 """Variables that say by themselves what moves."""
-
-
-def moves_struts(name: str) -> bool:
-    """Whether an error of a printed name is one of strut lengths."""
-    return name.startswith("strut-") or (variable_of(name) in _OF_ALL and " of the " not in name)
-
-
-_OF_ALL = {"time", *(f"{name}-temperature" for name in THERMOMETERS)}
-"""Variables that any of the things that move may follow."""
-
-
-def variable_of(name: str) -> str:
-    """Variable that a printed name begins with."""
-    return max((variable for variable in UNITS if name.startswith(variable)), key=len)
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,9 +332,7 @@ def shapes(extent: Ranges) -> list[Shape]:
         extent: of the variables over all runs.
     """
     found: list[Shape] = []
-    warmed = [
-        n for n in extent.low if n.endswith("-temperature") and np.max(extent.high[n] - extent.low[n]) > FOLLOWED_K
-    ]
+    warmed = [n for n in extent.low if n in TEMPERATURES and np.max(extent.high[n] - extent.low[n]) > FOLLOWED_K]
     usual = ("strut-length", "strut-force", "strut-speed-sign", "strut-speed", "strut-acceleration", "time")
     for name in (*usual, *warmed):
         if name not in extent.low:

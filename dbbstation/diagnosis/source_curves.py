@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.shapes import THERMOMETERS, variables
-from dbbstation.diagnosis.shapes import moves_struts as of_struts
+from dbbstation.diagnosis.discrepancy import BY_DIRECTION
+from dbbstation.diagnosis.shapes import SIGNED, TEMPERATURES, Follows, variables
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.laws.by_temperature import FollowsTemperature
@@ -43,7 +43,7 @@ UNITS = {
     "strut-force": "N",
     "time": "s",
     "temperature": "K",
-    **{f"{name}-temperature": "°C" for name in ("strut", *THERMOMETERS)},
+    **dict.fromkeys(TEMPERATURES, "°C"),
     "angle": "°",
 }
 """Of the variables that something can be drawn over."""
@@ -106,7 +106,7 @@ class _Samples:
 
 def source_curves(diagnosis: Diagnosis) -> tuple[SourceCurves, ...]:
     """Curves of every source that was found, and of what is left where some variable organises it."""
-    left = ("",) if diagnosis.unexplained.variable is not None else ()
+    left = ("",) if diagnosis.unexplained.follows is not None else ()
     return tuple(_curves(diagnosis, name) for name in (*found_sources(diagnosis), *left))
 
 
@@ -122,8 +122,9 @@ def _curves(diagnosis: Diagnosis, name: str) -> SourceCurves:
     if name:
         moves_struts = any(_strut_mm(after.model.actual(o.motion()), name) is not None for o in after.observations)
     else:
-        moves_struts = of_struts(wanted)
-    signed, fine = "sign" in wanted, wanted == "strut-length wave"
+        moves_struts = wanted.moves_struts
+    signed = wanted.moves == SIGNED or wanted.variable in BY_DIRECTION
+    fine = (wanted.variable, wanted.kind) == ("strut-length", "wave")
     variable = _drawn_over(wanted, after.observations, moves_struts=moves_struts)
     samples = [_samples(after, name, o, variable, moves_struts=moves_struts) for o in after.observations]
     whole = _Samples(
@@ -147,27 +148,25 @@ def _curves(diagnosis: Diagnosis, name: str) -> SourceCurves:
     )
 
 
-def _wanted(diagnosis: Diagnosis, name: str) -> str:
-    """Variable that organises a source, or what is left."""
+def _wanted(diagnosis: Diagnosis, name: str) -> Follows:
+    """What a source follows, or what is left."""
     if not name:
-        return diagnosis.unexplained.variable or ""
+        return diagnosis.unexplained.follows or Follows("")
     source = next(t.source for t in diagnosis.after.layout.terms if t.source.name == name)
     own = source.varies_with == "temperature" and not isinstance(source, FollowsTemperature)
-    return "time" if own else source.varies_with  # only those of ours say which temperature
+    return Follows("time" if own else source.varies_with)  # only those of ours say which temperature
 
 
-def _drawn_over(wanted: str, observations: Sequence[Observation], *, moves_struts: bool) -> str:
+def _drawn_over(wanted: Follows, observations: Sequence[Observation], *, moves_struts: bool) -> str:
     """Return the variable itself where it is one that every run has, else strut length, or angle for a reading."""
-    if wanted == "temperature":
-        return wanted
-    variable = wanted.partition(" ")[0]
-    if variable.endswith("-temperature"):
+    variable = wanted.variable
+    if variable in {"temperature", *TEMPERATURES}:
         return variable
-    if wanted.startswith("time") and all(o.started_s is not None for o in observations):
-        return "time"
-    if not moves_struts or wanted == "angle":
+    if variable == "time" and all(o.started_s is not None for o in observations):
+        return variable
+    if not moves_struts or variable == "angle":
         return "angle"
-    return "strut-force" if wanted.startswith("strut-force") else "strut-length"
+    return "strut-force" if variable == "strut-force" else "strut-length"
 
 
 def _strut_mm(there: Actual, name: str) -> NDArray[np.float64] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.calibration.outliers.outlier import SOURCE_OF, Kind
@@ -50,7 +49,7 @@ def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[
             "strut": rest.strut,
             "variable": rest.variable,
             "text": rest.text,
-            "curve": None if rest.curve is None else asdict(rest.curve),
+            "curve": None if rest.curve is None else rest.curve.plain(),
         },
         "parameter_shift": [
             {

@@ -11,7 +11,7 @@ is a place, along the line on which it changes most.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,7 +81,7 @@ def curve_of(channel: Channel, settled: Settled, member: Member) -> Curve:
         _along(runs, shapes[m.cause.name], found.values[a:b])
         for m, a, b in zip(together, ends[:-1], ends[1:], strict=True)
     ]
-    amplitudes = np.concatenate([piece[0] for piece in pieces])
+    amplitudes = np.concatenate([piece.amplitudes for piece in pieces])
     at, to_points = _summed(runs, [shapes[m.cause.name] for m in together], pieces)
     spread = found.covariance[: ends[-1], : ends[-1]]
     values, covariance = to_points @ amplitudes, to_points @ spread @ to_points.T
@@ -93,12 +93,13 @@ def curve_of(channel: Channel, settled: Settled, member: Member) -> Curve:
     alone = len(together) == 1
     alike = len({shapes[m.cause.name].kind for m in together}) == 1
     return Curve(
-        variable=shape.name if alike else replace(shape, kind="").name,
+        follows=shape.follows if alike else replace(shape.follows, kind=""),
         unit=UNITS[shape.variable],
         strut=shape.strut,
         form=shape.form.text(UNITS[shape.variable]) if alone else f"sum of {len(together)}",
-        period_mm=shape.period if alone else None,
-        convention=", ".join(dict.fromkeys(words for *_, words in pieces if words)),
+        period=shape.period if alone else None,
+        direction=pieces[0].direction,
+        convention=", ".join(dict.fromkeys(piece.words for piece in pieces if piece.words)),
         readings_um=1e3 * signature.whole_rms,
         unconcealed_um=1e3 * signature.rest_rms,
         points=tuple(
@@ -116,14 +117,12 @@ def _adds(one: Shape, other: Shape | None) -> bool:
 
 
 def _summed(
-    runs: Sequence[Samples],
-    shapes: Sequence[Shape],
-    pieces: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], str]],
+    runs: Sequence[Samples], shapes: Sequence[Shape], pieces: Sequence[_Piece]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points of a sum of curves, and the matrix from the amplitudes of all to them; of one curve its own."""
     if len(pieces) == 1:
-        return pieces[0][2], pieces[0][1]
-    at = max((piece[2] for piece in pieces), key=len)
+        return pieces[0].at, pieces[0].to_points
+    at = max((piece.at for piece in pieces), key=len)
     return at, np.hstack([shape.form.columns(at) @ _convention(runs, shape)[0] for shape in shapes])
 
 
@@ -149,22 +148,38 @@ def _not_followed(settled: Settled, together: Sequence[Member]) -> float:
     return max(more, 0.0) / max(own, 1e-300)
 
 
-def _along(
-    runs: Sequence[Samples], shape: Shape, found: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], str]:
-    """Amplitudes less what is conventional, matrix from them to the points, places of the points, and words."""
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """One effect along the direction in which it moves most.
+
+    Attributes:
+        amplitudes: less what is conventional, shape (p,).
+        to_points: matrix from them to the points, shape (n, p).
+        at: places of the points, shape (n,).
+        direction: empty where what moves has one only.
+        words: of direction and convention.
+    """
+
+    amplitudes: NDArray[np.float64]
+    to_points: NDArray[np.float64]
+    at: NDArray[np.float64]
+    direction: tuple[float, ...]
+    words: str
+
+
+def _along(runs: Sequence[Samples], shape: Shape, found: NDArray[np.float64]) -> _Piece:
     keep, convention = _convention(runs, shape)
     directions = len(found) // shape.form.count
     amplitudes = np.kron(np.eye(directions), keep) @ found
     left, _, right = np.linalg.svd(amplitudes.reshape(directions, -1))
     at, curve, over = _over(runs, shape, right[0])
-    way, towards = np.ones(1), ""
+    way, direction, towards = np.ones(1), (), ""
     if shape.moves in AXES:
         # Signs so that the greatest part of the direction is positive.
         way = left[:, 0] * np.sign(left[np.abs(left[:, 0]).argmax(), 0])
-        towards = AXES[shape.moves].format(*way)
+        direction, towards = tuple(way.tolist()), AXES[shape.moves].format(*way)
     words = ", ".join(part for part in (towards, over, convention) if part)
-    return amplitudes, np.asarray(np.kron(way, curve @ keep), dtype=np.float64), at, words
+    return _Piece(amplitudes, np.asarray(np.kron(way, curve @ keep), dtype=np.float64), at, direction, words)
 
 
 def _convention(runs: Sequence[Samples], shape: Shape) -> tuple[NDArray[np.float64], str]:

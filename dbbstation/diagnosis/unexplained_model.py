@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.calibration.reporting.summary import identified_model
 from dbbstation.diagnosis.findings import CurvePoint
 from dbbstation.diagnosis.refit import refitted
+from dbbstation.diagnosis.shapes import Follows
 from dbbstation.errors import CalibrationError, ModelError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import Effect, ErrorSource, Fitted
@@ -27,9 +28,9 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Motion, Parameter
 
 KEPT_AS = {
-    "strut-length": "unexplained-by-length",
-    "strut-length wave": "unexplained-wave",
-    "strut-force": "unexplained-by-force",
+    Follows("strut-length"): "unexplained-by-length",
+    Follows("strut-length", "wave"): "unexplained-wave",
+    Follows("strut-force"): "unexplained-by-force",
 }
 """Sources that carry an unnamed error into a model, by what organises it: what any program knows of itself."""
 
@@ -57,7 +58,7 @@ class Kept:
             report: numbers of the fit, by name.
             sessions: SHA-256 of each session file, by name.
         """
-        found = identified_model(self.fit, {**report, "unexplained": asdict(self.curve)}, sessions)
+        found = identified_model(self.fit, {**report, "unexplained": self.curve.plain()}, sessions)
         machine, name = found.model.machine, self.source.name
         names = [parameter.name for parameter in self.source.parameters(machine)]
         sources = tuple(
@@ -92,13 +93,13 @@ def keep_unexplained(curve: Curve | None, after: Calibration) -> Kept:
     """
     if curve is None:
         raise ModelError("nothing is left without a name that a curve describes", remedy="leave --keep-unexplained out")
-    if curve.variable not in KEPT_AS:
+    if curve.follows not in KEPT_AS:
         raise ModelError(
             f"what is left follows {curve.variable}, which no program knows of itself or no model has a source for: it "
             "cannot be compensated",
             remedy="leave --keep-unexplained out",
         )
-    (source,) = sources_named([KEPT_AS[curve.variable]])
+    (source,) = sources_named([KEPT_AS[curve.follows]])
     machine = after.layout.machine
     to_all = _to_all(len(source.parameters(machine)) // STRUTS, curve.strut)
     part = _part(source, to_all, curve.strut)
@@ -129,7 +130,7 @@ def with_exact_wave(rest: Unexplained, after: Calibration) -> Unexplained:
     values = by[:, :2] @ (sine, cosine)
     sigma = np.sqrt(np.einsum("ni,ij,nj->n", by, kept.fit.solution.covariance[columns, columns], by))
     points = tuple(CurvePoint(*map(float, point)) for point in zip(at, values, sigma, strict=True))
-    return replace(rest, curve=replace(curve, form=f"period {period:.6g} mm", period_mm=float(period), points=points))
+    return replace(rest, curve=replace(curve, form=f"period {period:.6g} mm", period=float(period), points=points))
 
 
 def _to_all(each: int, strut: int | None) -> NDArray[np.float64]:

@@ -94,4 +94,4 @@ KINDS = 30
 def _name(shape: Shape) -> str:
     """Unique name of an unmodelled effect."""
     where = f"strut {shape.strut}" if shape.strut else "no single strut"
-    return f"unmodelled: {shape.name}, {where}, {shape.form.text('')}"
+    return f"unmodelled: {shape.follows}, {where}, {shape.form.text('')}"

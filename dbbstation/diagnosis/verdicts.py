@@ -176,7 +176,7 @@ class _Judge:
     def _in_words(self, name: str) -> str:
         """Name of a cause; of an unmodelled effect the variable that it follows."""
         shape = self._settled.unmodelled.shapes.get(name)
-        return name if shape is None else f"an unmodelled effect over {shape.name}"
+        return name if shape is None else f"an unmodelled effect over {shape.follows}"
 
     def _class(self, member: Member) -> tuple[str, ...]:
         """Causes whose effects no test of these tells from those of a member, itself first; also those without a name."""

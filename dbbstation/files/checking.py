@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, TravelError
+from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.every_format import SCHEMAS
 from dbbstation.files.formats.jig import parse_jig
 from dbbstation.files.formats.machine import parse_machine
@@ -13,23 +14,22 @@ from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.judged import JUDGED, judge_session
 from dbbstation.files.recordings.run_csv import PART, read_run
-from dbbstation.files.recordings.session import (
-    SESSION_FILE,
-    RunState,
-    SessionFolder,
-    no_session,
-    parse_session,
-    unlisted_sealed,
-)
+from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, no_session, parse_session, unlisted_sealed
 from dbbstation.files.yaml.text import load_yaml
+from dbbstation.quality.finding import Name
 from dbbstation.trace.loss import lost_samples
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.quality.judge import Judgement
     from dbbstation.sources.contract import ErrorSource
+    from dbbstation.trace.recording import Recording
 
 
 @dataclass
@@ -42,6 +42,7 @@ class Checked:
         summary: what it holds, one line; empty where it has problems.
         problems: what makes it unusable.
         warnings: what does not.
+        judgements: of the runs of a session that are accepted or wait to be; empty for everything else.
     """
 
     path: Path
@@ -49,6 +50,7 @@ class Checked:
     summary: str = ""
     problems: list[Problem] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
+    judgements: tuple[Judgement, ...] = ()
 
 
 def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
@@ -86,6 +88,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         "dbb-jig": lambda: _jig(checked),
         "dbb-model": lambda: _model(checked, known_sources),
         "dbb-settings": lambda: _settings(checked),
+        "dbb-bar": lambda: _bar(checked),
     }
     name = str(given).partition("/")[0]
     if name in by_name:
@@ -132,6 +135,13 @@ def _settings(checked: Checked) -> None:
     checked.summary = f"settings: {_count(count, 'value')}"
 
 
+def _bar(checked: Checked) -> None:
+    bar = parse_bar(checked.path, checked.problems)
+    if bar is not None:
+        long_um, u_um = 1e3 * (bar.readings.mean_mm - bar.length_mm), 1e3 * bar.uncertainty_mm
+        checked.summary = f"bar {bar.serial_number}: reads {long_um:+.2f} µm long, standard uncertainty {u_um:.2f} µm"
+
+
 def _run(checked: Checked) -> None:
     try:
         run = read_run(checked.path)
@@ -160,9 +170,17 @@ def _session(checked: Checked) -> None:
     session = parse_session(checked.path, checked.problems)
     if session is None or checked.problems:
         return
+    wanted: list[tuple[RunEntry, Recording]] = []
+    checked.warnings += [
+        Problem(str(run.path), 0, 0, f"samples: {run.counts.text}")
+        for run in session.runs
+        if run.counts is not None and (run.counts.lost or run.counts.rejected)
+    ]
     for run in session.runs:
         try:
             read = session.load(run)
+            if run.state in JUDGED:
+                wanted.append((run, read.recording))
             checked.warnings += read.warnings
             if run.state is not RunState.REJECTED:
                 checked.warnings += session.loss(run, read.recording)
@@ -178,7 +196,27 @@ def _session(checked: Checked) -> None:
         session.plan.check(session.machine)
     except TravelError as error:
         checked.problems.append(Problem(str(session.plan_path), 0, 0, f"{error.where}: {error.what}", error.remedy))
-    checked.summary = f"session: {_states(session)}"
+    _judge(checked, session, wanted)
+    checked.warnings += [Problem(str(session.folder), 0, 0, amendment.text) for amendment in session.amendments]
+    seal = "sealed" if session.seal is not None else NO_SEAL
+    checked.summary = f"session: {_states(session)}; {seal}"
+
+
+NO_SEAL = "it carries no seal (`dbbstation session seal` writes one)"
+"""What is said of sessions of older programs, and of those that were written by hand: a changed plan is not noticed there."""
+
+
+def _judge(checked: Checked, session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]]) -> None:
+    """Say what is wrong with runs that can be read; samples that were lost, and what comes of that, are said already."""
+    checked.judgements = judge_session(session, wanted)
+    for (run, _), judgement in zip(wanted, checked.judgements, strict=True):
+        lossy = any(finding.name is Name.LOST for finding in judgement.wrong)
+        said = {Name.LOST, Name.CIRCLE} if lossy else {Name.LOST}
+        checked.warnings += [
+            Problem(str(run.path), 0, 0, f"{finding.name}: {finding.text}")
+            for finding in judgement.wrong
+            if finding.name not in said
+        ]
 
 
 def _states(session: SessionFolder) -> str:

@@ -76,3 +76,12 @@ def decode(data: bytes, file: str, faults: list[Problem]) -> str | None:
         what = f"byte {data[error.start]:#04x} is not UTF-8 text"
         faults.append(Problem(file, line, column, what, "save the file as UTF-8"))
     return None
+
+
+def shortened(text: str) -> str:
+    """Text as it is quoted in a message: of a long one its beginning."""
+    return text if len(text) <= LONGEST_QUOTED else f"{text[:LONGEST_QUOTED]}…"
+
+
+LONGEST_QUOTED = 60
+"""Characters of a file's text that a message quotes."""

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import diags_array
 from scipy.stats import chi2
 
-from dbbstation.inference.coloured import Coloured, bands_of, coloured_noise
+from dbbstation.inference.coloured import Bands, Coloured, bands_of, coloured_noise
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, Family, log_odds
@@ -36,6 +36,10 @@ DRAWS = 4
 
 TANGENT = 1e-3
 """Step of a nonlinear parameter for its tangent, in units of the spacing of its grid."""
+
+LEAST_LEFT = 0.02
+"""Share of noise that columns must leave of a frequency for it to say anything: of what they take up altogether, what priors leave
+is a shadow of the effect, not of the noise."""
 
 QUIETEST = 1e-9
 """Share of the residual below which nothing is noise: digits run out there."""
@@ -169,7 +173,7 @@ class Bank:
             before, found = self.noise, self.noise.with_innovation(max(innovation, least))
             spread = self._spread_of(left[:, 0])
             uneven = float(np.abs(spread / self.spread - 1.0).max(initial=0.0)) > SETTLED
-            if self.channel.time is not None and not white:
+            if self.channel.time is not None and not white and innovation > least:
                 found = self._colour_of(left, draws, stretches, found)
             self._take(found, spread)
             if _alike(found, before) and not uneven:
@@ -212,8 +216,11 @@ class Bank:
             whole, rest = bands_of(draws[:, k], stretches), bands_of(left[:, 1 + k], stretches)
             if whole is not None and rest is not None:
                 taken += (rest.log_power - whole.log_power) / draws.shape[1]
-        colour = np.log(self.noise.gain(bands.frequency))
-        found = coloured_noise(replace(bands, log_power=bands.log_power - taken - colour))
+        seen = taken > np.log(LEAST_LEFT)
+        if not seen.any():
+            return level
+        power = bands.log_power - taken - np.log(self.noise.gain(bands.frequency))
+        found = coloured_noise(Bands(bands.frequency[seen], power[seen], bands.count[seen]))
         # Squares say the level best once the colour is right.
         return level if _alike(found.with_innovation(level.innovation), level) else found
 
@@ -272,10 +279,10 @@ class Bank:
         Args:
             name: of the law.
             nonlinear: values of its nonlinear parameters.
-            amplitudes: shape (p,).
+            amplitudes: of all its columns, zero for those of other forms, shape (p,).
         """
         law = self.laws[name]
-        exact = law.columns(nonlinear)
+        exact = law.columns(nonlinear) if law.at is None else law.at(nonlinear, amplitudes)
         tangents, spacings = [], []
         for k, grid in enumerate(law.grids):
             spacing = spacing_of(grid, nonlinear[k])
@@ -283,31 +290,28 @@ class Bank:
             up, down = (law.columns(tuple(values)) @ amplitudes for values in moved)
             tangents.append((up - down) / (2.0 * TANGENT * spacing))
             spacings.append(spacing)
-        slack = np.column_stack([*tangents, self._discrepancy(law, exact @ amplitudes)])
+        slack = np.column_stack([*tangents, self._discrepancy(law, exact @ amplitudes, nonlinear, amplitudes)])
         own = self._add(np.hstack([exact, slack]))
         width = exact.shape[1]
         sd = np.concatenate([spacings, np.full(slack.shape[1] - len(tangents), law.form_uncertainty)])
-        at = max(float(np.sqrt(np.mean(np.square(amplitudes / law.plausible)))), 1e-12)
+        used = amplitudes != 0.0
+        at = max(float(np.sqrt(np.mean(np.square(amplitudes[used] / law.plausible[used])))), 1e-12)
         points = float(np.prod([len(grid) for grid in law.grids]))
         # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
         weight = -float(np.log(max(points / 2.5 ** len(law.grids), 1.0)))
-        variant = Variant(
-            own[:width],
-            law.plausible,
-            nonlinear,
-            slack=own[width:],
-            slack_sd=sd,
-            slack_at=at,
-            log_weight=weight,
-            positive=law.positive,
+        variants = tuple(
+            replace(variant, slack=own[width:], slack_sd=sd, slack_at=at)
+            for variant in _forms(law, own[:width], nonlinear, weight)
         )
-        self._of_laws[name] = replace(self._of_laws[name], variants=(variant,))
+        self._of_laws[name] = replace(self._of_laws[name], variants=variants)
 
-    def _discrepancy(self, law: Law, effect: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _discrepancy(
+        self, law: Law, effect: NDArray[np.float64], nonlinear: tuple[float, ...], amplitudes: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         if law.form_uncertainty == 0.0:
             return np.zeros((len(effect), 0))
         if law.discrepancy is not None:
-            return law.discrepancy(effect)
+            return law.discrepancy(effect, nonlinear, amplitudes)
         if law.follows is None:
             return np.zeros((len(effect), 0))
         return modulated([effect[:, None]], [law.follows.values[:, None]], None)
@@ -316,8 +320,7 @@ class Bank:
         points = list(product(*law.grids))
         weight = -float(np.log(len(points)))
         return tuple(
-            Variant(self._add(law.columns(point)), law.plausible, point, log_weight=weight, positive=law.positive)
-            for point in points
+            variant for point in points for variant in _forms(law, self._add(law.columns(point)), point, weight)
         )
 
     def _cause(self, pattern: Pattern, own: NDArray[np.int64], plausible: float) -> Cause:
@@ -352,6 +355,30 @@ class Bank:
     def _add(self, samples: NDArray[np.float64]) -> NDArray[np.int64]:
         self._everywhere.append(samples)
         return self._columns.add(self.whitened(samples))
+
+
+def _forms(law: Law, columns: NDArray[np.int64], nonlinear: tuple[float, ...], log_weight: float) -> list[Variant]:
+    """Forms of a law at one point: its choices where it has them, else all its amplitudes, whose columns these are."""
+    if not law.choices:
+        return [Variant(columns, law.plausible, nonlinear, log_weight=log_weight, positive=law.positive)]
+    return [
+        Variant(
+            columns[list(part)],
+            law.plausible[list(part)],
+            nonlinear,
+            label=label,
+            whole=columns,
+            log_weight=log_weight + weight,
+        )
+        for part, weight, label in law.choices
+    ]
+
+
+def amplitudes_of(variant: Variant) -> NDArray[np.int64]:
+    """Numbers of the amplitudes that a form has, among all of its law, shape (p,)."""
+    if not len(variant.whole):
+        return np.arange(len(variant.columns))
+    return np.searchsorted(variant.whole, variant.columns)
 
 
 def _alike(one: Coloured, other: Coloured) -> bool:

@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 NAMED_ODDS = float(np.log(0.05 / 0.95))
 """Log prior odds of a law: one object in twenty has any one of them so that it matters."""
+
+Discrepancy: TypeAlias = "Callable[[NDArray[np.float64], tuple[float, ...], NDArray[np.float64]], NDArray[np.float64]]"
+"""What a formula may be off by, from its effect, nonlinear parameters and amplitudes."""
 
 LARGEST = 10.0
 """Effect of a base column, in root mean squares of the residual, from which on its value is certainly of interest: what leaves a
@@ -76,10 +79,14 @@ class Law:
         positive: which amplitudes cannot be negative, shape (p,); empty where all can.
         form_uncertainty: share of the effect by which real objects depart from the formula, one standard deviation.
         follows: variable along which they do; None where the formula is exact or `discrepancy` says it.
-        discrepancy: columns of what the formula may be off by from its effect, (n,) to (n, q), of which `form_uncertainty`
-            is the standard deviation; by default, the effect times smooth functions of `follows`.
+        discrepancy: columns of what the formula may be off by, shape (n, q), from its effect, shape (n,), its nonlinear
+            parameters and its amplitudes, shape (p,); `form_uncertainty` is their standard deviation. By default, the effect
+            times smooth functions of `follows`.
         log_odds: log prior odds.
-        detail: rows of the shortest feature, where a band limit may hide it; 0 where none does.
+        at: columns like `columns`, at values of the nonlinear parameters and about amplitudes, shape (p,), whose effect they give
+            exactly; None where the effect is proportional to the amplitudes.
+        choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
+            from the others. None may be combined with `positive`.
     """
 
     name: str
@@ -91,8 +98,10 @@ class Law:
     positive: tuple[bool, ...] = ()
     form_uncertainty: float = 0.0
     follows: Variable | None = None
-    discrepancy: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
+    discrepancy: Discrepancy | None = None
     log_odds: float = NAMED_ODDS
+    at: Callable[[tuple[float, ...], NDArray[np.float64]], NDArray[np.float64]] | None = None
+    choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +179,12 @@ class Channel:
     def size(self) -> float:
         """Root mean square of what the base leaves of the kept rows: no effect is much larger, in the unit of the residual."""
         left = self.target - self.base.samples[self.kept] @ self.fitted(self.target, self._about).x
-        return max(float(np.sqrt(np.mean(left**2))), 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300)
+        return max(
+            float(np.sqrt(np.mean(left**2))),
+            self.least_noise,
+            1e-12 * float(np.abs(self.target).max(initial=0.0)),
+            1e-300,
+        )
 
     @cached_property
     def known(self) -> Columns:
@@ -206,7 +220,9 @@ class Channel:
     @property
     def _about(self) -> float:
         """A first idea of the noise: the spread of the residual."""
-        return max(float(np.std(self.target)), 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300)
+        return max(
+            float(np.std(self.target)), self.least_noise, 1e-12 * float(np.abs(self.target).max(initial=0.0)), 1e-300
+        )
 
     def _block(self, target: NDArray[np.float64]) -> Block:
         return compress(np.arange(self.base.samples.shape[1]), self.base.samples[self.kept], target)

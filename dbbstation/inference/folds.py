@@ -65,18 +65,21 @@ class HeldOutError:
 
 
 def held_out_error(
-    channel: Channel, choose: Callable[[Channel], Settled], progress: Callable[[str], None] = lambda _: None
+    channel: Channel,
+    choose: Callable[[Channel], Settled],
+    progress: Callable[[str, int, int], None] = lambda _text, _done, _of: None,
 ) -> HeldOutError:
     """Hold back parts in turn: blocks where there are five or more, else ten stretches of consecutive rows.
 
     Args:
         channel: all rows.
         choose: the whole selection, laws, patterns, noise and looks, from the rows that a channel keeps.
-        progress: told which part is held back.
+        progress: told what is being done, and how much of how much.
     """
     found = []
-    for name, rows in parts_of(channel):
-        progress(f"held out: {name}")
+    parts = parts_of(channel)
+    for done, (name, rows) in enumerate(parts):
+        progress("held-out part", done, len(parts))
         settled = choose(channel.without(rows))
         none = np.zeros(len(channel.residual))
         base = channel.base.samples @ settled.base_values(none)

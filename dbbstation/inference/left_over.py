@@ -106,7 +106,7 @@ def _in_order(left: NDArray[np.float64], stretches: Sequence[slice], sigma: floa
         power = np.abs(np.fft.rfft(longest - longest.mean())[1 : (len(longest) + 1) // 2]) ** 2
         at = int(power.argmax())
         # Share of the largest of m exponential powers [Fisher, Proc. R. Soc. A 125 (1929) 54].
-        share = float(power[at] / power.sum())
+        share = float(power[at] / max(float(power.sum()), 1e-300))
         chance = min(1.0, len(power) * (1.0 - share) ** (len(power) - 1))
         size = sigma * 2.0 * float(np.sqrt(power[at])) / len(longest) / float(np.sqrt(2.0))
         found.append(Look("wave in time", chance, size, f"about every {len(longest) / (at + 1):.4g} rows"))

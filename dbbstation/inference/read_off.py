@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import expit
 
+from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.settle import impossible, moved
 from dbbstation.inference.verdict import Value, Verdict
@@ -70,6 +71,7 @@ class Finding:
         name: of it.
         verdict: what can be said.
         family: kind of effect; None for a law.
+        label: which of its forms, such as which strut; empty where it has one.
         variables: that it follows.
         probability: that it is there, or one of its class.
         log_factor: log Bayes factor beside the others.
@@ -89,6 +91,7 @@ class Finding:
     name: str
     verdict: Verdict
     family: Family | None
+    label: str
     variables: tuple[str, ...]
     probability: float
     log_factor: float
@@ -137,7 +140,9 @@ class _Judge:
     def refused(self, name: str, why: str) -> Finding:
         """Finding of a law that would have to be what it cannot be."""
         blocks = (0.0,) * len(self._settled.channel.blocks)
-        return Finding(name, Verdict.RULED_OUT, None, (), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {}, (), (), blocks, text=why)
+        return Finding(
+            name, Verdict.RULED_OUT, None, "", (), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, {}, (), (), blocks, text=why
+        )
 
     def finding(self, cause: Cause) -> Finding:
         """What is said of one cause."""
@@ -165,6 +170,7 @@ class _Judge:
             name=cause.name,
             verdict=verdict,
             family=pattern.family if pattern else None,
+            label=shown.variant.label,
             variables=tuple(v.name for v in variables),
             probability=probability,
             log_factor=gain,
@@ -264,13 +270,15 @@ class _Judge:
         law = self._settled.bank.laws.get(member.cause.name)
         if law is not None:
             found = {
-                name: Value(float(values[k]), float(np.hypot(sigma[k], law.form_uncertainty * values[k])), law.units[k])
-                for k, name in enumerate(law.parameters[:width])
+                law.parameters[j]: Value(
+                    float(values[k]), float(np.hypot(sigma[k], law.form_uncertainty * values[k])), law.units[j]
+                )
+                for k, j in enumerate(amplitudes_of(member.variant).tolist())
             }
-            shaped = moved(law, member, values)
-            for k, name in enumerate(law.parameters[width:]):
+            shaped, every = moved(law, member, values), len(law.plausible)
+            for k, name in enumerate(law.parameters[every:]):
                 known = len(member.variant.slack) > k
-                found[name] = Value(shaped[k], float(sigma[width + k]) if known else np.nan, law.units[width + k])
+                found[name] = Value(shaped[k], float(sigma[width + k]) if known else np.nan, law.units[every + k])
             return found
         pattern = self._settled.bank.patterns[member.cause.name]
         unit = self._settled.channel.unit
@@ -318,7 +326,7 @@ class _Judge:
         found = [member.cause.name]
         for cause in rivals:
             same = [v for v in cause.variants if len(v.columns) == size]
-            if same and self._same(member.variant.columns, same[0].columns, others):
+            if any(self._same(member.variant.columns, variant.columns, others) for variant in same):
                 found.append(cause.name)
         return tuple(found)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.bank import Bank
+from dbbstation.inference.bank import Bank, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import IN_TIME, edges_anew, seen
@@ -112,6 +112,7 @@ def settle(
     static: bool = True,
     most_expanded: int = MOST_EXPANDED,
     most_looks: int = MOST_LOOKS,
+    in_time: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns on a channel.
@@ -122,9 +123,10 @@ def settle(
         static: compare with the patterns that need no look, too.
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
         most_looks: looks at what is left, one beside what the other brought, at the most.
+        in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
         progress: told what is being done.
     """
-    options = _Options(look=look, static=static, most_expanded=most_expanded, most_looks=most_looks)
+    options = _Options(look=look, static=static, most_expanded=most_expanded, most_looks=most_looks, in_time=in_time)
     return _settled(_begun(channel, options), options, progress)
 
 
@@ -134,6 +136,7 @@ class _Options:
     static: bool
     most_expanded: int
     most_looks: int
+    in_time: bool
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
@@ -168,7 +171,7 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
     for number in range(MOST_ROUNDS):
         bank.measure_noise()
         starts: list[tuple[Member, ...]] = []
-        if looking and not looked:
+        if looking and options.in_time and not looked:
             # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
             # follow variables have a start of their own, and what comes at once has one beside the laws alone.
             begun = _grown_in(bank)
@@ -176,7 +179,7 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
             laws = tuple(member for member in begun if member.cause.name in bank.laws)
             starts.append(_looked(bank, laws, refused, progress, options.most_looks) if laws else ())
         if looking:
-            best = _looked(bank, best, refused, progress, options.most_looks)
+            best = _looked(bank, best, refused, progress, options.most_looks, in_time=options.in_time)
         progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
@@ -316,15 +319,18 @@ def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, member: Member) -
     """Lay out a law at its best values in the best hypothesis, or beside it in the place of what it competes with."""
     target, law = bank.target, bank.laws[member.cause.name]
     others = best.without(member.cause.name)
-    for _ in range(STEPS if law.grids else 1):
+    for _ in range(STEPS if law.grids or law.at else 1):
         values = beside.comparison(target).estimates([member, *others]).values[: len(member.columns)]
         width = len(member.variant.columns)
         nonlinear = moved(law, member, values)
         if not values[:width].any():
             return
-        bank.refine(law.name, nonlinear, values[:width])
+        every = np.zeros(len(law.plausible))
+        every[amplitudes_of(member.variant)] = values[:width]
+        bank.refine(law.name, nonlinear, every)
         cause = next(cause for cause in bank.causes if cause.name == law.name)
-        member = replace(member, cause=cause, variant=cause.variants[0])
+        same = next(variant for variant in cause.variants if variant.label == member.variant.label)
+        member = replace(member, cause=cause, variant=same)
 
 
 def moved(law: Law, member: Member, values: NDArray[np.float64]) -> tuple[float, ...]:
@@ -337,7 +343,7 @@ def moved(law: Law, member: Member, values: NDArray[np.float64]) -> tuple[float,
 
 
 STEPS = 3
-"""Times that the nonlinear parameters of a law are improved."""
+"""Times that the nonlinear parameters of a law are improved, and amplitudes to which its effect is not proportional."""
 
 
 def _negative(settled: Settled) -> dict[str, str]:

@@ -42,6 +42,7 @@ class ByteLog:
     Args:
         path: the file; it must not exist yet.
         instrument: name of the protocol.
+        profile: of it, empty where it has none.
         port: name of the port.
         force: overwrite the file.
         clock: monotonic clock in s.
@@ -56,6 +57,7 @@ class ByteLog:
         *,
         instrument: str,
         port: str,
+        profile: str = "",
         force: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -71,7 +73,8 @@ class ByteLog:
         self._path = path
         self._clock = clock
         self._opened_s = clock()
-        self._file.write(f"{_HEAD}\n# instrument: {instrument}\n# port: {port}\n")
+        variant = f"# profile: {profile}\n" if profile else ""
+        self._file.write(f"{_HEAD}\n# instrument: {instrument}\n{variant}# port: {port}\n")
 
     def note(self, direction: Literal["<", ">"], raw: bytes) -> None:
         """Write down bytes that just went over the line.
@@ -96,16 +99,20 @@ class ByteLog:
         self.close()
 
 
-def logged_instrument(path: Path) -> str:
-    """Return the name of the instrument in the head of a byte log, empty where it has none.
+def logged_instrument(path: Path) -> tuple[str, str]:
+    """Return instrument and profile in the head of a byte log, each empty where it has none.
 
     Raises:
         InputError: the file cannot be read or is no byte log.
     """
+    told = {"# instrument": "", "# profile": ""}
     for line in _lines(path)[1:]:
-        if line.startswith("# instrument:"):
-            return line.partition(":")[2].strip()
-    return ""
+        if not line.startswith("#"):
+            break
+        key, _, value = line.partition(":")
+        if key in told:
+            told[key] = value.strip()
+    return told["# instrument"], told["# profile"]
 
 
 def read_byte_log(path: Path) -> Iterator[Chunk]:

@@ -6,14 +6,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from dbbstation.errors import InstrumentError
-from dbbstation.instrument.fields import Content, Found, NotRepresentable, NotUnderstood
+from dbbstation.instrument.fields import Content, Found, Literally, NotRepresentable, NotUnderstood, Reason
 from dbbstation.instrument.reading import Reading, Status
 
 if TYPE_CHECKING:
-    from dbbstation.instrument.protocol import Frame, Protocol
+    from collections.abc import Iterator
 
-_LONGEST_LINE = 256
-"""Bytes without a line end after which they count as garbage; no known length gauge sends longer lines."""
+    from dbbstation.instrument.frame import Frame
+    from dbbstation.instrument.protocol import Protocol
+
+LONGEST_LINE = 256
+"""Bytes without a line end after which they count as garbage; no known length gauge sends longer lines. Also the most that
+is kept of bytes in which no frame of fixed width was found yet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +37,13 @@ class Garbage:
         raw: the bytes.
         why: what was wrong with them, empty where they simply do not fit the grammar.
         joining: they are the rest of a frame that was under way when listening began: nothing is wrong.
+        reason: why they are rejected, in one word, for counting.
     """
 
     raw: bytes
     why: str = ""
     joining: bool = False
+    reason: Reason = "bytes"
 
 
 Heard: TypeAlias = Piece | Garbage
@@ -58,16 +64,17 @@ def encode(protocol: Protocol, length_mm: float | None, *, counter: int = 0, sta
     """
     if length_mm is None and status == "ok":
         status = "fault"
-    value = 0.0 if length_mm is None else length_mm / protocol.length.mm_per_unit()
+    length, features = protocol.length, protocol.features
+    value = 0.0 if length_mm is None else (length_mm - length.zero_mm) / length.mm_per_unit()
     if status == "ok":
         try:
-            return protocol.frames[0].write(Content(value, counter))
+            return protocol.frames[0].write(Content(value, counter, features=features))
         except NotRepresentable:
             status, value = "overrange", 0.0
     for wanted in ("overrange", "fault") if status == "overrange" else ("fault",):
         voice = protocol.voice(wanted)
         if voice is not None:
-            return _told(voice[0], Content(value, counter, voice[1]))
+            return _told(voice[0], Content(value, counter, voice[1], features))
     raise InstrumentError(
         f"its wire has no way to say {status!r}",
         where=protocol.name,
@@ -81,15 +88,15 @@ def decode(protocol: Protocol, raw: bytes) -> Reading:
     Raises:
         NotUnderstood: they are no whole frame of this protocol.
     """
-    why = "no frame of this protocol"
+    wrong = NotUnderstood("no frame of this protocol")
     for frame in protocol.frames:
         match = frame.pattern.fullmatch(raw)
         if match is not None:
             try:
                 return _reading(protocol, frame.read(match))
             except NotUnderstood as error:
-                why = str(error)
-    raise NotUnderstood(why)
+                wrong = error
+    raise wrong
 
 
 class Decoder:
@@ -105,6 +112,8 @@ class Decoder:
         self._joining = joining
         self._in_step = not joining
         self._pending = b""
+        self._heads = [_head(frame) for frame in protocol.frames]
+        self._bare = tuple(b"".join(_fixed(frame)) for frame in protocol.frames if frame.bare)
 
     @property
     def pending(self) -> bytes:
@@ -123,23 +132,28 @@ class Decoder:
 
     def _cut_by_line_end(self) -> list[Heard]:
         end = self._protocol.terminator
-        *lines, self._pending = self._pending.split(end)
-        after = sum(len(line) + len(end) for line in lines) + len(self._pending)
         heard: list[Heard] = []
-        for line in lines:
-            raw = line + end
-            after -= len(raw)
+        while True:
+            bare = next((raw for raw in self._bare if self._pending.startswith(raw)), None)
+            if bare is not None:
+                raw = bare
+            else:
+                cut = self._pending.find(end)
+                if cut < 0:
+                    break
+                raw = self._pending[: cut + len(end)]
+            self._pending = self._pending[len(raw) :]
             joining, self._joining = self._joining, False
-            if joining:
+            if joining and bare is None:
                 # Its beginning is unknown: where widths vary, "23.4" may be the rest of "123.4".
                 heard.append(Garbage(raw, joining=True))
                 continue
             try:
-                heard.append(Piece(decode(self._protocol, raw), raw, after))
+                heard.append(Piece(decode(self._protocol, raw), raw, len(self._pending)))
             except NotUnderstood as error:
-                heard.append(Garbage(raw, str(error)))
-        if len(self._pending) > _LONGEST_LINE:
-            heard.append(Garbage(self.take_pending(), f"no line end in {_LONGEST_LINE} bytes"))
+                heard.append(Garbage(raw, str(error), reason=error.reason))
+        if len(self._pending) > LONGEST_LINE:
+            heard.append(Garbage(self.take_pending(), f"no line end in {LONGEST_LINE} bytes"))
         return heard
 
     def _cut_by_width(self) -> list[Heard]:
@@ -147,82 +161,71 @@ class Decoder:
         longest = max(frame.width or 0 for frame in self._protocol.frames)
         heard: list[Heard] = []
         start = skipped = 0
+        wrong: NotUnderstood | None = None
         while len(self._pending) - start - skipped >= longest:
             here = start + skipped
             found = self._frame_at(here)
+            if isinstance(found, NotUnderstood):
+                wrong, found = wrong or found, None
             if found is not None and not self._in_step:
                 follower = here + len(found.raw)
                 if len(self._pending) - follower < longest:
                     break
-                found = found if self._frame_at(follower) else None
+                found = found if isinstance(self._frame_at(follower), Piece) else None
             if found is None:
                 self._in_step = False
-                skipped += 1
+                skipped = self._next_head(here + 1, len(self._pending) - longest + 1) - start
                 continue
             if skipped:
-                heard.append(Garbage(self._pending[start:here], joining=self._joining))
+                heard.append(_skipped(self._pending[start:here], wrong, joining=self._joining))
             heard.append(found)
-            start, skipped = here + len(found.raw), 0
+            start, skipped, wrong = here + len(found.raw), 0, None
             self._in_step, self._joining = True, False
-        if skipped and not self._joining:
-            heard.append(Garbage(self._pending[start : start + skipped]))
+        if skipped and (not self._joining or skipped > LONGEST_LINE):
+            heard.append(_skipped(self._pending[start : start + skipped], wrong, joining=False))
             start += skipped
         self._pending = self._pending[start:]
         return heard
 
-    def _frame_at(self, start: int) -> Piece | None:
+    def _next_head(self, after: int, end: int) -> int:
+        """Return the next place at which a frame can begin, at most `end`: every place where frames begin with anything."""
+        if not all(self._heads):
+            return after
+        places = [self._pending.find(head, after, end + len(head) - 1) for head in self._heads]
+        return min((place for place in places if place >= 0), default=max(after, end))
+
+    def _frame_at(self, start: int) -> Piece | NotUnderstood | None:
+        """Return the frame that begins there; what is wrong with it where only its checksum or a number is."""
+        wrong: NotUnderstood | None = None
         for frame in self._protocol.frames:
             match = frame.pattern.match(self._pending, start)
             if match is not None:
                 try:
                     reading = _reading(self._protocol, frame.read(match))
-                except NotUnderstood:
+                except NotUnderstood as error:
+                    wrong = error
                     continue
                 return Piece(reading, match[0], len(self._pending) - match.end())
-        return None
+        return wrong
 
 
-class GapCounter:
-    """Counts lost samples by the device's counter.
+def _head(frame: Frame) -> bytes:
+    first = frame.parts[0]
+    return first.value if isinstance(first, Literally) else b""
 
-    Args:
-        modulus: where the counter starts again from 0; None: the wire has no counter, and nothing is counted.
-    """
 
-    def __init__(self, modulus: int | None) -> None:
-        self._modulus = modulus
-        self._last: int | None = None
+def _fixed(frame: Frame) -> Iterator[bytes]:
+    return (part.value for part in frame.parts if isinstance(part, Literally))
 
-    @property
-    def counts(self) -> bool:
-        """Whether the wire has a counter."""
-        return self._modulus is not None
 
-    def lost_before(self, counter: int | None, where: str) -> int:
-        """Return how many samples are missing between the last one and this.
-
-        Raises:
-            InstrumentError: the counter went back or stood still: the device restarted, or two programs read the port.
-        """
-        if self._modulus is None or counter is None:
-            return 0
-        last, self._last = self._last, counter
-        if last is None:
-            return 0
-        step = (counter - last) % self._modulus
-        if step == 0 or step > self._modulus // 2:
-            raise InstrumentError(
-                f"the sample counter went from {last} to {counter}",
-                where=where,
-                remedy="the instrument was restarted, or another program reads the same port: start the measurement again",
-            )
-        return step - 1
+def _skipped(raw: bytes, wrong: NotUnderstood | None, *, joining: bool) -> Garbage:
+    return Garbage(raw, joining=joining) if wrong is None else Garbage(raw, str(wrong), joining, wrong.reason)
 
 
 def _reading(protocol: Protocol, found: Found) -> Reading:
     length_mm: float | None = None
     if found.value is not None and found.status != "fault":
-        length_mm = found.sign * found.value * protocol.length.mm_per_unit(found.unit) + 0.0
+        length_mm = found.sign * found.value * protocol.length.mm_per_unit(found.unit) + protocol.length.zero_mm + 0.0
         low_mm, high_mm = protocol.length.range_mm
         if not low_mm <= length_mm <= high_mm:
             found.report(
@@ -239,4 +242,4 @@ def _told(frame: Frame, content: Content) -> bytes:
     try:
         return frame.write(content)
     except NotRepresentable:
-        return frame.write(Content(0.0, content.counter, content.voice))
+        return frame.write(content.of(0.0))

@@ -9,42 +9,33 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError, StationError
 from dbbstation.instrument import symptoms
-from dbbstation.instrument.codec import Decoder, GapCounter, Garbage, Heard, Piece
-from dbbstation.instrument.link import open_link
-from dbbstation.instrument.stamps import StreamStamps
+from dbbstation.instrument.adapters import adapter_of, port_of
+from dbbstation.instrument.link import LineClosedError, open_link
+from dbbstation.instrument.listening import Listener
+from dbbstation.instrument.polling import Poller
+from dbbstation.instrument.reception import Reception, Tally
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from typing import Self
 
+    from dbbstation.instrument.adapters import Adapter
     from dbbstation.instrument.bytelog import ByteLog
     from dbbstation.instrument.link import Link, Port
     from dbbstation.instrument.protocol import Protocol, Step
     from dbbstation.instrument.reading import Reading
 
-_PAUSE_TICK_S = 0.001
-
-_MARGIN_S = 0.02
-
-_INCOMPLETE = "incomplete"
+_LOOK_S = 0.25
+"""Between looks for an adapter that was pulled out [s]."""
 
 _JOIN_S = 5.0
 """The reader thread ends within some hundredths of a second; after this long something is broken."""
-
-
-@dataclass(slots=True)
-class Tally:
-    """What a driver has seen since `start`: readings, samples lost, bytes not understood and an example of them."""
-
-    readings: int = 0
-    lost: int = 0
-    garbage_bytes: int = 0
-    garbage: bytes = b""
 
 
 class Instrument:
@@ -60,6 +51,8 @@ class Instrument:
         timeout_s: patience before a silent line is an error, instead of the protocol's.
         memory_s: how long the quickest arrival of a stream's samples is remembered, by `clock`: on a scaled clock as many
             times longer, because what holds samples up is the computer, in real time.
+        reconnect_s: how long an adapter that was pulled out is waited for, in real seconds; it is known by its USB identity,
+            whatever its port is called then. A port that is no USB adapter is not waited for.
     """
 
     def __init__(
@@ -72,6 +65,7 @@ class Instrument:
         log: ByteLog | None = None,
         timeout_s: float | None = None,
         memory_s: float = 2.0,
+        reconnect_s: float = 0.0,
     ) -> None:
         self.protocol = protocol
         self.tally = Tally()
@@ -81,6 +75,10 @@ class Instrument:
         self._log = log
         self._timeout_s = timeout_s or protocol.timing.timeout_s
         self._memory_s = memory_s
+        self._reconnect_s = reconnect_s
+        self._adapter: Adapter | None = None
+        self._last_s: float | None = None
+        self._away = False
         self._link: Link | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
@@ -102,14 +100,14 @@ class Instrument:
         if self._thread is not None:
             raise InstrumentError("it is being read already", where=self.where, remedy="stop it first")
         self._link = self._link or open_link(self._port, self.protocol.line, baud=self._baud, log=self._log)
+        self._adapter = adapter_of(self._port) if self._reconnect_s and isinstance(self._port, str) else None
+        self._last_s, self._away = None, False
         self._stop.clear()
         self._queue.clear()
         self._failure = None
         self.tally = Tally()
-        after = b""
         try:
-            for step in self.protocol.ask.start:
-                after = _command(self._link, step, self._timeout_s)
+            after = self._begin(self._link)
         except StationError:
             self.close()
             raise
@@ -194,124 +192,71 @@ class Instrument:
             yield self.read()
             done += 1
 
+    def _begin(self, link: Link) -> bytes:
+        """Send the start sequence; return what came behind its last answer."""
+        after = b""
+        for step in self.protocol.ask.start:
+            after = _command(link, step, self._timeout_s)
+        return after
+
     def _run(self, link: Link, after: bytes) -> None:
         try:
-            if self.protocol.ask.mode == "request":
-                self._note_garbage(after)
-                self._poll(link)
-            else:
-                self._listen(link, after)
+            while not self._stop.is_set():
+                try:
+                    self._read_on(link, after)
+                except LineClosedError as error:
+                    found = self._plugged_in_again()
+                    if found is None:
+                        raise error from None
+                    link, after = found
         except StationError as error:
             self._end(error)
         except Exception as error:  # noqa: BLE001 (a thread that dies silently would look like a silent instrument)
             self._end(InstrumentError(f"reading failed: {type(error).__name__}: {error}", where=self.where))
 
-    def _poll(self, link: Link) -> None:
-        """Ask, wait for the reply, ask again; a reply that does not come or cannot be read is asked for again."""
-        timing, line, request = self.protocol.timing, self.protocol.line, self.protocol.ask.request
-        gaps = GapCounter(self.protocol.counter_modulus)
-        to_latch_s = len(request) * line.character_s(self._baud) + timing.latch_delay_s
-        pause_s = 1.0 / timing.rate_hz if timing.rate_hz else 0.0
-        last_s = float("-inf")
-        failed: list[Garbage] = []
-        self._until_quiet(link)
-        while not self._stop.is_set():
-            decoder = Decoder(self.protocol, joining=False)
-            asked_s = self._clock()
-            link.write(request)
-            heard = self._reply(link, decoder)
-            if self._stop.is_set():
-                return
-            if isinstance(heard, Piece):
-                last_s = max(asked_s + to_latch_s, last_s + 1e-6)
-                missing = gaps.lost_before(heard.reading.counter, self.where)
-                self._put(replace(heard.reading, t_s=last_s, lost=missing if gaps.counts else len(failed)))
-                failed.clear()
-                while self._clock() < asked_s + pause_s and not self._stop.wait(_PAUSE_TICK_S):
-                    pass
+    def _read_on(self, link: Link, after: bytes) -> None:
+        reception = Reception(
+            protocol=self.protocol,
+            where=self.where,
+            baud=self._baud,
+            clock=self._clock,
+            timeout_s=self._timeout_s,
+            memory_s=self._memory_s,
+            tally=self.tally,
+            stop=self._stop,
+            put=self._put,
+        )
+        if self.protocol.ask.asked:
+            self.tally.reject(after, "bytes")
+            Poller(link, reception).run()
+        else:
+            Listener(link, reception).run(after)
+
+    def _plugged_in_again(self) -> tuple[Link, bytes] | None:
+        """Wait for the same adapter under whatever name; return its line, and what came behind the start sequence."""
+        if self._adapter is None:
+            return None
+        if self._link is not None:
+            self._link.close()
+        end_s = time.monotonic() + self._reconnect_s
+        while time.monotonic() < end_s and not self._stop.wait(_LOOK_S):
+            name = port_of(self._adapter)
+            if name is None:
                 continue
-            failed.append(heard)
-            self._note_garbage(heard.raw)
-            self._until_quiet(link)
-            if len(failed) > timing.retries:
-                # The attempt that brought something says more than the silence after it.
-                telling = next((one for one in reversed(failed) if one.raw), heard)
-                raise self._symptom(telling.raw, telling.why)
-
-    def _until_quiet(self, link: Link) -> None:
-        """Let a reply to an earlier request pass, perhaps one of a program before, lest it be taken for the next one.
-
-        The line is quiet when nothing came for longer than a reply takes from the request to its last byte.
-        """
-        timing, line = self.protocol.timing, self.protocol.line
-        quiet_s = timing.reply_latency_s + self.protocol.frame_characters * line.character_s(self._baud) + _MARGIN_S
-        now_s = heard_s = time.monotonic()
-        end_s = now_s + self._timeout_s + quiet_s
-        while now_s < min(heard_s + quiet_s, end_s) and not self._stop.is_set():
-            raw = link.read()
-            now_s = time.monotonic()
-            heard_s = now_s if raw else heard_s
-            self._note_garbage(raw)
-
-    def _reply(self, link: Link, decoder: Decoder) -> Heard:
-        """Return the reply, or as garbage whatever came instead before patience ended."""
-        deadline_s = time.monotonic() + self._timeout_s
-        while time.monotonic() < deadline_s and not self._stop.is_set():
-            heard = decoder.feed(link.read())
-            pieces = [one for one in heard if isinstance(one, Piece)]
-            if pieces:
-                self._note_garbage(
-                    b"".join(one.raw for one in heard if isinstance(one, Garbage)) + decoder.take_pending()
-                )
-                return pieces[-1]
-            if heard and not decoder.pending:
-                # A whole line that is no reading: asking again is quicker than waiting.
-                return heard[-1]
-        return Garbage(decoder.take_pending(), _INCOMPLETE)
-
-    def _listen(self, link: Link, chunk: bytes) -> None:
-        """Take what comes; only a long time without a reading is an error."""
-        timing, line = self.protocol.timing, self.protocol.line
-        gaps = GapCounter(self.protocol.counter_modulus)
-        # Behind the answer to a start command the stream begins with a whole frame.
-        decoder = Decoder(self.protocol, joining=not (self.protocol.ask.start and self.protocol.ask.start[-1].reply))
-        stamps = StreamStamps(1.0 / self.protocol.fastest_hz(self._baud), self._memory_s)
-        character_s = line.character_s(self._baud)
-        good_s = time.monotonic()
-        garbled, unread, why = 0, b"", ""
-        while not self._stop.is_set():
-            chunk += link.read()
-            seen_s = self._clock()
-            for heard in decoder.feed(chunk) if chunk else ():
-                if isinstance(heard, Garbage):
-                    if not heard.joining:
-                        self._note_garbage(heard.raw)
-                        garbled += max(1, round(len(heard.raw) / self.protocol.frame_characters))
-                        unread, why = (unread + heard.raw)[:256], heard.why
-                    continue
-                missing = gaps.lost_before(heard.reading.counter, self.where)
-                lost = missing if gaps.counts else garbled
-                on_line_s = (heard.after + len(heard.raw)) * character_s + timing.latch_delay_s
-                self._put(replace(heard.reading, t_s=stamps.stamp(seen_s - on_line_s, lost), lost=lost))
-                good_s = time.monotonic()
-                garbled, unread, why = 0, b"", ""
-            chunk = b""
-            if time.monotonic() - good_s > self._timeout_s:
-                raise self._symptom(unread or decoder.pending, why if unread else _INCOMPLETE)
-
-    def _symptom(self, raw: bytes, why: str) -> InstrumentError:
-        if not raw:
-            heard_before = self.tally.readings > 0
-            return symptoms.silence(self.protocol, self.where, self._timeout_s, self._baud, heard_before=heard_before)
-        if why == _INCOMPLETE and symptoms.begins_well(self.protocol, raw):
-            return symptoms.half_line(raw, self.where, self._timeout_s)
-        return symptoms.garbage(self.protocol, self.where, raw, why, self._baud)
-
-    def _note_garbage(self, raw: bytes) -> None:
-        self.tally.garbage_bytes += len(raw)
-        self.tally.garbage = self.tally.garbage or raw
+            # A port that has just appeared may not be ready, or not be ours yet: it is tried again.
+            with suppress(StationError):
+                link = open_link(name, self.protocol.line, baud=self._baud, log=self._log)
+                self._link, self._away = link, True
+                self.tally.reconnected += 1
+                return link, self._begin(link)
+        return None
 
     def _put(self, reading: Reading) -> None:
+        if self._away and self._last_s is not None:
+            # Nobody counted while the cable was out: the clock did.
+            missed = round((reading.t_s - self._last_s) * self.protocol.fastest_hz(self._baud)) - 1
+            reading = replace(reading, lost=max(reading.lost, missed, 1))
+        self._away, self._last_s = False, reading.t_s
         with self._arrived:
             self.tally.readings += 1
             self.tally.lost += reading.lost
@@ -334,6 +279,12 @@ def _command(link: Link, step: Step, patience_s: float) -> bytes:
     came = b""
     deadline_s = time.monotonic() + patience_s
     while step.reply and step.reply not in came:
+        if step.refused and step.refused in came:
+            raise InstrumentError(
+                f"it refuses the command {symptoms.shown(step.send)}",
+                where=link.name,
+                remedy="is it the right instrument and the right profile, and does its display show the actual value?",
+            )
         if time.monotonic() > deadline_s:
             answer = symptoms.shown(came) if came else "nothing"
             raise InstrumentError(

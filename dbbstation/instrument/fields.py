@@ -5,32 +5,43 @@ instrument therefore cannot disagree about a protocol.
 
     literal    fixed bytes: head, separator, line end
     sign       the sign of the length, apart from its digits
-    decimal    a number in text
-    integer    a whole number: binary, tagged bytes, packed BCD, or hexadecimal text
-    float      IEEE 754
     choice     one of several codes, each with a unit or a status
     flags      one byte of status bits
-    checksum   over what precedes it
     skip       bytes that say nothing of the length
+
+Further kinds stand in `numbers.py` (decimal, integer, float), `checksum_part.py`, `telling.py` (text, errors) and `frame.py`
+(optional).
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from dbbstation.files.yaml.schema import Schema
-from dbbstation.instrument.checksums import Algorithm, checksum, checksum_bytes
 from dbbstation.instrument.reading import SEVERITY, Status
 
 Unit: TypeAlias = Literal["mm", "um", "nm", "m", "inch", "count"]
 
 
+Reason: TypeAlias = Literal["bytes", "checksum", "counter"]
+"""Why a frame is rejected: its bytes do not fit the grammar, its checksum is wrong, its sample counter is out of order."""
+
+
 class NotUnderstood(ValueError):  # noqa: N818 (it is no error of the program: most garbled bytes end here)
-    """These bytes are not what the grammar says."""
+    """These bytes are not what the grammar says.
+
+    Args:
+        what: is wrong with them.
+        reason: the same in one word, for counting.
+    """
+
+    def __init__(self, what: str, reason: Reason = "bytes") -> None:
+        self.reason: Reason = reason
+        super().__init__(what)
 
 
 class NotRepresentable(ValueError):  # noqa: N818 (the device meets this too, and reports overrange)
@@ -62,6 +73,7 @@ class Found:
         unit: None: the unit that the protocol declares.
         counter: sample counter.
         status, said, remedy: the worst status that a part reported.
+        text: what the device says in words of its own.
     """
 
     value: float | None = None
@@ -71,6 +83,7 @@ class Found:
     status: Status = "ok"
     said: str = ""
     remedy: str = ""
+    text: str = ""
 
     def report(self, status: Status, said: str, remedy: str) -> None:
         """Keep the worst of the statuses."""
@@ -80,11 +93,23 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """What a frame is to say: a signed value in device units, a counter, and the code or bit that speaks of a status."""
+    """What a frame is to say.
+
+    Attributes:
+        value: signed, in device units.
+        counter: of the sample.
+        voice: the code or bit that speaks of a status.
+        features: what the device has switched on, for optional parts.
+    """
 
     value: float
     counter: int = 0
     voice: Code | Bit | None = None
+    features: tuple[str, ...] = ()
+
+    def of(self, value: float) -> Content:
+        """Return the same with another value."""
+        return replace(self, value=value)
 
 
 class Code(Schema):
@@ -226,34 +251,6 @@ class Flags(Schema):
     def write(self, content: Content) -> bytes:
         """Return the base, with the bit of the status to report turned over."""
         return bytes([self.base ^ sum(1 << bit.bit for bit in self.bits if bit is content.voice)])
-
-
-class Checksum(Schema):
-    """A checksum over everything before it, less the first `after` bytes of the frame."""
-
-    kind: Literal["checksum"]
-    algorithm: Algorithm
-    after: int = Field(default=0, ge=0)
-    written: Literal["binary", "hex", "HEX"] = "binary"
-    order: Literal["big", "little"] = "big"
-
-    @property
-    def width(self) -> int:
-        """Bytes."""
-        return checksum_bytes(self.algorithm) * (1 if self.written == "binary" else 2)
-
-    def pattern(self) -> bytes:
-        """Return the regular expression of any checksum."""
-        digit = {"binary": b"[\\x00-\\xff]", "hex": b"[0-9a-f]", "HEX": b"[0-9A-F]"}[self.written]
-        return digit + b"{%d}" % self.width
-
-    def over(self, before: bytes) -> bytes:
-        """Return the checksum as it stands on the wire, `before` being all that precedes it in the frame."""
-        raw = checksum(self.algorithm, before[self.after :]).to_bytes(checksum_bytes(self.algorithm), self.order)
-        if self.written == "binary":
-            return raw
-        text = raw.hex().encode()
-        return text.upper() if self.written == "HEX" else text
 
 
 class Skip(Schema):

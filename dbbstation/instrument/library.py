@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import looked_up
+from dbbstation.catalogue import looked_up, nearest
 from dbbstation.errors import InputError, InstrumentError, Problem
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml.schema import validate
 from dbbstation.files.yaml.text import load_yaml
-from dbbstation.instrument.protocol import Protocol
+from dbbstation.instrument.profiles import ProtocolFile, variant
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.protocol import Protocol
 
 HOW_TO_ADD = "or give a .yaml file of your own"
 """What a name that nobody knows may lack."""
@@ -25,20 +29,62 @@ def known_instruments(folder: Path | None = None) -> list[str]:
     return sorted(path.stem for path in (folder or instruments_folder()).glob("*.yaml"))
 
 
-def load_instrument(name_or_file: str | Path) -> Protocol:
+def load_instrument(name_or_file: str | Path, profile: str | None = None) -> Protocol:
     """Return the protocol of a shipped instrument, or of a file (a name that ends in `.yaml`).
 
+    Args:
+        name_or_file: of the instrument.
+        profile: variant of the device; the usual one where none is named.
+
     Raises:
-        InstrumentError: no instrument of that name.
+        InstrumentError: no instrument of that name, or no such profile.
         InputError: the file cannot be read or is wrong; every fault is listed with line and column.
     """
+    return read_protocol(_file_of(name_or_file), profile)
+
+
+def load_variants(name_or_file: str | Path) -> list[Protocol]:
+    """Return every variant of an instrument, the usual one first.
+
+    Raises:
+        InstrumentError, InputError: as `load_instrument`.
+    """
+    variants = _read(_file_of(name_or_file))
+    return list(variants.values())
+
+
+def _file_of(name_or_file: str | Path) -> Path:
     path = Path(name_or_file)
     if path.suffix in {".yaml", ".yml"}:
-        return read_protocol(path)
+        return path
     files = {name: instruments_folder() / f"{name}.yaml" for name in known_instruments()}
-    return read_protocol(
-        looked_up(str(name_or_file), files, called="instrument", error=InstrumentError, how_to_add=HOW_TO_ADD)
-    )
+    return looked_up(str(name_or_file), files, called="instrument", error=InstrumentError, how_to_add=HOW_TO_ADD)
+
+
+def with_zero(protocol: Protocol, zero_mm: float | None) -> Protocol:
+    """Return the protocol of a device that shows how far it is from its zero, with the length at which it shows zero.
+
+    Args:
+        protocol: of any device.
+        zero_mm: distance of the ball centres at which it shows zero; None where the device shows whole lengths.
+
+    Raises:
+        InstrumentError: a relative device without a zero, or a zero for one that shows whole lengths.
+    """
+    if protocol.length.relative == (zero_mm is not None):
+        return protocol if zero_mm is None else _at_zero(protocol, zero_mm)
+    if zero_mm is None:
+        what = "it shows how far the bar is from its zero, and nobody says how long the bar is there"
+        raise InstrumentError(what, where=protocol.label, remedy="give the calibrated length with --zero-mm")
+    what = "it shows whole lengths, and has no zero to be added"
+    raise InstrumentError(what, where=protocol.label, remedy="leave out --zero-mm; preset the device on the calibrator")
+
+
+def _at_zero(protocol: Protocol, zero_mm: float) -> Protocol:
+    length = protocol.length
+    low_mm, high_mm = length.range_mm
+    moved = {"zero_mm": zero_mm, "range_mm": (low_mm + zero_mm, high_mm + zero_mm)}
+    return protocol.model_copy(update={"length": length.model_copy(update=moved)})
 
 
 def at_rate(protocol: Protocol, rate_hz: float | None) -> Protocol:
@@ -48,18 +94,39 @@ def at_rate(protocol: Protocol, rate_hz: float | None) -> Protocol:
     return protocol.model_copy(update={"timing": protocol.timing.model_copy(update={"rate_hz": rate_hz})})
 
 
-def read_protocol(path: Path) -> Protocol:
-    """Return the protocol in the file `path`.
+def read_protocol(path: Path, profile: str | None = None) -> Protocol:
+    """Return the protocol in the file `path`, of one profile or of the usual one.
 
     Raises:
+        InstrumentError: the file has no such profile.
         InputError: the file cannot be read or is wrong; every fault is listed with line and column.
+    """
+    variants = _read(path)
+    first = next(iter(variants.values()))
+    if not profile:
+        return first
+    if profile not in variants:
+        names = [name for name in variants if name]
+        remedy = nearest(profile, names) if names else "leave out --profile: its file has none"
+        raise InstrumentError(f"{first.name} has no profile {profile!r}", remedy=remedy)
+    return variants[profile]
+
+
+def _read(path: Path) -> dict[str, Protocol]:
+    """Every variant of a file by the name of its profile, the usual one first; all of them are checked.
+
+    Raises:
+        InputError: every fault with line and column.
     """
     faults: list[Problem] = []
     document = load_yaml(path, faults)
-    protocol = validate(document, Protocol, faults) if document is not None else None
-    if document is not None and protocol is not None and protocol.name != path.stem:
-        remedy = f"rename the file to {protocol.name}.yaml or change the name in it"
-        faults.append(document.problem(("name",), f"the name {protocol.name!r} is not the file's", remedy))
-    if protocol is None or faults:
+    file = validate(document, ProtocolFile, faults) if document is not None else None
+    if document is None or file is None:
         raise InputError(faults)
-    return protocol
+    if file.name != path.stem:
+        remedy = f"rename the file to {file.name}.yaml or change the name in it"
+        faults.append(document.problem(("name",), f"the name {file.name!r} is not the file's", remedy))
+    variants = {name: variant(document, name, faults) for name in (file.profile, *file.profiles)}
+    if faults:
+        raise InputError(set(faults))
+    return {name: one for name, one in variants.items() if one is not None}

@@ -12,6 +12,7 @@ from serial.tools import list_ports
 from serial.urlhandler.protocol_socket import Serial as SocketPort
 
 from dbbstation.errors import InstrumentError
+from dbbstation.instrument.holders import holders
 
 if TYPE_CHECKING:
     from dbbstation.instrument.bytelog import ByteLog
@@ -54,6 +55,10 @@ class Port(Protocol):
         """Send the bytes."""
 
 
+class LineClosedError(InstrumentError):
+    """The system closed the line while it was in use: an adapter was pulled out, a server hung up."""
+
+
 class Link:
     """An open line to an instrument.
 
@@ -74,7 +79,7 @@ class Link:
         """Return the bytes that have arrived, after waiting a moment for the first; empty where none came.
 
         Raises:
-            InstrumentError: the line is closed.
+            LineClosedError: the line is closed.
         """
         try:
             raw = self._port.read(1)
@@ -104,7 +109,7 @@ class Link:
         """Send bytes.
 
         Raises:
-            InstrumentError: the line is closed.
+            LineClosedError: the line is closed.
         """
         if self._log is not None:
             self._log.note(">", raw)
@@ -115,22 +120,24 @@ class Link:
 
     def close(self) -> None:
         """Close the port if this link opened it."""
-        if not self._owned:
-            return
-        # pyserial forgets to close a socket whose other side hung up: its shutdown fails first.
-        inner = getattr(self._port, "_socket", None)
-        for opened in (self._port, inner):
-            close = getattr(opened, "close", None)
-            if close is not None:
-                with suppress(*_ERRORS):
-                    close()
+        if self._owned:
+            _close_quietly(self._port)
 
-    def _gone(self, error: Exception) -> InstrumentError:
-        return InstrumentError(
+    def _gone(self, error: Exception) -> LineClosedError:
+        return LineClosedError(
             "the line was closed while it was in use",
             where=self.name,
             remedy=f"plug the instrument in again and check its cable and power; the system says: {_first_words(error)}",
         )
+
+
+def _close_quietly(port: object) -> None:
+    # pyserial forgets to close a socket whose other side hung up: its shutdown fails first.
+    for opened in (port, getattr(port, "_socket", None)):
+        close = getattr(opened, "close", None)
+        if close is not None:
+            with suppress(*_ERRORS):
+                close()
 
 
 def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: ByteLog | None = None) -> Link:
@@ -150,6 +157,7 @@ def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: Byt
     speed = baud or line.baud
     # A pseudo-terminal has no bits: asked a second time for parity, the system finds nothing to change and refuses.
     bits = (8, "none", 1) if _is_pseudo_terminal(port) else (line.data_bits, line.parity, line.stop_bits)
+    opened = None
     try:
         opened = serial.serial_for_url(
             port,
@@ -166,6 +174,7 @@ def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: Byt
             opened.exclusive = True
         opened.open()
     except _OPENING_ERRORS as error:
+        _close_quietly(opened)
         raise _not_opened(port, speed, error) from None
     return Link(opened, name=port, owned=True, log=log)
 
@@ -192,8 +201,10 @@ def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:
         remedy = f"connected are {names}" if names else "no serial port is connected: plug the adapter in"
         return InstrumentError("there is no such port", where=port, remedy=f"{remedy}; see `dbbstation ports`")
     if number in _BUSY or "access is denied" in words:
+        who = ", ".join(holders(port))
         remedy = "close the other program, for example a second monitor or a terminal program"
-        return InstrumentError("another program has the port open", where=port, remedy=remedy)
+        what = f"another program has the port open{f': {who}' if who else ''}"
+        return InstrumentError(what, where=port, remedy=remedy)
     if number in {errno.EACCES, errno.EPERM}:
         remedy = f"add yourself to the group that owns it ({_group(port)}) and log in again"
         return InstrumentError("no permission to open the port", where=port, remedy=remedy)

@@ -26,11 +26,14 @@ class Number(Schema):
     Attributes:
         of: what it counts.
         modulus: of a counter: it starts again from 0 there.
+        scale: of a length: what one on the wire stands for, in the length's unit; 0.0001 where a device leaves out the
+            decimal point of four decimals.
         specials: contents that are no number.
     """
 
     of: Literal["length", "counter"] = "length"
     modulus: int | None = Field(default=None, ge=2)
+    scale: float = Field(default=1.0, gt=0.0)
     specials: tuple[Code, ...] = ()
 
     @model_validator(mode="after")
@@ -56,7 +59,7 @@ class Number(Schema):
                 return
         value = self._parsed(raw)
         if self.of == "length":
-            found.value = value
+            found.value = self._times(value, self.scale)
         else:
             found.counter = int(value)
 
@@ -69,7 +72,18 @@ class Number(Schema):
         for special in self.specials:
             if special is content.voice:
                 return special.code
-        return self._written(content.value if self.of == "length" else content.counter % (self.modulus or 1))
+        if self.of == "counter":
+            return self._written(content.counter % (self.modulus or 1))
+        return self._written(self._times(content.value, 1.0 / self.scale))
+
+    def as_read(self, value: float) -> float:
+        """Return what is left of a length after writing and reading it, in the length's unit."""
+        return self._times(self.rounded(self._times(value, 1.0 / self.scale)), self.scale)
+
+    @staticmethod
+    def _times(value: float, factor: float) -> float:
+        # Twelve digits: 1500003 times 0.0001 is 150.0003, not 150.00030000000001; no gauge has more.
+        return value if factor == 1.0 else float(f"{value * factor:.12g}")
 
     def rounded(self, value: float) -> float:
         """Return what is left of `value` after writing and reading it, so that a sign can be written before it."""
@@ -94,6 +108,8 @@ class DecimalText(Number):
         point: the decimal point.
         pad: what fills the width on the left.
         signed: the sign stands in this field; `plus` is what a positive number has there.
+        min_width: of a number of free width: blanks fill it up on the left.
+        leading_zero: whether the device writes 0 before the point of a number below one.
     """
 
     kind: Literal["decimal"]
@@ -105,6 +121,8 @@ class DecimalText(Number):
     pad: Literal[" ", "0"] = " "
     signed: bool = False
     plus: Literal["", "+", " "] = ""
+    min_width: int = Field(default=0, ge=0)
+    leading_zero: bool = True
 
     @model_validator(mode="after")
     def _specials_fit(self) -> Self:
@@ -139,8 +157,10 @@ class DecimalText(Number):
         if value < 0 and not self.signed:
             raise NotRepresentable("the wire has no sign for a negative number")
         body = f"{abs(value):.{self.decimals}f}".replace(".", self.point)
+        if not self.leading_zero and self.decimals:
+            body = body.removeprefix("0")
         sign = ("-" if value < 0 else self.plus) if self.signed else ""
-        width = self.width or 0
+        width = self.width or self.min_width
         text = sign + body.rjust(width - len(sign), "0") if self.pad == "0" else (sign + body).rjust(width)
         if len(text) > (self.width or self.max_width):
             raise NotRepresentable(f"{text} is wider than {self.width or self.max_width} characters")

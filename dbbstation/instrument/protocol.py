@@ -1,44 +1,35 @@
-"""The wire protocol of a length instrument, `dbb-instrument/2`: what one YAML file in `protocols/instruments` says.
+"""The wire protocol of a length instrument, `dbb-instrument/3`: what one YAML file in `protocols/instruments` says.
 
 Protocol
 ├── line       baud rate, bits, parity, stop bits, flow control
-├── ask        how a reading is obtained: asked for each time, or streaming; commands to start and to stop
+├── ask        how a reading is obtained: asked for each time, or streaming; commands to start and to stop; the request that
+│              follows an error
+├── reply      what all replies begin and end with
 ├── length     unit, sense, range
 ├── frames     what comes over the wire: one frame that carries the length, others that are messages
-└── timing     latency, rate, patience
+├── timing     latency, rate, patience
+└── profiles   variants of the device: what each has instead
 """
 
 from __future__ import annotations
 
-import re
-from functools import cached_property
-from typing import Annotated, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 
 from dbbstation.files.yaml.schema import Schema
-from dbbstation.instrument.fields import (
-    Bit,
-    Bytes,
-    Checksum,
-    Choice,
-    Code,
-    Content,
-    Flags,
-    Found,
-    Literally,
-    NotRepresentable,
-    NotUnderstood,
-    Sign,
-    Skip,
-    Unit,
-)
-from dbbstation.instrument.numbers import DecimalText, Ieee, Integer
+from dbbstation.instrument.fields import Bytes, Content, Literally, Unit
+from dbbstation.instrument.frame import Frame  # noqa: TC001 (pydantic needs it at run time)
 from dbbstation.instrument.reading import SEVERITY, Status
 
-Part: TypeAlias = Annotated[
-    Literally | Sign | DecimalText | Integer | Ieee | Choice | Flags | Checksum | Skip, Field(discriminator="kind")
-]
+if TYPE_CHECKING:
+    from dbbstation.instrument.fields import Bit, Code
+
+Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9.-]*$")]
+"""Of an instrument or a profile: small letters, digits, hyphens, points."""
+
+_NEWER_WORDS = {"poll", "latch", "text", "errors", "optional"}
+"""Modes and kinds of parts that came with the third version of the format."""
 
 _MM_PER_UNIT: dict[Unit, float] = {"mm": 1.0, "um": 1e-3, "nm": 1e-6, "m": 1e3, "inch": 25.4}
 
@@ -63,34 +54,98 @@ class Line(Schema):
         return self.bits_per_character / (baud or self.baud)
 
     @property
+    def bits_text(self) -> str:
+        """What a character is made of, for example `7 data bits, even parity, 2 stop bits`."""
+        stop = f"{self.stop_bits} stop bit" + ("s" if self.stop_bits > 1 else "")
+        parity = "no" if self.parity == "none" else self.parity
+        return f"{self.data_bits} data bits, {parity} parity, {stop}"
+
+    @property
     def text(self) -> str:
         """The settings as people say them, for example `9600 baud, 7 data bits, even parity, 2 stop bits`."""
-        stop = f"{self.stop_bits} stop bit" + ("s" if self.stop_bits > 1 else "")
         flow = "" if self.flow == "none" else f", flow control {self.flow}"
-        return f"{self.baud} baud, {self.data_bits} data bits, {self.parity} parity, {stop}{flow}"
+        return f"{self.baud} baud, {self.bits_text}{flow}"
 
 
 class Step(Schema):
-    """One command of a start or stop sequence: bytes sent, the answer waited for, a rest afterwards."""
+    """One command of a start or stop sequence: bytes sent, the answer waited for, a rest afterwards.
+
+    Attributes:
+        refused: the answer of a device that does not know the command or does not allow it.
+    """
 
     send: Bytes = Field(min_length=1)
     reply: Bytes = b""
+    refused: Bytes = b""
     wait_s: float = Field(default=0.0, ge=0.0, le=30.0)
 
 
-class Ask(Schema):
-    """How a reading is obtained: `request` before each, or the device streams by itself once it is started."""
+class FollowUp(Schema):
+    """What is asked once after a fault, to hear what it is in the device's own words.
 
-    mode: Literal["request", "stream"]
+    Attributes:
+        request: bytes sent.
+        frames: the first is the answer while there is a fault, others that there is nothing to tell. All are messages.
+    """
+
+    request: Bytes = Field(min_length=1)
+    frames: tuple[Frame, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _messages(self) -> FollowUp:
+        fault = next(filter(None, (frame.fault() for frame in self.frames)), "")
+        if fault or not all(frame.is_message for frame in self.frames):
+            raise ValueError(fault or "what follows a fault is a message, and carries no length")
+        return self
+
+
+class Ask(Schema):
+    """How a reading is obtained.
+
+    Attributes:
+        mode: `poll`: `request` before each; the device takes the length whenever it likes before it replies. `latch`: the
+            request makes it take the length, within `timing.latch_bounds_s`. `stream`: it sends by itself once it is
+            started. `request` is the name that `latch` had in older files.
+        request: bytes.
+        request_end: what every request, command and follow-up ends with.
+        start, stop: commands.
+        follow_up: what is asked after a fault.
+    """
+
+    mode: Literal["request", "poll", "latch", "stream"]
     request: Bytes = b""
+    request_end: Bytes = b""
     start: tuple[Step, ...] = ()
     stop: tuple[Step, ...] = ()
+    follow_up: FollowUp | None = None
 
     @model_validator(mode="after")
     def _request_fits(self) -> Ask:
-        if (self.mode == "request") != bool(self.request):
+        if self.asked != bool(self.request):
             raise ValueError("mode request has request bytes, mode stream has none")
+        if self.follow_up is not None and not self.asked:
+            raise ValueError("a device that streams is not asked, not even after a fault")
         return self
+
+    @property
+    def asked(self) -> bool:
+        """Whether each reading is asked for."""
+        return self.mode != "stream"
+
+
+class Reply(Schema):
+    """What all replies have in common, so that a profile changes it in one place."""
+
+    prefix: Bytes = b""
+    end: Bytes = b""
+
+    def around(self, frame: Frame) -> Frame:
+        """Return a frame with prefix and end as parts of it; a bare one as it is."""
+        if frame.bare:
+            return frame
+        before = (Literally(kind="literal", value=self.prefix),) if self.prefix else ()
+        after = (Literally(kind="literal", value=self.end),) if self.end else ()
+        return frame.model_copy(update={"parts": (*before, *frame.parts, *after)})
 
 
 class Length(Schema):
@@ -102,6 +157,8 @@ class Length(Schema):
         sense: -1 where the number falls when the balls move apart.
         range_mm: lengths outside are reported as overrange.
         stroke_mm: travel of the gauge from the bar's calibrated length, either way; circles of other radii are refused.
+        relative: the device shows how far it is from its zero, because its display has no room for the bar's length.
+        zero_mm: distance of the ball centres at which a relative device shows zero.
     """
 
     unit: Unit = "mm"
@@ -109,6 +166,8 @@ class Length(Schema):
     sense: Literal[1, -1] = 1
     range_mm: tuple[float, float]
     stroke_mm: float | None = Field(default=None, gt=0.0)
+    relative: bool = False
+    zero_mm: float = 0.0
 
     @model_validator(mode="after")
     def _count_has_size(self) -> Length:
@@ -116,6 +175,8 @@ class Length(Schema):
             raise ValueError("unit count, and only it, needs mm_per_count")
         if self.range_mm[0] >= self.range_mm[1]:
             raise ValueError("range_mm is [lowest, highest]")
+        if self.zero_mm and not self.relative:
+            raise ValueError("zero_mm goes with relative: true")
         return self
 
     def mm_per_unit(self, unit: Unit | None = None) -> float:
@@ -123,122 +184,15 @@ class Length(Schema):
         return self.sense * (self.mm_per_count or _MM_PER_UNIT[unit or self.unit])
 
 
-class Frame(Schema):
-    """One kind of frame: parts in wire order. A frame without a length is a message, and says what it means."""
-
-    name: str = "reading"
-    status: Status = "ok"
-    means: str = ""
-    remedy: str = ""
-    parts: tuple[Part, ...] = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _makes_sense(self) -> Frame:
-        kinds = [part.of for part in self.parts if isinstance(part, DecimalText | Integer | Ieee)]
-        if kinds.count("length") > 1 or kinds.count("counter") > 1:
-            raise ValueError("a frame has at most one length and one counter")
-        if "length" not in kinds and (self.status == "ok" or not self.means):
-            raise ValueError("a frame without a length is a message: give it a status that is not ok, and means")
-        return self
-
-    @property
-    def number(self) -> DecimalText | Integer | Ieee | None:
-        """The part that carries the length."""
-        return self._number_of("length")
-
-    @property
-    def counter(self) -> DecimalText | Integer | Ieee | None:
-        """The part that carries the sample counter."""
-        return self._number_of("counter")
-
-    def _number_of(self, what: str) -> DecimalText | Integer | Ieee | None:
-        parts = (part for part in self.parts if isinstance(part, DecimalText | Integer | Ieee) and part.of == what)
-        return next(parts, None)
-
-    @property
-    def width(self) -> int | None:
-        """Bytes of the frame, None where they vary."""
-        widths = [part.width for part in self.parts]
-        return None if None in widths else sum(width for width in widths if width is not None)
-
-    @property
-    def terminator(self) -> bytes:
-        """The fixed bytes at its end, empty where it ends otherwise."""
-        last = self.parts[-1]
-        return last.value if isinstance(last, Literally) else b""
-
-    @property
-    def binary(self) -> bool:
-        """Whether bytes inside can look like a line end by chance."""
-        return any(
-            isinstance(part, Flags)
-            or (isinstance(part, DecimalText | Integer | Ieee) and part.binary)
-            or (isinstance(part, Checksum) and part.written == "binary")
-            for part in self.parts
-        )
-
-    @cached_property
-    def pattern(self) -> re.Pattern[bytes]:
-        """The whole frame as a regular expression, one group per part."""
-        return re.compile(b"".join(b"(" + part.pattern() + b")" for part in self.parts))
-
-    @property
-    def voices(self) -> tuple[Code | Bit, ...]:
-        """Every code and bit with which this frame can speak of a status."""
-        found: list[Code | Bit] = []
-        for part in self.parts:
-            if isinstance(part, Choice):
-                found += part.codes
-            elif isinstance(part, Flags):
-                found += part.bits
-            elif isinstance(part, DecimalText | Integer | Ieee):
-                found += part.specials
-        return tuple(voice for voice in found if voice.status != "ok")
-
-    def read(self, match: re.Match[bytes]) -> Found:
-        """Return what a match of `pattern` says.
-
-        Raises:
-            NotUnderstood: the characters are right but a number or the checksum is not.
-        """
-        found = Found()
-        found.report(self.status, self.means, self.remedy)
-        for group, part in enumerate(self.parts, start=1):
-            if isinstance(part, Checksum):
-                should = part.over(match.string[match.start() : match.start(group)])
-                if match[group] != should:
-                    raise NotUnderstood(f"checksum {match[group].hex(' ')} instead of {should.hex(' ')}")
-            else:
-                part.read(match[group], found)
-        return found
-
-    def write(self, content: Content) -> bytes:
-        """Return the frame as bytes.
-
-        Raises:
-            NotRepresentable: a number does not fit.
-        """
-        number = self.number
-        value = (number.rounded(content.value) if number else 0.0) + 0.0
-        content = Content(value, content.counter, content.voice)
-        unsigned = Content(abs(value), content.counter, content.voice)
-        has_sign = any(isinstance(part, Sign) for part in self.parts)
-        raw = b""
-        for part in self.parts:
-            if isinstance(part, Checksum):
-                raw += part.over(raw)
-            else:
-                raw += part.write(content if isinstance(part, Sign) or not has_sign else unsigned)
-        return raw
-
-
 class Timing(Schema):
     """When things happen.
 
     Attributes:
-        latch_delay_s: request: from the end of the request to the moment the device takes the length. Stream: from that
+        latch_delay_s: asked: from the end of the request to the moment the device takes the length. Stream: from that
             moment to the first byte of the frame.
-        reply_latency_s: from the end of the request to the first byte of the reply.
+        latch_bounds_s: asked: the earliest and the latest moment of taking the length after the end of the request, where
+            the manual has them; instead of `latch_delay_s`.
+        reply_latency_s: from the end of the request to the first byte of the reply, at the latest.
         rate_hz: readings per second: of a stream the nominal rate, of requests the most the device stands. None: as
             fast as replies come.
         timeout_s: patience before the line counts as silent.
@@ -246,10 +200,20 @@ class Timing(Schema):
     """
 
     latch_delay_s: float = Field(default=0.0, ge=0.0, le=1.0)
+    latch_bounds_s: tuple[float, float] | None = None
     reply_latency_s: float = Field(default=0.0, ge=0.0, le=10.0)
     rate_hz: float | None = Field(default=None, gt=0.0)
     timeout_s: float = Field(gt=0.0, le=60.0)
     retries: int = Field(default=2, ge=0, le=10)
+
+    @model_validator(mode="after")
+    def _bounds_in_order(self) -> Timing:
+        if self.latch_bounds_s is None:
+            return self
+        earliest_s, latest_s = self.latch_bounds_s
+        if not 0.0 <= earliest_s <= latest_s or self.latch_delay_s:
+            raise ValueError("latch_bounds_s is [earliest, latest] from 0, and stands instead of latch_delay_s")
+        return self
 
 
 class Reference(Schema):
@@ -261,39 +225,73 @@ class Reference(Schema):
 
 
 class Protocol(Schema):
-    """A whole protocol file.
+    """A whole protocol.
 
     Attributes:
         name: what it is called on the command line; the file's name without `.yaml`.
         title: what it is.
+        profile: which variant of the device this is; empty where the file has no variants.
         setup: what the operator sets on the device.
         references: manual pages.
+        features: what the virtual instrument has switched on, of the features that optional parts name.
     """
 
-    format: Literal["dbb-instrument/1", "dbb-instrument/2"]
+    format: Literal["dbb-instrument/1", "dbb-instrument/2", "dbb-instrument/3"]
     name: str = Field(pattern=r"^[a-z0-9][a-z0-9-]*$")
     title: str = Field(min_length=1)
+    profile: Name | Literal[""] = ""
     setup: tuple[str, ...] = ()
     references: tuple[Reference, ...] = ()
+    features: tuple[str, ...] = ()
     line: Line
     ask: Ask
+    reply: Reply = Reply()
     length: Length
     frames: tuple[Frame, ...] = Field(min_length=1)
     timing: Timing
 
     @model_validator(mode="after")
     def _frames_can_be_told_apart(self) -> Protocol:
-        if self.frames[0].number is None or any(frame.number is not None for frame in self.frames[1:]):
+        fault = next(filter(None, (frame.fault() for frame in self.frames)), "")
+        if fault:
+            raise ValueError(fault)
+        if self.frames[0].is_message or not all(frame.is_message for frame in self.frames[1:]):
             raise ValueError("the first frame, and only the first, carries the length")
-        if not self.by_width and not self.terminator:
+        whole = self.whole()
+        if not whole.by_width and not whole.terminator:
             raise ValueError(
                 "every frame ends in the same literal, or every frame has a fixed width: otherwise nobody knows where one ends"
             )
-        if self.line.data_bits == 7 and any(frame.binary for frame in self.frames):  # noqa: PLR2004 (bits)
+        if self.line.data_bits == 7 and any(frame.binary for frame in whole.frames):  # noqa: PLR2004 (bits)
             raise ValueError("binary parts need 8 data bits")
         if self.ask.mode == "stream" and self.timing.rate_hz is None:
             raise ValueError("a stream needs timing.rate_hz")
+        kinds = {part.kind for frame in self.frames for part in frame.parts}
+        newer = sorted(_NEWER_WORDS & (kinds | {self.ask.mode}))
+        if newer and self.format < "dbb-instrument/3":
+            raise ValueError(f"`{newer[0]}` came with dbb-instrument/3: write `format: dbb-instrument/3`")
         return self
+
+    def whole(self) -> Protocol:
+        """Return the same with what requests and replies have in common written into each of them."""
+        ask, end = self.ask, self.ask.request_end
+        steps = {
+            key: tuple(step.model_copy(update={"send": step.send + end}) for step in getattr(ask, key))
+            for key in ("start", "stop")
+        }
+        follow_up = ask.follow_up
+        if follow_up is not None:
+            told = tuple(map(self.reply.around, follow_up.frames))
+            follow_up = follow_up.model_copy(update={"request": follow_up.request + end, "frames": told})
+        request = ask.request + end if ask.request else b""
+        asking = {"request": request, "request_end": b"", "follow_up": follow_up, **steps}
+        frames = tuple(map(self.reply.around, self.frames))
+        return self.model_copy(update={"ask": ask.model_copy(update=asking), "frames": frames, "reply": Reply()})
+
+    @property
+    def label(self) -> str:
+        """Name and profile, as people are told."""
+        return f"{self.name} (profile {self.profile})" if self.profile else self.name
 
     @property
     def by_width(self) -> bool:
@@ -303,8 +301,8 @@ class Protocol(Schema):
 
     @property
     def terminator(self) -> bytes:
-        """The line end that all frames share, empty where they have none."""
-        ends = {frame.terminator for frame in self.frames}
+        """The line end that all frames share but bare ones, empty where they have none."""
+        ends = {frame.terminator for frame in self.frames if not frame.bare}
         return ends.pop() if len(ends) == 1 else b""
 
     @property
@@ -313,32 +311,55 @@ class Protocol(Schema):
         counter = self.frames[0].counter
         return counter.modulus if counter else None
 
+    @property
+    def explaining(self) -> Protocol | None:
+        """The protocol of the answers to the follow-up of a fault; None where nothing is asked then."""
+        follow_up = self.ask.follow_up
+        return None if follow_up is None else self.model_copy(update={"frames": follow_up.frames})
+
+    @property
+    def has_checksum(self) -> bool:
+        """Whether a wrong digit in a reading is noticed."""
+        return any(part.kind == "checksum" for part in self.frames[0].parts)
+
     def voice(self, status: Status) -> tuple[Frame, Code | Bit | None] | None:
         """Return how the device says `status`: a code in its reading, or else a message; None where it cannot."""
-        reading = self.frames[0]
-        for voice in reading.voices:
-            if voice.status == status:
-                return reading, voice
+        for frame in self.frames:
+            for voice in frame.voices:
+                if voice.status == status:
+                    return frame, voice
         return next(((frame, None) for frame in self.frames[1:] if frame.status == status), None)
 
     @property
     def statuses(self) -> tuple[Code | Bit | Frame, ...]:
         """Everything the device can say that is not ok, the worst first."""
-        said = [*self.frames[0].voices, *self.frames[1:]]
+        said: list[Code | Bit | Frame] = list(self.frames[0].voices)
+        for frame in self.frames[1:]:
+            said += frame.voices or (frame,)
         return tuple(sorted(said, key=lambda one: -SEVERITY[one.status]))
 
     @property
     def frame_characters(self) -> int:
         """Characters of a typical reading on the wire."""
-        return len(self.frames[0].write(Content(0.0))) if self.frames[0].width is None else self.frames[0].width
+        width = self.frames[0].width
+        return len(self.frames[0].write(Content(0.0, features=self.features))) if width is None else width
 
     def fastest_hz(self, baud: int | None = None) -> float:
         """Return the most readings per second that the line carries, latency included; at most `rate_hz`."""
         character_s = self.line.character_s(baud)
         one_s = self.frame_characters * character_s
-        if self.ask.mode == "request":
+        if self.ask.asked:
             one_s += len(self.ask.request) * character_s + self.timing.reply_latency_s
         return min(1.0 / one_s, self.timing.rate_hz or float("inf"))
 
+    def latch_bounds_s(self) -> tuple[float, float]:
+        """Earliest and latest moment at which the device takes the length, from the end of the request [s].
 
-__all__ = ["NotRepresentable", "NotUnderstood", "Part", "Protocol"]
+        Without bounds in the file a device that is polled takes it anywhere before its reply begins.
+        """
+        timing = self.timing
+        if timing.latch_bounds_s is not None:
+            return timing.latch_bounds_s
+        if self.ask.mode == "poll":
+            return 0.0, timing.reply_latency_s
+        return timing.latch_delay_s, timing.latch_delay_s

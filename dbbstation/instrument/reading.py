@@ -24,6 +24,9 @@ class Reading:
         counter: the device's own sample counter, None where its wire has none.
         said: what the device said where `status` is not `ok`.
         remedy: what to do about it.
+        t_uncertainty_s: standard uncertainty of `t_s` where the request bounds it [s]; None of a stream, whose clock does
+            better than its bounds.
+        first_byte_s: host time at which the first byte had arrived at the latest, by the clock of `t_s` [s]; 0 without.
     """
 
     t_s: float
@@ -33,3 +36,5 @@ class Reading:
     counter: int | None = None
     said: str = ""
     remedy: str = ""
+    t_uncertainty_s: float | None = None
+    first_byte_s: float = 0.0

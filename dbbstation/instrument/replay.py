@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError
-from dbbstation.instrument.codec import Decoder, GapCounter, Garbage
+from dbbstation.instrument.codec import Decoder, Piece
+from dbbstation.instrument.sequence import Sequence
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -36,32 +37,70 @@ class Replayed:
 def replayed(protocol: Protocol, chunks: Iterable[Chunk], *, where: str) -> Iterator[Replayed]:
     """Yield readings and everything not understood, in wire order.
 
-    Answers to commands of the start and stop sequence are left out: they are no readings, and understood. So is a
-    reading whose counter makes no sense: the driver stops there, a replay goes on and says so.
+    Answers to commands of the start and stop sequence and to what is asked after a fault are left out: they are no readings,
+    and understood. Where the device restarted the driver stops; a replay goes on and says so.
     """
-    answers = {step.reply for step in (*protocol.ask.start, *protocol.ask.stop) if step.reply}
-    asked = protocol.ask.mode == "request"
-    decoder = Decoder(protocol, joining=not asked)
-    gaps = GapCounter(protocol.counter_modulus)
-    last_s = 0.0
+    decoding = _Decoding(protocol, where)
     for chunk in chunks:
-        if chunk.direction == ">":
-            unfinished = decoder.take_pending() if asked else b""
-            if unfinished and unfinished not in answers:
-                yield Replayed(last_s, unfinished, None, "no end before the next request")
-            continue
-        last_s = chunk.t_s
-        for heard in decoder.feed(chunk.raw):
-            if isinstance(heard, Garbage):
-                if heard.raw not in answers:
-                    yield Replayed(last_s, heard.raw, None, "joined in the middle" if heard.joining else heard.why)
-                continue
-            try:
-                lost = gaps.lost_before(heard.reading.counter, where)
-            except InstrumentError as error:
-                yield Replayed(last_s, heard.raw, None, error.what)
-                continue
-            yield Replayed(last_s, heard.raw, replace(heard.reading, t_s=last_s, lost=lost))
-    unfinished = decoder.take_pending()
-    if unfinished and unfinished not in answers:
-        yield Replayed(last_s, unfinished, None, "the log ends within it")
+        yield from decoding.sent(chunk.raw) if chunk.direction == ">" else decoding.came(chunk)
+    yield from decoding.ended()
+
+
+class _Decoding:
+    """What a log has said so far."""
+
+    def __init__(self, protocol: Protocol, where: str) -> None:
+        self._protocol = protocol
+        self._where = where
+        self._answers = {step.reply for step in (*protocol.ask.start, *protocol.ask.stop) if step.reply}
+        self._decoder = Decoder(protocol, joining=not protocol.ask.asked)
+        self._sequence = self._anew()
+        self._explaining = False
+        self._last_s = 0.0
+
+    def sent(self, raw: bytes) -> Iterator[Replayed]:
+        """Take bytes that went to the device: the reply before them is over."""
+        if not self._protocol.ask.asked:
+            return
+        yield from self._unfinished("no end before the next request")
+        follow_up = self._protocol.ask.follow_up
+        self._explaining = follow_up is not None and raw == follow_up.request
+        told = self._protocol.explaining if self._explaining else None
+        self._decoder = Decoder(told or self._protocol, joining=False)
+
+    def came(self, chunk: Chunk) -> Iterator[Replayed]:
+        """Take bytes that came from the device."""
+        self._last_s = chunk.t_s
+        for heard in self._decoder.feed(chunk.raw):
+            if isinstance(heard, Piece):
+                if not self._explaining:
+                    yield from self._placed(heard)
+            elif heard.raw not in self._answers:
+                yield Replayed(chunk.t_s, heard.raw, None, "joined in the middle" if heard.joining else heard.why)
+
+    def ended(self) -> Iterator[Replayed]:
+        """Return what is left at the end of the log."""
+        for one in self._sequence.left():
+            yield Replayed(one.sample[1], one.sample[0].raw, None, one.why)
+        yield from self._unfinished("the log ends within it")
+
+    def _placed(self, heard: Piece) -> Iterator[Replayed]:
+        try:
+            placed = self._sequence.place(heard.reading.counter, (heard, self._last_s))
+        except InstrumentError as error:
+            for one in self._sequence.left():
+                yield Replayed(one.sample[1], one.sample[0].raw, None, error.what)
+            self._sequence = self._anew()
+            placed = self._sequence.place(heard.reading.counter, (heard, self._last_s))
+        for one in placed:
+            piece, t_s = one.sample
+            told = None if one.lost is None else replace(piece.reading, t_s=t_s, lost=one.lost)
+            yield Replayed(t_s, piece.raw, told, one.why)
+
+    def _unfinished(self, why: str) -> Iterator[Replayed]:
+        raw = self._decoder.take_pending()
+        if raw and raw not in self._answers:
+            yield Replayed(self._last_s, raw, None, why)
+
+    def _anew(self) -> Sequence[tuple[Piece, float]]:
+        return Sequence(self._protocol.counter_modulus, self._where)

@@ -7,9 +7,15 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.codec import Decoder, Piece
 from dbbstation.instrument.fields import Content
+from dbbstation.instrument.recognise import looks_like
 
 if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
+
+_TELLING_BYTES = 12
+
+_OTHERS = 3
+"""Instruments that a message names: the likeliest."""
 
 _SHOWN = 24
 """Bytes that a message shows; a whole line of any instrument at hand fits."""
@@ -26,7 +32,8 @@ def silence(protocol: Protocol, where: str, waited_s: float, baud: int, *, heard
         others = ", ".join(str(rate) for rate in protocol.line.baud_choices if rate != baud)
         remedy = (
             f"is it switched on, is the cable a null-modem one and plugged into this port, is it set to {baud} baud"
-            + (f" (it can also be set to {others})?" if others else "?")
+            + (f" (it can also be set to {others})" if others else "")
+            + f", with {protocol.line.bits_text}?"
         )
     return InstrumentError(what, where=where, remedy=remedy)
 
@@ -43,7 +50,7 @@ def half_line(raw: bytes, where: str, waited_s: float) -> InstrumentError:
 def garbage(protocol: Protocol, where: str, raw: bytes, why: str, baud: int) -> InstrumentError:
     """Return the error for bytes that are no reading, with the likeliest cause."""
     return InstrumentError(
-        f"what comes is not {protocol.name}: {shown(raw)}" + (f" ({why})" if why else ""),
+        f"what comes is not {protocol.label}: {shown(raw)}" + (f" ({why})" if why else ""),
         where=where,
         remedy=_cause(protocol, raw, baud),
     )
@@ -52,7 +59,7 @@ def garbage(protocol: Protocol, where: str, raw: bytes, why: str, baud: int) -> 
 def begins_well(protocol: Protocol, raw: bytes) -> bool:
     """Whether some frame of the protocol could begin with these bytes: tried with the ends of an example."""
     for frame in protocol.frames:
-        example = frame.write(Content(0.0))
+        example = frame.write(Content(0.0, features=protocol.features))
         if any(frame.pattern.fullmatch(raw + example[cut:]) for cut in range(1, len(example))):
             return True
     return False
@@ -69,7 +76,18 @@ def shown(raw: bytes) -> str:
 def _cause(protocol: Protocol, raw: bytes, baud: int) -> str:
     seven_bits = bytes(byte & 0x7F for byte in raw)
     if seven_bits != raw and _holds_reading(protocol, seven_bits):
-        return f"without the highest bit it is a reading: set data bits and parity of the port to {protocol.line.text}"
+        # Seven bits and a parity in eight: the port is set to eight, or the device to seven.
+        wrong = "the device" if protocol.line.data_bits == 8 else "the port"  # noqa: PLR2004 (bits)
+        return (
+            f"without the highest bit it is a reading, and that bit is {parity_in(raw) or 'something else'}: "
+            f"set data bits and parity of {wrong} to {protocol.line.text}"
+        )
+    others = looks_like(raw, protocol)
+    if not others and seven_bits != raw and parity_in(raw):
+        others = looks_like(seven_bits, protocol)
+    if others:
+        like = " or ".join(_as_options(one) for one in others[:_OTHERS])
+        return f"it looks like another instrument: {like}; name that one, with its settings of the line"
     strange = sum(byte >= 0x80 or (byte < 0x20 and byte not in b"\r\n\x02") for byte in raw)  # noqa: PLR2004 (ASCII)
     binary = any(frame.binary for frame in protocol.frames)
     if strange and not binary:
@@ -80,6 +98,21 @@ def _cause(protocol: Protocol, raw: bytes, baud: int) -> str:
     return (
         f"is it this instrument, set as `dbbstation instruments {protocol.name}` says, with nothing else on the line?"
     )
+
+
+def parity_in(raw: bytes) -> str:
+    """Return which parity the highest bits of bytes have, empty where they have none throughout.
+
+    By chance a byte has the one or the other, so a dozen of the same is chance once in 4096 times; fewer are not believed.
+    """
+    even = sum(byte.bit_count() % 2 == 0 for byte in raw)
+    if len(raw) < _TELLING_BYTES or 0 < even < len(raw):
+        return ""
+    return "even parity" if even else "odd parity"
+
+
+def _as_options(protocol: Protocol) -> str:
+    return f"--instrument {protocol.name}" + (f" --profile {protocol.profile}" if protocol.profile else "")
 
 
 def _holds_reading(protocol: Protocol, raw: bytes) -> bool:

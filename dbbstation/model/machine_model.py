@@ -144,7 +144,7 @@ class MachineModel:
         """What a bar about the motion's fixed ball reads, and how that answers to every error, kept rows only.
 
         A ball that was put up under the spindle stands where the tool tip really was then. What a micrometer read of
-        both balls is taken into account.
+        both balls is taken into account, and what the bar reads too long by its calibration.
         """
         setup = motion.setup
         if setup is None:
@@ -169,7 +169,7 @@ class MachineModel:
             ball = ball + actual.effect.fixed_ball_mm
         sensitivity = bar_sensitivity(actual.hexapod, actual.frames, ball, tool)
         reading = np.zeros(1) if actual.effect.reading_mm is None else actual.effect.reading_mm
-        length = sensitivity.length_mm + reading
+        length = sensitivity.length_mm + reading + setup.bar_reads_long_mm
         return BarReading(actual, length[motion.kept], sensitivity, standing, ball_response)
 
 

@@ -38,14 +38,14 @@ def check_reach(machine: Machine, toolpath: Toolpath) -> None:
     outside = points.first_outside(machine)
     upto = len(toolpath) if outside is None else int(points.row[outside]) + 1
     pieces = toolpath.pieces(STEP_MM, STEP_DEG)[:upto]
-    block = np.cumsum(pieces) // AT_ONCE
-    for rows in np.split(np.arange(upto), np.flatnonzero(np.diff(block)) + 1):
+    # A move of one piece has no pose beside its end, which is a programmed point.
+    divided = np.flatnonzero(pieces > 1)
+    block = np.cumsum(pieces[divided]) // AT_ONCE
+    for rows in np.split(divided, np.flatnonzero(np.diff(block)) + 1):
         row, share = in_pieces(pieces[rows])
         poses = _Poses(toolpath, rows[row], share)
-        outside = poses.first_outside(machine)
-        if outside is not None:
-            where = _where(toolpath, int(poses.row[outside]))
-            check_travel(machine, poses.poses[outside : outside + 1], where=where)
+        poses.refuse(machine, toolpath, poses.first_outside(machine))
+    points.refuse(machine, toolpath, outside)
 
 
 def check_feeds(machine: Machine, toolpath: Toolpath) -> None:
@@ -90,6 +90,12 @@ class _Poses:
             else:
                 outside = middle
         return inside
+
+    def refuse(self, machine: Machine, toolpath: Toolpath, outside: int | None) -> None:
+        """Refuse the pose of this number, by its line; nothing where there is none."""
+        if outside is not None:
+            where = _where(toolpath, int(self.row[outside]))
+            check_travel(machine, self.poses[outside : outside + 1], where=where)
 
 
 def _where(toolpath: Toolpath, row: int) -> str:

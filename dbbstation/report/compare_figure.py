@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from dbbstation.diagnosis.compare_summary import by_angle_um
+from dbbstation.diagnosis.compare.summary import by_angle_um
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, DIVERGING, QUARTERS, in_style
 from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
 
-    from dbbstation.diagnosis.compare import Comparison, RunDifference
+    from dbbstation.diagnosis.compare.comparison import Comparison, RunDifference
 
 OVERLAYS = 3
 COLOUR_A, COLOUR_B = AFTER, BEFORE
@@ -45,7 +45,7 @@ def compare_figure(found: Comparison, wanted: FigureFormat | Stamped = FigureFor
 def _worst(found: Comparison) -> list[RunDifference]:
     """The runs that differ most, one of each test."""
     by_test: dict[str, RunDifference] = {}
-    for run in sorted(found.runs, key=lambda run: -run.ratio):
+    for run in sorted(found.runs, key=lambda run: (-float(np.sum(run.found_mm**2)), -run.rms_mm)):
         by_test.setdefault(run.pair.test, run)
     return list(by_test.values())[:OVERLAYS]
 
@@ -73,7 +73,9 @@ def _overlay(readings: Axes, differences: Axes, run: RunDifference) -> None:
     readings.set_title(f"{run.pair.label}: {1e3 * run.rms_mm:.1f} µm rms apart")
     readings.legend()
     differences.plot(theta, 1e3 * run.pair.difference_mm, color="#bbbbbb", linewidth=0.6)
-    differences.plot(theta, 1e3 * run.smooth_mm, color="black", linewidth=1.2)
+    differences.plot(theta, 1e3 * run.smooth_mm, color="black", linewidth=1.2, label="smooth")
+    differences.plot(theta, 1e3 * run.found_mm, color=COLOUR_B, linewidth=1.0, linestyle="--", label="found")
+    differences.legend()
     differences.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
     differences.set_xticks(QUARTERS)
     differences.set_xlabel("angle, degrees")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.shapes import EVERY, PULL, SIGNED, TOWARDS
 from dbbstation.report.drawing import AFTER
 
 if TYPE_CHECKING:
@@ -34,8 +35,7 @@ def draw_unexplained(part: SubFigure, curve: Curve) -> None:
         axes.fill_between(at, value - 2.0 * sigma, value + 2.0 * sigma, color=AFTER, alpha=0.3, linewidth=0.0)
         axes.plot(at, value, color=AFTER, linewidth=1.0)
         axes.set_xlim(at[0], at[-1])
-        over = "strut-length" if curve.period_mm is not None else curve.variable
-        axes.set_xlabel(f"{over.replace('-', ' ')}, {'°' if curve.unit == 'deg' else curve.unit}")
+        axes.set_xlabel(f"{curve.follows.variable.replace('-', ' ')}, {'°' if curve.unit == 'deg' else curve.unit}")
     axes.axhline(0.0, color="black", linewidth=0.5, linestyle=":")
     axes.set_ylabel("µm, ±2u")
     axes.set_title(curve.convention, loc="right")
@@ -46,8 +46,11 @@ def _whose(curve: Curve) -> str:
     wave = "" if curve.period_mm is None else f"a wave of {curve.period_mm:.2f} mm: "
     if curve.strut is not None:
         return f"{wave}error of strut {curve.strut}"
-    of_reading = curve.variable == "angle" or curve.variable.endswith("of the reading")
-    return wave + ("error of the reading" if of_reading else "error of every strut")
+    return f"{wave}error of {WHOSE.get(curve.follows.moves, f'the {curve.follows.moves}')}"
+
+
+WHOSE = {EVERY: EVERY, SIGNED: EVERY, PULL: "every strut by a pull", TOWARDS: "every strut by a pull towards a place"}
+"""What moves, as a title says it; bodies have their own names."""
 
 
 def _between(curve: Curve) -> tuple[NDArray[np.float64], ...]:

@@ -95,6 +95,8 @@ class Setup:
         mounting_repeatability_mm: of the holder, one standard deviation, for all axes or each, shape (3,) [mm].
         ball_uncertainty_mm: of the CMM, one standard deviation per axis [mm].
         bar_uncertainty_mm: of the bar's calibrated length, one standard deviation [mm].
+        bar_reads_long_mm: reading less true distance, as calibrator and temperature let expect it: part of every reading,
+            and never taken off one [mm].
         place_known: False for a ball that was put up under the spindle: `fixed_ball_mm` is where the machine was told
             to stand then, and nobody knows where the ball is.
         set_up_errors: micrometer readings of such a ball; None where there are none.
@@ -120,6 +122,7 @@ class Setup:
     plate: Plate | None = None
     run: str = ""
     start_uncertainty_deg: float = 0.0
+    bar_reads_long_mm: float = 0.0
     moving_s: tuple[tuple[float, float], ...] = ()
     thermometers: Mapping[str, Thermometer] = field(default_factory=dict)
 

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.recordings.bar_reach import unlike_bar
-from dbbstation.files.recordings.session_writer import SessionDetails
+from dbbstation.files.recordings.session_text import SessionDetails
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
+from dbbstation.station.judging import RunJudge
 from dbbstation.station.opening import last_end, open_session
-from dbbstation.station.preflight import check_plan
+from dbbstation.station.preflight import check_plan, check_range
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.storage import Storage, time_of_day
+from dbbstation.station.unjudged import unjudged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -41,6 +43,9 @@ class Job:
         programs: what commands each test and direction; empty: plain nominal circles.
         patience: how long is waited for the machine.
         clock: machine time, that of the instrument's readings [s].
+        time_scale: how much faster than real time that goes; other than 1 for a virtual machine only.
+        rate_hz: readings per second that the instrument brings; None: not known.
+        range_mm: lowest and highest length that it reads; None: not known.
     """
 
     machine: Machine
@@ -50,12 +55,15 @@ class Job:
     programs: Mapping[tuple[str, Direction], RunProgram] = field(default_factory=dict)
     patience: Patience = field(default_factory=Patience)
     clock: Callable[[], float] = time.monotonic
+    time_scale: float = 1.0
+    rate_hz: float | None = None
+    range_mm: tuple[float, float] | None = None
 
     def check(self, plan_file: str) -> None:
         """Dry-run the plan; to be done before an instrument is opened.
 
         Raises:
-            InputError: a test that readings cannot follow, or that the bar cannot reach.
+            InputError: a test that readings cannot follow, or that bar or instrument cannot reach.
             TravelError: a circle leaves the machine's travel.
         """
         plan = self.plan.to_domain()
@@ -64,6 +72,8 @@ class Job:
         if fault is not None:
             raise InputError([Problem(plan_file, 0, 0, *fault)])
         check_plan(plan, self.machine, file=plan_file)
+        if self.range_mm is not None:
+            check_range(plan, self.range_mm, file=plan_file)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +114,22 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     }
     schedule = Schedule(plan, writer.next_repeat, writer.runs)
     names = {key: program.name for key, program in job.programs.items()}
-    station = Station(Sequencer(plan, schedule, programs=names, patience=job.patience), source)
-    storage = Storage(writer, time_of_day(job.clock, last_end(writer.session)), kept)
+    # Real runs bear the computer's time, so that they fit what thermometers log.
+    now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
+    storage = Storage(writer, now, kept)
+    judge = RunJudge(writer, kept)
+    sequencer = Sequencer(
+        plan,
+        schedule,
+        storage.recorded,
+        programs=names,
+        patience=job.patience,
+        judge=judge.judge,
+        waiting=unjudged(writer.session, judge.judge),
+        rate_hz=job.rate_hz,
+    )
+    station = Station(sequencer, source)
     station.subscribe(storage)
+    station.subscribe(judge)
     station.regularly(storage.sync_if_due)
     return Workplace(station, schedule, writer, storage)

@@ -56,7 +56,7 @@ class Autopilot:
         """
         match event:
             case events.RunAnnounced():
-                self._prepare(event)
+                self._announced = event
             case events.RunCompleted():
                 self._problem = event.problem
             case events.RunAccepted():
@@ -69,7 +69,6 @@ class Autopilot:
                 pass
 
     def _prepare(self, announced: events.RunAnnounced) -> None:
-        self._announced = announced
         remounted = False
         if announced.put_up:
             self._hands.mount(announced.run.test)
@@ -83,7 +82,9 @@ class Autopilot:
         if self._announced is None:
             return
         run = self._announced.run
-        if state is State.ARMED:
+        if state is State.ANNOUNCED:
+            self._prepare(self._announced)
+        elif state is State.ARMED:
             self._hands.start(run.test, run.direction, self._announced.program)
         elif state is State.COMPLETE:
             self._send(Accept())

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from dbbstation.plan.circle import Direction
 
 
 @dataclass(frozen=True)
@@ -54,4 +57,59 @@ class Quit:
     """Stop here; a run that goes on is kept as far as it came. The session can be continued later."""
 
 
-Command: TypeAlias = Start | Accept | Repeat | Reject | Skip | Quit
+@dataclass(frozen=True)
+class GoTo:
+    """Measure another test next, also one that was left out or has its runs already; then go on from there.
+
+    Attributes:
+        test: name of the test.
+        direction: sense of travel; None: whichever is left to do.
+    """
+
+    test: str
+    direction: Direction | None = None
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Give a run another verdict, at any time after it was recorded: a wrong one is taken back so.
+
+    Attributes:
+        test: name of the test.
+        direction: sense of travel.
+        repeat: of this test and direction, from 1.
+        accepted: whether the run counts.
+        reason: why it does not; kept with the recording.
+    """
+
+    test: str
+    direction: Direction
+    repeat: int
+    accepted: bool
+    reason: str = "rejected by the operator"
+
+
+@dataclass(frozen=True)
+class Note:
+    """Keep a remark or the temperature of the shop with the session; at any time.
+
+    Attributes:
+        text: the remark; empty for a temperature alone.
+        ambient_temp_c: temperature of the shop now [degC]; None where it was not read.
+    """
+
+    text: str = ""
+    ambient_temp_c: float | None = None
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Leave the machine alone for a while: nothing is waited for."""
+
+
+@dataclass(frozen=True)
+class Resume:
+    """Go on after a pause."""
+
+
+Command: TypeAlias = Start | Accept | Repeat | Reject | Skip | Quit | GoTo | Judge | Note | Pause | Resume

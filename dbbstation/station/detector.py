@@ -40,6 +40,40 @@ class Patience:
         return self.turn_factor * circle.swept_deg / circle.turning_deg_s + self.turn_extra_s
 
 
+SETTLED_S = 2.0
+"""A bar that is put in by hand passes the circle's length in less [s]."""
+
+
+class CircleWatch:
+    """Tells when the machine is on the circle though nothing is recorded, from readings in time order.
+
+    Args:
+        circle: as commanded.
+        waits_for_feed_in: whether a bar that stands at the circle's length is on it only after it came from outside.
+    """
+
+    def __init__(self, circle: Circle, *, waits_for_feed_in: bool) -> None:
+        self._edges = EdgeDetector(circle)
+        self._far_mm = circle.bar_mm - circle.feed_in_mm / 2.0
+        self._since_s: float | None = None
+        self._came = not waits_for_feed_in
+        self._told = False
+
+    def seen(self, t_s: float, length_mm: float) -> bool:
+        """Return True once, when the bar has kept the circle's length for `SETTLED_S`."""
+        outside = self._edges.outside(length_mm)
+        if outside is not False or length_mm < self._far_mm:
+            self._since_s = None
+            self._came = self._came or outside is True
+            return False
+        if self._since_s is None:
+            self._since_s = t_s
+        if self._told or not self._came or t_s - self._since_s < SETTLED_S:
+            return False
+        self._told = True
+        return True
+
+
 class EdgeDetector:
     """Tells on which side of the feed-in's middle the bar is, from readings in time order.
 

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from dbbstation.instrument.reading import Status
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Ball
+    from dbbstation.plan.sampling import Sampling
+    from dbbstation.quality.finding import Finding
     from dbbstation.station.commands import Command
     from dbbstation.station.states import State
     from dbbstation.trace.analysis import CircleFigures
@@ -87,6 +89,7 @@ class RunAnnounced:
         number: of the run in the sequence, from 1.
         count: runs in the sequence.
         instructions: the same in words, one step per entry.
+        sampling: what the instrument sees of the circle at its feed; None where its rate is not known.
     """
 
     run: RunId
@@ -97,6 +100,7 @@ class RunAnnounced:
     number: int
     count: int
     instructions: tuple[str, ...]
+    sampling: Sampling | None = None
 
 
 @dataclass(frozen=True)
@@ -174,6 +178,7 @@ class RunCompleted:
         lost: samples that the line lost during it.
         figures: of its circle; None where there is none.
         problem: why it cannot be used; empty where it can.
+        findings: all that was looked for in its circle; empty where it has none.
     """
 
     run: RunId
@@ -181,6 +186,51 @@ class RunCompleted:
     lost: int
     figures: CircleFigures | None
     problem: str
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def wrong(self) -> tuple[Finding, ...]:
+        """Findings that pass their limit: reasons to measure the run again."""
+        return tuple(finding for finding in self.findings if finding.wrong)
+
+
+@dataclass(frozen=True)
+class RunRestored:
+    """A run that was recorded before waits for its verdict still; its figures follow as those of any completed run.
+
+    Attributes:
+        run: which run.
+        samples: of its turn, in time order, thinned; empty where it has none.
+    """
+
+    run: RunId
+    samples: tuple[Sample, ...]
+
+
+@dataclass(frozen=True)
+class FeedInMissed:
+    """The machine is on the circle, and nothing is recorded.
+
+    Attributes:
+        run: that is announced.
+        problem: what was seen, and what to do.
+    """
+
+    run: RunId
+    problem: str
+
+
+@dataclass(frozen=True)
+class Noted:
+    """Somebody noted something.
+
+    Attributes:
+        text: the remark; empty for a temperature alone.
+        ambient_temp_c: temperature of the shop now [degC]; None where it was not read.
+    """
+
+    text: str
+    ambient_temp_c: float | None
 
 
 @dataclass(frozen=True)
@@ -281,6 +331,9 @@ Event: TypeAlias = (
     | FeedInSeen
     | Progress
     | RunCompleted
+    | RunRestored
+    | FeedInMissed
+    | Noted
     | RunAccepted
     | RunRejected
     | RunLate

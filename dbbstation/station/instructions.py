@@ -7,17 +7,29 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Ball
+    from dbbstation.plan.sampling import Sampling
 
 
-def instructions(ball: Ball, circle: Circle, *, put_up: bool, program: str) -> tuple[str, ...]:
-    """Return the steps, in their order."""
+def instructions(
+    ball: Ball, circle: Circle, *, put_up: bool, program: str, sampling: Sampling | None = None
+) -> tuple[str, ...]:
+    """Return the steps, in their order, and what the instrument is too slow for."""
     raised = f", raised by {circle.elevation_deg:g}°" if circle.elevation_deg else ", level"
     what = f"NC program {program}" if program else f"{circle.direction} circle"
     return (
         *(_mounted if ball.place_known else _under_spindle)(ball, circle, put_up=put_up),
         f"Bar of {circle.bar_mm:g} mm{raised}; circle about {_place(circle.centre_mm)}",
         f"Start the {what} at {circle.feed_mm_min:g} mm/min",
+        *(() if sampling is None or sampling.enough else (too_slow(sampling),)),
     )
+
+
+def too_slow(sampling: Sampling) -> str:
+    """Say what is not seen with so few points."""
+    points = f"The instrument brings {sampling.points_per_turn:.0f} points per turn"
+    if not sampling.is_circle:
+        return f"{points}, which is no circle: take a lower feed"
+    return f"{points}: undulations above {sampling.highest_undulation} per revolution are not seen"
 
 
 def _mounted(ball: Ball, circle: Circle, *, put_up: bool) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.machine import machine_data, machine_parts
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
-from dbbstation.files.recordings.session import RunState
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.session_writer import SessionWriter
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.formats.plan import InlinePlan
     from dbbstation.files.recordings.session import SessionFolder
-    from dbbstation.files.recordings.session_writer import SessionDetails
+    from dbbstation.files.recordings.session_text import SessionDetails
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
 

@@ -1,4 +1,4 @@
-"""What can be known to go wrong is found before anything starts: travel and feed-in."""
+"""What can be known to go wrong is found before anything starts: travel, feed-in, range of the instrument."""
 
 from __future__ import annotations
 
@@ -37,3 +37,29 @@ def check_plan(plan: Plan, machine: Machine, *, file: str) -> None:
     if faults:
         raise InputError(faults)
     plan.check(machine)
+
+
+def check_range(plan: Plan, range_mm: tuple[float, float], *, file: str) -> None:
+    """Hold the lengths of a plan's circles against what an instrument reads.
+
+    Args:
+        plan: what is to be measured.
+        range_mm: lowest and highest length of the instrument.
+        file: of the plan, for messages.
+
+    Raises:
+        InputError: a circle or its feed-in lies outside; every such test is named.
+    """
+    low_mm, high_mm = range_mm
+    faults = []
+    for test in plan.tests.values():
+        bar_mm, outside_mm = test.circle.bar_mm, test.circle.bar_mm + test.circle.feed_in_mm
+        if low_mm <= bar_mm and outside_mm <= high_mm:
+            continue
+        what = (
+            f"test {test.name}: the bar goes from {bar_mm:g} to {outside_mm:g} mm with its feed-in, and the instrument"
+        )
+        remedy = "take an instrument or a profile with more range, or a shorter `feed_in_mm` in its path"
+        faults.append(Problem(file, 0, 0, f"{what} reads {low_mm:g} to {high_mm:g} mm", remedy))
+    if faults:
+        raise InputError(faults)

@@ -1,9 +1,12 @@
-"""The run that goes on: its samples so far, whether its edges were seen, what its circle says in the end."""
+"""The run that goes on: how many samples it has, whether its edges were seen, what its circle says in the end.
+
+Samples are not kept here: the memory of a run must not grow with its length. Whoever records them gives them back in the end.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -11,11 +14,14 @@ from dbbstation.errors import TraceError
 from dbbstation.station.detector import DWELL_BEHIND_S, live_phi_deg
 from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
-from dbbstation.trace.cut import cut, lost_on_turn
+from dbbstation.trace.cut import cut
+from dbbstation.trace.cut import lost_on_turn as shown_lost
 from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 from dbbstation.trace.recording import Recording
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from dbbstation.instrument.reading import Reading
     from dbbstation.plan.circle import Circle
     from dbbstation.station.events import RunId
@@ -24,9 +30,39 @@ _STEP_S = 2e-6
 """Run files have microseconds; two samples must not round to the same one."""
 
 
+class Recorded(Protocol):
+    """Gives back what was recorded of the run that goes on."""
+
+    def __call__(self, run: RunId, behind: Sequence[Sample], /) -> Recording:
+        """Return the whole run.
+
+        Args:
+            run: which run.
+            behind: its last samples, which observers have not been told of yet.
+
+        Raises:
+            StationError: it cannot be read.
+        """
+
+
+def recording_of(run: RunId, samples: Sequence[Sample]) -> Recording:
+    """Return samples of a run as a recording.
+
+    Args:
+        run: which run.
+        samples: in time order, each with a number.
+    """
+    return Recording(
+        name=run.label,
+        t_s=np.array([sample.t_s for sample in samples], dtype=np.float64),
+        length_mm=np.array([sample.length_mm for sample in samples], dtype=np.float64),
+        usable=np.array([sample.status == "ok" for sample in samples], dtype=np.bool_),
+    )
+
+
 @dataclass
 class RunRecord:
-    """Samples of one run.
+    """One run while it is recorded.
 
     Attributes:
         run: which run.
@@ -34,6 +70,9 @@ class RunRecord:
         started_s: time of the first sample on the driver's clock [s].
         fed_in_s: of the feed-in edge, since the first sample [s]; None before.
         fed_out_s: of the feed-out edge, likewise.
+        samples: how many it has.
+        lost: samples that the line counted as lost, wherever in the run.
+        lost_on_turn: those from feed-in to feed-out.
     """
 
     run: RunId
@@ -41,13 +80,14 @@ class RunRecord:
     started_s: float
     fed_in_s: float | None = None
     fed_out_s: float | None = None
-    _lost: list[int] = field(default_factory=list)
-    _t_s: list[float] = field(default_factory=list)
-    _length_mm: list[float] = field(default_factory=list)
-    _usable: list[bool] = field(default_factory=list)
+    samples: int = 0
+    lost: int = 0
+    lost_on_turn: int = 0
+    _last_s: float = 0.0
+    _last_mm: float | None = None
 
     def __len__(self) -> int:
-        return len(self._t_s)
+        return self.samples
 
     def add(self, reading: Reading) -> Sample:
         """Take a reading into the run.
@@ -56,61 +96,60 @@ class RunRecord:
         its status keeps it out of every calculation.
         """
         t_s = reading.t_s - self.started_s
-        if self._t_s:
-            t_s = max(t_s, self._t_s[-1] + _STEP_S)
+        if self.samples:
+            t_s = max(t_s, self._last_s + _STEP_S)
         length_mm = reading.length_mm
         if length_mm is None:
-            length_mm = self._length_mm[-1] if self._length_mm else self.circle.bar_mm
-        self._t_s.append(t_s)
-        self._length_mm.append(length_mm)
-        self._usable.append(reading.status == "ok")
-        self._lost.append(reading.lost)
+            length_mm = self.circle.bar_mm if self._last_mm is None else self._last_mm
+        self._last_s, self._last_mm = t_s, length_mm
+        self.samples += 1
+        self.lost += reading.lost
         phi = None
         if self.fed_in_s is not None and self.fed_out_s is None:
+            self.lost_on_turn += reading.lost
             phi = live_phi_deg(self.circle, t_s - self.fed_in_s)
         return Sample(t_s, length_mm, reading.status, reading.said, reading.lost, phi)
 
-    @property
-    def lost(self) -> int:
-        """Samples that the line counted as lost, wherever in the run."""
-        return sum(self._lost)
-
     def swept_deg(self) -> float:
         """Travelled since the feed-in, as far as it can be told live [deg]."""
-        if self.fed_in_s is None or not self._t_s:
+        if self.fed_in_s is None or not self.samples:
             return 0.0
-        return live_phi_deg(self.circle, self._t_s[-1] - self.fed_in_s) + self.circle.overshoot_deg
+        return live_phi_deg(self.circle, self._last_s - self.fed_in_s) + self.circle.overshoot_deg
 
     def left(self, t_s: float) -> bool:
         """Whether at a time since the first sample enough lies behind the feed-out."""
         rest_s = self.circle.feed_in_mm / 2.0 / (self.circle.feed_mm_min / 60.0)
         return self.fed_out_s is not None and t_s >= self.fed_out_s + rest_s + DWELL_BEHIND_S
 
-    def circle_figures(self, largest_loss_percent: float) -> tuple[CircleFigures | None, str]:
+    def circle_figures(self, recording: Recording, largest_loss_percent: float) -> tuple[CircleFigures | None, str]:
         """Return the figures of the circle, or None and why there is none.
 
         Args:
+            recording: the whole run.
             largest_loss_percent: share of the samples that may be lost [%].
         """
-        recording = Recording(
-            name=self.run.label,
-            t_s=np.array(self._t_s),
-            length_mm=np.array(self._length_mm),
-            usable=np.array(self._usable, dtype=np.bool_),
-        )
-        shown, kept = lost_on_turn(recording, self.circle)
-        if problem := too_many_lost(max(self._lost_between_edges(), shown), kept, largest_loss_percent):
-            return None, f"{problem}; {AFTER_LOSS}"
-        try:
-            return figures(cut(recording, self.circle)), ""
-        except TraceError as error:
-            return None, str(error)
+        return circle_figures(recording, self.circle, self.lost, self.lost_on_turn, largest_loss_percent)
 
-    def _lost_between_edges(self) -> int:
-        """Samples that the line counted as lost from feed-in to feed-out."""
-        begin = -np.inf if self.fed_in_s is None else self.fed_in_s
-        end = np.inf if self.fed_out_s is None else self.fed_out_s
-        return sum(lost for t, lost in zip(self._t_s, self._lost, strict=True) if begin < t <= end)
+
+def circle_figures(
+    recording: Recording, circle: Circle, lost: int, lost_on_turn: int, largest_loss_percent: float
+) -> tuple[CircleFigures | None, str]:
+    """Return the figures of a recorded circle, or None and why there is none.
+
+    Args:
+        recording: of the whole run.
+        circle: as commanded.
+        lost: samples that the line counted as lost, wherever in the run; 0 where nobody counted.
+        lost_on_turn: those from feed-in to feed-out.
+        largest_loss_percent: share of the samples that may be lost [%].
+    """
+    shown, kept = shown_lost(recording, circle)
+    if problem := too_many_lost(max(lost_on_turn, shown), kept, largest_loss_percent):
+        return None, f"{problem}; {AFTER_LOSS}"
+    try:
+        return figures(cut(recording, circle, counted_lost=lost)), ""
+    except TraceError as error:
+        return None, str(error)
 
 
 def unrecorded(reading: Reading) -> Sample:

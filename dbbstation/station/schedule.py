@@ -1,11 +1,11 @@
-"""Which run comes next: the plan's order, less what the session has accepted already, and which mounting it belongs to."""
+"""Which run comes next: the plan's order from where somebody stands, less what is accepted, and which mounting it belongs to."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.files.recordings.session import RunEntry, RunState
+from dbbstation.files.recordings.entries import RunEntry, RunState
 from dbbstation.station.events import RunId
 
 if TYPE_CHECKING:
@@ -67,26 +67,36 @@ class Schedule:
         self._next_repeat = next_repeat
         self._mountings = max((run.mounting or 0 for run in recorded), default=0)
         self._standing: tuple[str, int] | None = None
-        self._done: set[Task] = set()
+        self._accepted: dict[tuple[str, Direction, int], bool] = {}
         self._passed: set[Task] = set()
+        self._again: Task | None = None
+        self._place = 0
         for run in recorded:
             # A run that died before its mounting was noted says nothing about what stands on the table now.
             self._standing = None if run.mounting is None else (plan.tests[run.test].ball.name, run.mounting)
-            if run.state is RunState.ACCEPTED:
-                self._count(run.test, run.direction)
+            if run.state is not RunState.RECORDING:
+                self._accepted[run.test, run.direction, run.repeat] = run.state is RunState.ACCEPTED
+        if recorded:
+            # Where the last run was measured: what was left out before that comes at the end.
+            self._place = self._place_of(recorded[-1].test, recorded[-1].direction)
 
     @property
     def accepted(self) -> int:
         """Tasks that have an accepted recording."""
-        return len(self._done)
+        return len(self.tasks) - len(self.open)
 
     @property
     def open(self) -> tuple[Task, ...]:
-        """Tasks without an accepted recording, passed over or not."""
-        return tuple(task for task in self.tasks if task not in self._done)
+        """Tasks without an accepted recording, passed over or not; more accepted ones than planned do no harm."""
+        runs = [(test, direction) for (test, direction, _), accepted in self._accepted.items() if accepted]
+        return tuple(task for task in self.tasks if task.occurrence > runs.count((task.test, task.direction)))
+
+    def number_of(self, run: RunId) -> int:
+        """Number, from 1, of the task that a run was or is measured for."""
+        return self._place_of(run.test, run.direction) + 1
 
     def next(self) -> NextRun | None:
-        """Return the first task that is neither done nor passed over; None where all are."""
+        """Return the first task, from the last one on, that is neither done nor passed over; None where all are."""
         task = self._current()
         if task is None:
             return None
@@ -109,22 +119,56 @@ class Schedule:
         return run
 
     def accept(self, run: RunId) -> None:
-        """Note that a run counts."""
-        self._count(run.test, run.direction)
+        """Note that a run counts, and go on from there."""
+        place = self._place_of(run.test, run.direction)
+        self._accepted[run.test, run.direction, run.repeat] = True
+        self._place, self._again = place, None
 
-    def pass_over(self) -> None:
-        """Leave the current task for another time."""
-        task = self._current()
-        if task is not None:
-            self._passed.add(task)
+    def recorded(self, run: RunId) -> None:
+        """Note a run that has been recorded and has no verdict yet."""
+        self._accepted[run.test, run.direction, run.repeat] = False
+
+    def judge(self, test: str, direction: Direction, repeat: int, *, accepted: bool) -> None:
+        """Note another verdict on a recorded run.
+
+        Raises:
+            KeyError: there is no such recording.
+        """
+        if (test, direction, repeat) not in self._accepted:
+            raise KeyError(f"{test}-{direction}-{repeat}")
+        self._accepted[test, direction, repeat] = accepted
+
+    def pass_over(self, run: RunId) -> None:
+        """Leave the task of a run for another time."""
+        self._place, self._again = self._place_of(run.test, run.direction), None
+        self._passed.add(self.tasks[self._place])
+
+    def go_to(self, test: str, direction: Direction | None = None) -> None:
+        """Let a test be next, also one that was passed over; where all of it is done, once more.
+
+        Raises:
+            KeyError: the plan has no such run.
+        """
+        mine = [task for task in self.tasks if task.test == test and direction in {None, task.direction}]
+        if not mine:
+            raise KeyError(test)
+        self._passed -= set(mine)
+        left = [task for task in mine if task in self.open]
+        self._again = None if left else mine[0]
+        self._place = self.tasks.index((left or mine)[0])
 
     def _current(self) -> Task | None:
-        return next((task for task in self.tasks if task not in self._done and task not in self._passed), None)
+        if self._again is not None:
+            return self._again
+        left = [k for k, task in enumerate(self.tasks) if task in self.open and task not in self._passed]
+        following = [k for k in left if k >= self._place] or left
+        return self.tasks[following[0]] if following else None
 
-    def _count(self, test: str, direction: Direction) -> None:
-        """Give an accepted recording to the first open task of its test and direction; more than planned do no harm."""
-        mine = [task for task in self.open if (task.test, task.direction) == (test, direction)]
-        self._done.update(mine[:1])
+    def _place_of(self, test: str, direction: Direction) -> int:
+        """Place of the first task of a test and direction that is left to do; of one passed over or done where none is."""
+        mine = [k for k, task in enumerate(self.tasks) if (task.test, task.direction) == (test, direction)]
+        still = [k for k in mine if self.tasks[k] in self.open]
+        return next((k for k in still if self.tasks[k] not in self._passed), (still or mine)[-1])
 
 
 def _tasks(plan: Plan) -> tuple[Task, ...]:

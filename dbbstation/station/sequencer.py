@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.plan.sampling import sampling
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, Command, Reject, Repeat, Skip, Start
-from dbbstation.station.detector import EdgeDetector, Patience
+from dbbstation.station.commands import Accept, Command, GoTo, Judge, Note, Pause, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.detector import CircleWatch, EdgeDetector, Patience
 from dbbstation.station.instructions import instructions
 from dbbstation.station.run_record import RunRecord, unrecorded
 from dbbstation.station.states import (
@@ -20,14 +24,31 @@ from dbbstation.station.states import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from dbbstation.errors import StationError
     from dbbstation.instrument.reading import Reading
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Plan
+    from dbbstation.quality.finding import Finding
     from dbbstation.station.events import Event, RunId, Sample
+    from dbbstation.station.run_record import Recorded
     from dbbstation.station.schedule import Schedule
+    from dbbstation.trace.analysis import CircleFigures
+    from dbbstation.trace.recording import Recording
+
+
+@dataclass(frozen=True)
+class Waiting:
+    """A run that was recorded before and has no verdict.
+
+    Attributes:
+        completed: what its recording says.
+        samples: of its turn, in time order, thinned; empty where it has none.
+    """
+
+    completed: events.RunCompleted
+    samples: tuple[Sample, ...]
 
 
 class Sequencer:
@@ -39,33 +60,48 @@ class Sequencer:
     Args:
         plan: what is measured.
         schedule: what is left of it.
+        recorded: gives back the run that goes on, once it is complete.
         programs: name of the NC program that commands a test and direction; the plan's nominal circle where absent.
         patience: how long is waited for the machine.
+        waiting: runs that were recorded before and have no verdict, oldest first; they are judged before anything is measured.
+        judge: finds out what is wrong with a run that holds a circle; None: nothing is looked for.
+        rate_hz: readings per second that the instrument brings; None: not known.
     """
 
     def __init__(
         self,
         plan: Plan,
         schedule: Schedule,
+        recorded: Recorded,
         *,
         programs: Mapping[tuple[str, Direction], str] | None = None,
         patience: Patience | None = None,
+        waiting: Sequence[Waiting] = (),
+        judge: Callable[[RunId, Recording], tuple[Finding, ...]] | None = None,
+        rate_hz: float | None = None,
     ) -> None:
         self.state = State.BETWEEN
         self.plan = plan
         self.schedule = schedule
+        self._recorded = recorded
+        self._judge_run = judge
         self._programs = programs or {}
         self._patience = patience or Patience()
+        self._rate_hz = rate_hz
         self._out: list[Event] = []
         self._samples: list[Sample] = []
         self._run: RunId | None = None
+        self._commanded: Circle | None = None
         self._record: RunRecord | None = None
         self._edges: EdgeDetector | None = None
+        self._watch: CircleWatch | None = None
+        self._remounted = False
+        self._unjudged = deque(waiting)
         self._waiting_since_s: float | None = None
         self._told_deg = 0.0
 
     def begin(self) -> list[Event]:
-        """Announce the first run."""
+        """Announce the first run, or one that waits for its verdict."""
         self._announce_next()
         return self._told()
 
@@ -83,7 +119,17 @@ class Sequencer:
             case Repeat() | Reject():
                 self._throw_out(command)
             case Skip():
-                self.schedule.pass_over()
+                self.schedule.pass_over(self._announced())
+                self._to_next(cause)
+            case GoTo() | Judge():
+                self._reorder(command)
+            case Note():
+                self._flush()
+                self._out.append(events.Noted(command.text, command.ambient_temp_c))
+            case Pause():
+                self._edges = self._watch = None
+                self._move(cause)
+            case Resume():
                 self._to_next(cause)
             case _:
                 self._stop()
@@ -109,28 +155,45 @@ class Sequencer:
     # Between runs.
 
     def _announce_next(self) -> None:
+        self._edges = None
+        if self._unjudged:
+            self._offer(self._unjudged.popleft())
+            return
         following = self.schedule.next()
         if following is None:
             missing = tuple(task.text for task in self.schedule.open)
             self._out.append(events.SessionFinished(self.schedule.accepted, missing))
             self._move(Cause.NONE_LEFT)
             return
-        self._run = run = following.run
+        self._announce(following.run, following.number, put_up=following.put_up)
+        self._watch = CircleWatch(self._circle(), waits_for_feed_in=True)
+        self._move(Cause.RUN_LEFT)
+
+    def _announce(self, run: RunId, number: int, *, put_up: bool) -> None:
+        self._run = run
         test = self.plan.tests[run.test]
         program = self._programs.get((run.test, run.direction), "")
-        circle = test.run(run.direction)
+        self._commanded = circle = test.run(run.direction)
+        seen = None if self._rate_hz is None else sampling(circle, self._rate_hz)
         announced = events.RunAnnounced(
             run=run,
             ball=test.ball,
             circle=circle,
-            put_up=following.put_up,
+            put_up=put_up,
             program=program,
-            number=following.number,
+            number=number,
             count=len(self.schedule.tasks),
-            instructions=instructions(test.ball, circle, put_up=following.put_up, program=program),
+            instructions=instructions(test.ball, circle, put_up=put_up, program=program, sampling=seen),
+            sampling=seen,
         )
         self._out.append(announced)
-        self._move(Cause.RUN_LEFT)
+
+    def _offer(self, waiting: Waiting) -> None:
+        """Offer a run for its verdict that was recorded before."""
+        run = waiting.completed.run
+        self._announce(run, self.schedule.number_of(run), put_up=False)
+        self._out += [events.RunRestored(run, waiting.samples), waiting.completed]
+        self._move(Cause.CIRCLE_MISSING if waiting.completed.figures is None else Cause.CIRCLE_FOUND)
 
     def _to_next(self, cause: Cause) -> None:
         self._record = None
@@ -140,9 +203,9 @@ class Sequencer:
     # Commands.
 
     def _arm(self, command: Start) -> None:
-        run = self._announced()
-        self._run = self.schedule.mounted(run, remounted=command.remounted)
+        self._remounted = command.remounted
         self._edges = EdgeDetector(self._circle())
+        self._watch = CircleWatch(self._circle(), waits_for_feed_in=False)
         self._waiting_since_s = None
         self._move(Cause.START)
 
@@ -159,8 +222,28 @@ class Sequencer:
         if self.state is not State.ARMED:
             self._out.append(events.RunRejected(run, command.reason))
         if isinstance(command, Reject):
-            self.schedule.pass_over()
+            self.schedule.pass_over(run)
         self._to_next(COMMAND_CAUSES[type(command)])
+
+    def _reorder(self, command: GoTo | Judge) -> None:
+        """Let another test be next, or another verdict hold; what cannot be done is refused."""
+        try:
+            if isinstance(command, GoTo):
+                self.schedule.go_to(command.test, command.direction)
+            else:
+                self._judge(command)
+        except KeyError as error:
+            what = "the plan has no test" if isinstance(command, GoTo) else "no complete recording is called"
+            self._out.append(events.CommandRefused(command, self.state, f"{what} {error.args[0]}"))
+            return
+        self._to_next(COMMAND_CAUSES[type(command)])
+
+    def _judge(self, command: Judge) -> None:
+        self.schedule.judge(command.test, command.direction, command.repeat, accepted=command.accepted)
+        # The mounting of a run that was recorded long ago is not needed to judge it.
+        run = events.RunId(command.test, command.direction, command.repeat, 0)
+        verdict = events.RunAccepted(run) if command.accepted else events.RunRejected(run, command.reason)
+        self._out.append(verdict)
 
     def _stop(self) -> None:
         self._flush()
@@ -184,6 +267,7 @@ class Sequencer:
             self._begin_run(reading)
         if self.state not in RECORDING or self._record is None:
             self._samples.append(unrecorded(reading))
+            self._look_for_missed(reading)
             self._check_patience(reading)
             return
         sample = self._record.add(reading)
@@ -196,12 +280,16 @@ class Sequencer:
             self._move(Cause.FED_OUT)
         elif self.state is State.LEAVING and self._record.left(sample.t_s):
             self._move(Cause.CIRCLE_FOUND if self._complete() else Cause.CIRCLE_MISSING)
+        elif reading.status != "ok" and sample.phi_deg is not None and 0.0 <= sample.phi_deg <= FULL_TURN_DEG:
+            self._complete(problem=_length_gone(reading, sample.phi_deg))
+            self._move(Cause.LENGTH_GONE)
         else:
             self._check_patience(reading)
         self._tell_progress()
 
     def _begin_run(self, reading: Reading) -> None:
-        run = self._announced()
+        # Only now is it certain that a ball stands: a start that comes to nothing leaves no mounting.
+        self._run = run = self.schedule.mounted(self._announced(), remounted=self._remounted)
         self._flush()
         self._record = RunRecord(run, self._circle(), reading.t_s)
         self._waiting_since_s = reading.t_s
@@ -223,6 +311,20 @@ class Sequencer:
             self._told_deg = swept
             self._flush()
             self._out.append(events.Progress(self._record.run, swept, self._record.circle.swept_deg))
+
+    def _look_for_missed(self, reading: Reading) -> None:
+        """Say so where the machine is on its circle and nobody records it."""
+        if self._watch is None or reading.length_mm is None or reading.status != "ok":
+            return
+        if not self._watch.seen(reading.t_s, reading.length_mm):
+            return
+        what = "before Start" if self.state is State.ANNOUNCED else "before the bar was seen at the feed-in point"
+        problem = (
+            f"the machine went onto the circle {what}: this circle is not recorded; let it end, send the machine to the "
+            "feed-in point and run the program again"
+        )
+        self._flush()
+        self._out.append(events.FeedInMissed(self._announced(), problem))
 
     def _check_patience(self, reading: Reading) -> None:
         """Give up on a machine that does not move, or does not stop."""
@@ -247,10 +349,15 @@ class Sequencer:
         record = self._record
         if record is None:
             raise RuntimeError(f"no run is recorded while {self.state}")
-        found = None
+        found: CircleFigures | None = None
+        findings: tuple[Finding, ...] = ()
         if not problem:
-            found, problem = record.circle_figures(self.plan.largest_loss_percent)
-        self._out.append(events.RunCompleted(record.run, len(record), record.lost, found, problem))
+            recording = self._recorded(record.run, self._untold(record.run))
+            found, problem = record.circle_figures(recording, self.plan.largest_loss_percent)
+            if found is not None and self._judge_run is not None:
+                findings = self._judge_run(record.run, recording)
+        self._out.append(events.RunCompleted(record.run, len(record), record.lost, found, problem, findings))
+        self.schedule.recorded(record.run)
         self._edges = None
         return found is not None
 
@@ -262,8 +369,9 @@ class Sequencer:
         return self._run
 
     def _circle(self) -> Circle:
-        run = self._announced()
-        return self.plan.tests[run.test].run(run.direction)
+        if self._commanded is None:
+            raise RuntimeError(f"no circle was announced while {self.state}")
+        return self._commanded
 
     def _interrupted(self) -> RunId | None:
         return self._run if self.state in RECORDING else None
@@ -282,10 +390,22 @@ class Sequencer:
         else:
             self._out.append(events.ReadingsSeen(samples))
 
+    def _untold(self, run: RunId) -> list[Sample]:
+        """Samples of a run that nobody has been told of yet."""
+        batches = (event for event in self._out if isinstance(event, events.SamplesRecorded) and event.run == run)
+        return [sample for batch in batches for sample in batch.samples]
+
     def _told(self) -> list[Event]:
         self._flush()
         out, self._out = self._out, []
         return out
+
+
+def _length_gone(reading: Reading, phi_deg: float) -> str:
+    """Say what the instrument told in the middle of the turn: what is missing there, no fit brings back."""
+    said = f" ({reading.said})" if reading.said else ""
+    what = f"the instrument reports {reading.status}{said} at {phi_deg:.0f}° of the turn"
+    return f"{what}; {reading.remedy or 'check bar and instrument'}, then repeat the run"
 
 
 def _remedy(circle: Circle) -> str:

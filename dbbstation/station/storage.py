@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dbbstation.errors import OutputError
+from dbbstation.files.recordings.entries import Counts, Note
 from dbbstation.station import events
+from dbbstation.station.run_record import recording_of
+from dbbstation.trace.columns import STATUS_GOOD
+from dbbstation.trace.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
+    from dbbstation.files.recordings.entries import Program, RunEntry
     from dbbstation.files.recordings.journal import RunWriter
-    from dbbstation.files.recordings.session import Program, RunEntry
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.plan.circle import Direction
 
@@ -39,7 +46,8 @@ class Storage:
         self._now = now or (lambda: datetime.now(UTC))
         self._programs = programs or {}
         self._journal: RunWriter | None = None
-        self._sealed: RunEntry | None = None
+        self._received = self._lost = 0
+        self._rejected: Counter[str] = Counter()
 
     def __call__(self, event: events.Event) -> None:
         """Keep what the event says.
@@ -53,16 +61,41 @@ class Storage:
             case events.SamplesRecorded():
                 self._append(event.samples)
             case events.RunCompleted() if self._journal is not None:
-                self._sealed = self._writer.finish_run(self._journal)
+                counts = Counts(self._received, self._lost, dict(sorted(self._rejected.items())))
+                self._writer.finish_run(self._journal, counts)
                 self._journal = None
-            case events.RunAccepted() if self._sealed is not None:
-                self._writer.judge(self._sealed, accepted=True)
-            case events.RunRejected() if self._sealed is not None:
-                self._writer.judge(self._sealed, accepted=False, reason=event.reason)
+            case events.RunAccepted():
+                self._writer.judge(self._entry(event.run), accepted=True)
+            case events.RunRejected():
+                self._writer.judge(self._entry(event.run), accepted=False, reason=event.reason)
+            case events.Noted():
+                self._writer.note(Note(self._now(), event.text, event.ambient_temp_c))
             case events.SessionStopped() | events.Fault():
                 self.close()
             case _:
                 pass
+
+    def recorded(self, run: events.RunId, behind: Sequence[events.Sample]) -> Recording:
+        """Return the run that goes on, from its journal; a `Recorded` of the sequencer.
+
+        Args:
+            run: which run.
+            behind: its last samples, which are not in the journal yet.
+
+        Raises:
+            InputError: the journal cannot be read, or not as it was written.
+        """
+        last = recording_of(run, behind)
+        if self._journal is None or not self._journal.samples:
+            return last
+        first = self._journal.read().recording
+        kept = np.ones(len(first), dtype=np.bool_) if first.usable is None else first.usable
+        return Recording(
+            name=run.label,
+            t_s=np.concatenate([first.t_s, last.t_s]),
+            length_mm=np.concatenate([first.length_mm, last.length_mm]),
+            usable=np.concatenate([kept, last.usable]),
+        )
 
     def sync_if_due(self) -> None:
         """Bring to disk what has waited for a second, also while no readings come.
@@ -84,7 +117,8 @@ class Storage:
             journal.close()
 
     def _start(self, run: events.RunId) -> None:
-        self._sealed = None
+        self._received = self._lost = 0
+        self._rejected.clear()
         self._journal = self._writer.start_run(
             run.test,
             run.direction,
@@ -101,6 +135,11 @@ class Storage:
                 remedy="another program writes into this session: end it, then continue",
             )
 
+    def _entry(self, run: events.RunId) -> RunEntry:
+        """What the session says of a recorded run."""
+        key = (run.test, run.direction, run.repeat)
+        return next(entry for entry in self._writer.runs if (entry.test, entry.direction, entry.repeat) == key)
+
     def _append(self, samples: tuple[events.Sample, ...]) -> None:
         if self._journal is None:
             raise RuntimeError("samples came without a run")
@@ -108,13 +147,17 @@ class Storage:
             if sample.length_mm is None:
                 raise RuntimeError("a recorded sample has a number")
             self._journal.append((sample.t_s, sample.length_mm, sample.status))
+            self._received += 1
+            self._lost += sample.lost
+            if sample.status != STATUS_GOOD:
+                self._rejected[sample.status] += 1
 
 
 def time_of_day(clock: Callable[[], float], last: datetime | None = None) -> Callable[[], datetime]:
-    """Return the time of day that goes as fast as `clock`, so that runs on scaled time lie apart as their samples do.
+    """Return the time of day that goes as fast as a scaled `clock`, so that runs on it lie apart as their samples do.
 
     Args:
-        clock: machine time [s].
+        clock: machine time, faster than real time [s].
         last: start of the last run of a session that goes on; time of day never falls behind it.
     """
     begun_s = clock()

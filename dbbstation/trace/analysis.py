@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 MOST_STEPS = 20
 CENTRE_TOLERANCE_MM = 1e-12
 
+AGREED_MM = 1e-9
+"""Change of the centre below which angles about the ball are settled: a thousandth of what bars resolve [mm]."""
+
 
 @dataclass(frozen=True)
 class CircleFigures:
@@ -74,6 +77,49 @@ def best_circle(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class BallPath:
+    """A path as seen from the fixed ball, and its least-squares circle.
+
+    Attributes:
+        theta_deg: angles about the ball, from +X towards +Y, within 0 to 360, shape (n,) [deg].
+        centre_mm: of the circle, from the ball, shape (2,) [mm].
+        radius_mm: of the circle [mm].
+        deviation_mm: radial deviations of the points from the circle, shape (n,) [mm].
+    """
+
+    theta_deg: NDArray[np.float64]
+    centre_mm: NDArray[np.float64]
+    radius_mm: float
+    deviation_mm: NDArray[np.float64]
+
+
+def path_about_ball(theta_deg: NDArray[np.float64], radius_mm: NDArray[np.float64]) -> BallPath:
+    """Least-squares circle of a path, with each point at its angle about the fixed ball.
+
+    A recording has commanded angles, which count about the commanded centre. Seen from a ball that stands c beside it a
+    point is turned by about c/R. Taken at its commanded angle, a perfect circle would have the second harmonic c²/(2R):
+    0.13 µm at 0.2 mm, 13 µm at 2 mm.
+
+    Args:
+        theta_deg: commanded angles, shape (n,) [deg].
+        radius_mm: distances from the fixed ball in the plane of the circle, shape (n,) [mm].
+
+    Raises:
+        TraceError: the points do not determine a circle.
+    """
+    theta = np.radians(theta_deg)
+    about_ball_deg = theta_deg
+    centre, radius, deviation = best_circle(theta_deg, radius_mm)
+    for _ in range(MOST_STEPS):
+        about_ball_deg = np.degrees(np.arctan2(centre[1] + radius * np.sin(theta), centre[0] + radius * np.cos(theta)))
+        last = centre
+        centre, radius, deviation = best_circle(about_ball_deg, radius_mm)
+        if np.abs(centre - last).max() < AGREED_MM:
+            break
+    return BallPath(np.mod(about_ball_deg, 360.0), centre, radius, deviation)
+
+
 def horizontal_radius_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distance of the moving ball from the vertical through the fixed ball, where the bar is raised [mm]."""
     height = raw.circle.bar_mm * np.sin(np.radians(raw.circle.elevation_deg))
@@ -98,16 +144,16 @@ _MEASURED: WeakKeyDictionary[RawCircle, CircleFigures] = WeakKeyDictionary()
 
 
 def _figures(raw: RawCircle, length_mm: NDArray[np.float64]) -> CircleFigures:
-    centre, _, deviation = best_circle(raw.theta_deg, horizontal_radius_mm(raw, length_mm))
+    path = path_about_ball(raw.theta_deg, horizontal_radius_mm(raw, length_mm))
     return CircleFigures(
-        centre_mm=(float(centre[0]), float(centre[1])),
+        centre_mm=(float(path.centre_mm[0]), float(path.centre_mm[1])),
         mean_radial_error_um=1e3 * float((length_mm - raw.circle.bar_mm).mean()),
-        circularity_um=1e3 * float(np.ptp(deviation)),
+        circularity_um=1e3 * float(np.ptp(path.deviation_mm)),
     )
 
 
 def centred(raw: RawCircle) -> CentredCircle:
-    """Remove the centre, as the standard circular test does [CAL III-A step 4].
+    """Remove the centre, as the standard circular test does [CAL III-A step 4], at commanded angles [CAL eq 6].
 
     Raises:
         TraceError: the points do not determine a circle.

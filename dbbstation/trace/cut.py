@@ -67,21 +67,27 @@ INSIDE_FEEDINGS = 3.0
 """How far from an edge, in durations of the feed-in, its two levels are read."""
 
 
-def cut(recording: Recording, circle: Circle) -> RawCircle:
+def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircle:
     """Return the full turn of a recording.
 
     Rows with angles are taken as they are: they are cut already. Otherwise the turn is anchored midway between
     feed-in and feed-out, and angles follow from the programmed feed: controls dwell at the corners, so the
     trace's duration says little.
 
+    Args:
+        recording: of a whole run.
+        circle: as commanded.
+        counted_lost: samples that the line counted as lost in it.
+
     Raises:
         TraceError: no feed-in or feed-out, a gap, a bar that left the circle, or a feed that is not the
-            programmed one; with the lost samples first where the times show some, since these may be the cause.
+            programmed one; with the lost samples first where the line counted some or the times show some, since these
+            may be the cause.
     """
     try:
         return _cut(recording, circle)
     except TraceError as error:
-        lost = lost_samples(recording.t_s)
+        lost = max(lost_samples(recording.t_s), counted_lost)
         if not lost:
             raise
         raise TraceError(
@@ -108,10 +114,21 @@ def _cut(recording: Recording, circle: Circle) -> RawCircle:
         phi = _along(circle.phi_deg(recording.theta_deg))
         return _selected(recording, circle, phi, np.ones(len(recording), dtype=bool))
     edges = edges_of(recording, circle)
-    phi = FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
+    phi = progress_deg(recording, circle, edges)
     _check_feed(recording, circle, edges)
     raw = _selected(recording, circle, phi, (phi >= 0.0) & (phi < FULL_TURN_DEG))
     return replace(raw, start_uncertainty_deg=start_uncertainty_deg(recording, circle))
+
+
+def progress_deg(recording: Recording, circle: Circle, edges: tuple[float, float]) -> NDArray[np.float64]:
+    """Progress of every sample along the turn by the programmed feed, 0 at its start, shape (n,) [deg].
+
+    Args:
+        recording: as recorded.
+        circle: as commanded.
+        edges: times of feed-in and feed-out [s].
+    """
+    return FULL_TURN_DEG / 2.0 + (recording.t_s - (edges[0] + edges[1]) / 2.0) * circle.turning_deg_s
 
 
 def start_uncertainty_deg(recording: Recording, circle: Circle) -> float:

@@ -11,16 +11,16 @@ from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer
 
-from dbbstation.station.commands import Accept, Command, Quit, Reject, Repeat, Skip, Start
+from dbbstation.service.board import Board
+from dbbstation.station.commands import Accept, Command, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import FINAL, RECORDING
-from dbbstation.tui.board import Board
 from dbbstation.tui.figures_panel import FiguresPanel
 from dbbstation.tui.jig_map import JigMap
 from dbbstation.tui.message_lines import MessageLines
 from dbbstation.tui.now_line import NowLine
 from dbbstation.tui.panel import Panel
 from dbbstation.tui.progress_line import ProgressLine
-from dbbstation.tui.quit_question import QuitQuestion
+from dbbstation.tui.question import GiveUpQuestion
 from dbbstation.tui.reading_panel import ReadingPanel
 from dbbstation.tui.run_list import RunList
 from dbbstation.tui.set_up_panel import SetUpPanel
@@ -34,8 +34,10 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
     from textual.binding import BindingType
 
+    from dbbstation.plan.circle import Direction
+    from dbbstation.service.board import SequenceOpened
+    from dbbstation.service.live_trace import Centred, LiveTrace
     from dbbstation.station.events import Event
-    from dbbstation.tui.board import SequenceOpened
 
 LOOK_S = 0.1
 """Between looks into the mailbox [s]: ten pictures per second are fluent, more is work that nobody sees."""
@@ -47,7 +49,12 @@ _COMMANDS: dict[str, Command] = {
     "repeat": Repeat(),
     "reject": Reject(),
     "skip": Skip(),
+    "pause": Pause(),
+    "resume": Resume(),
 }
+
+_GIVES_UP = {"repeat": "Repeat", "reject": "Reject"}
+"""Commands that end a running circle, as the question before them says."""
 
 _TALL_ROWS = 32
 """From so many rows on there is room for more than the necessary."""
@@ -116,11 +123,14 @@ class StationApp(App[None]):
     VERTICAL_BREAKPOINTS = [(0, "-low"), (_TALL_ROWS, "-tall")]  # noqa: RUF012 - declared by Textual, as an attribute of instances
     BINDINGS: ClassVar[list[BindingType]] = [
         ("enter", "tell('start')", "Start"),
-        ("m", "tell('touched')", "Start, holder touched"),
+        ("m", "tell('touched')", "Start, new mounting"),
         ("a", "tell('accept')", "Accept"),
         ("r", "tell('repeat')", "Repeat"),
         ("x", "tell('reject')", "Reject"),
         ("s", "tell('skip')", "Skip"),
+        ("p", "tell('pause')", "Pause"),
+        ("p", "tell('resume')", "Go on"),
+        ("v", "view", "View"),
         ("c", "connect", "Connect again"),
         ("d", "brightness", "Dark/light"),
         ("q", "leave", "Quit"),
@@ -136,6 +146,7 @@ class StationApp(App[None]):
         self._runner = runner
         self._keys: object = None
         self._leaving = False
+        self._centred = False
 
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""
@@ -168,6 +179,7 @@ class StationApp(App[None]):
         """Take the mail and draw what changed."""
         for event in self._runner.mail():
             self.board.take(event)
+        self._drop_stale_question()
         self.draw()
         if self._runner.crash is not None or (self._leaving and not self._runner.alive):
             self.exit()
@@ -180,11 +192,25 @@ class StationApp(App[None]):
         for panel in base.query(Panel):
             panel.show(self.board)
         for view in base.query(TraceView):
-            view.show(self.board.circle, self.board.traces, self.board.running)
+            view.show(self.board.circle, self._shown_traces(), None if self._centred else self.board.running)
         keys = (self.board.allowed, self.board.state, self.board.fault is None)
         if keys != self._keys:
             self._keys = keys
             self.refresh_bindings()
+
+    def _shown_traces(self) -> Mapping[Direction, LiveTrace | Centred]:
+        """Traces as measured, or those of complete circles about their own centre."""
+        if not self._centred:
+            return self.board.traces
+        return {way: trace.centred for way, trace in self.board.traces.items() if trace.centred is not None}
+
+    def _drop_stale_question(self) -> None:
+        """Take a question back whose circle has ended meanwhile: an answer to it would hit something else."""
+        question = self.screen
+        if isinstance(question, GiveUpQuestion):
+            running = self.board.state in RECORDING and self.board.announced is not None
+            if not running or self.board.announced is None or self.board.announced.run.label != question.run:
+                question.dismiss(result=False)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Only keys that mean something now stand in the footer and do something."""
@@ -195,8 +221,27 @@ class StationApp(App[None]):
         return True
 
     def action_tell(self, name: str) -> None:
-        """Send a command."""
-        self._runner.send(_COMMANDS[name])
+        """Send a command, after a question where it gives up a circle that is being recorded."""
+        if name in _GIVES_UP and self.board.state in RECORDING:
+            self._ask(_GIVES_UP[name], lambda sure: self._tell_if(name, sure=bool(sure)))
+        else:
+            self._runner.send(_COMMANDS[name])
+
+    def _tell_if(self, name: str, *, sure: bool) -> None:
+        if sure:
+            self._runner.send(_COMMANDS[name])
+
+    def _ask(self, act: str, then: Callable[[bool | None], None]) -> None:
+        """Ask whether to give up the circle; one question at a time."""
+        if isinstance(self.screen, GiveUpQuestion):
+            return
+        run = self.board.announced.run.label if self.board.announced else ""
+        self.push_screen(GiveUpQuestion(run, act), then)
+
+    def action_view(self) -> None:
+        """Change between the circle as measured and its form about its own centre."""
+        self._centred = not self._centred
+        self.draw()
 
     def action_connect(self) -> None:
         """Open instrument and session again after a fault."""
@@ -208,9 +253,8 @@ class StationApp(App[None]):
 
     def action_leave(self) -> None:
         """Quit, after a question where a circle is being recorded."""
-        run = self.board.announced.run.label if self.board.announced else ""
         if self.board.state in RECORDING:
-            self.push_screen(QuitQuestion(run), self.leave)
+            self._ask("Quit", self.leave)
         else:
             self.leave(sure=True)
 

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from dbbstation.service.board import Verdict
 from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
+    from dbbstation.service.board import Board
     from dbbstation.station.events import RunCompleted
-    from dbbstation.tui.board import Board
 
 _NAME = 13
 
@@ -23,17 +24,18 @@ class FiguresPanel(Panel):
     def text(self, board: Board) -> Content:
         """Return titles and rows."""
         titles = f"{'figures [µm]':{_NAME}}{'centre':>8}{'mean':>8}{'circul.':>8}"
-        rows = [Content(_row(result)) for result in board.results]
+        rows = [_row(result, board.verdicts.get(result.run.label, Verdict.NONE)) for result in board.results]
         empty = Content.styled("of the finished runs stand here", "dim")
         return lines(Content.styled(titles, "dim"), *(rows or [empty]))
 
 
-def _row(completed: RunCompleted) -> str:
+def _row(completed: RunCompleted, verdict: Verdict) -> Content:
     figures = completed.figures
     name = f"{_short(completed.run.label):{_NAME}}"
     if figures is None:
-        return f"{name}no circle"
-    return f"{name}{figures.centre_deviation_um:8.1f}{figures.mean_radial_error_um:+8.1f}{figures.circularity_um:8.1f}"
+        return Content(f"{name}no circle")
+    row = f"{name}{figures.centre_deviation_um:8.1f}{figures.mean_radial_error_um:+8.1f}{figures.circularity_um:8.1f}"
+    return Content.styled(f"{row} x", "dim strike") if verdict is Verdict.REJECTED else Content(row)
 
 
 def _short(label: str) -> str:

@@ -11,7 +11,7 @@ from dbbstation.tui.panel import Panel
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.tui.board import Board
+    from dbbstation.service.board import Board
 
 COLUMNS, ROWS = 13, 5
 

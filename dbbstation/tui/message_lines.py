@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from dbbstation.tui.messages import Message, Weight
+from dbbstation.service.messages import Message, Weight
 from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
-    from dbbstation.tui.board import Board
+    from dbbstation.service.board import Board
 
 _STYLES = {Weight.NOTE: "", Weight.WARNING: "$text-warning", Weight.FAULT: "bold $text-error"}
 

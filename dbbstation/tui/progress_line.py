@@ -10,7 +10,7 @@ from dbbstation.station.states import RECORDING, State
 from dbbstation.tui.panel import Panel
 
 if TYPE_CHECKING:
-    from dbbstation.tui.board import Board
+    from dbbstation.service.board import Board
 
 _FIXED = 60
 """Letters beside the two bars."""

@@ -7,16 +7,20 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from dbbstation.station.states import State
 from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dbbstation.service.board import Board
     from dbbstation.station.events import Sample
-    from dbbstation.tui.board import Board
 
 _STALE_S = 1.5
 """Without a new reading for so long the last one is shown as old: it must not look live [s]."""
+
+_WITHOUT_BAR = {None, State.BETWEEN, State.ANNOUNCED, State.PAUSED}
+"""States in which no bar need be in its place."""
 
 _FAR_UM = 9_999.9
 """Further from the nominal length a deviation in µm says nothing."""
@@ -68,6 +72,9 @@ def _deviation(sample: Sample, board: Board) -> Content:
 
 
 def _quality(sample: Sample, board: Board, old_s: float | None) -> list[Content]:
+    if sample.status != "ok" and board.state in _WITHOUT_BAR:
+        # Nobody has put the bar in yet: that is no fault.
+        return [Content.styled(f"no bar: {sample.said or sample.status}", "dim")]
     if sample.status != "ok":
         # What the instrument says needs the room.
         return [Content.styled(f"{sample.status.upper()} {sample.said}".rstrip(), "bold $text-error")]

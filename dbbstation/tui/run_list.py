@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from dbbstation.tui.board import Mark
+from dbbstation.service.board import Mark
 from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
-    from dbbstation.tui.board import Board
+    from dbbstation.service.board import Board
 
 _SIGNS = {
     Mark.OPEN: ("·", "dim"),

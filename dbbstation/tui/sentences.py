@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.service.messages import problem_alone
 from dbbstation.station.states import State
-from dbbstation.tui.messages import problem_alone
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dbbstation.service.board import Board
     from dbbstation.station.events import RunAnnounced
-    from dbbstation.tui.board import Board
 
 _BEGIN = "Opening instrument and session …"
 
@@ -53,6 +53,10 @@ def _leaving(_board: Board) -> str:
 
 def _verdict(board: Board) -> str:
     name = board.completed.run.label if board.completed else "The run"
+    wrong = board.completed.wrong if board.completed else ()
+    if wrong:
+        more = f" ({len(wrong) - 1} more)" if len(wrong) > 1 else ""
+        return f"{name}, {wrong[0].name} wrong{more}: {_ended(wrong[0].text)} R measures it again, A accepts it all the same."
     return f"{name} is complete: A accepts it, R measures it again, X rejects it and goes on."
 
 
@@ -60,6 +64,10 @@ def _flawed(board: Board) -> str:
     problem = problem_alone(board.completed) if board.completed else ""
     name = board.completed.run.label if board.completed else "the run"
     return f"No usable circle in {name}: {_ended(problem)} R measures it again, X leaves it out."
+
+
+def _paused(_board: Board) -> str:
+    return "Pause: nothing is recorded and nothing is waited for. P goes on."
 
 
 _SENTENCES: dict[State, Callable[[Board], str]] = {
@@ -70,6 +78,7 @@ _SENTENCES: dict[State, Callable[[Board], str]] = {
     State.LEAVING: _leaving,
     State.COMPLETE: _verdict,
     State.FLAWED: _flawed,
+    State.PAUSED: _paused,
 }
 
 

@@ -11,8 +11,8 @@ from dbbstation.tui.panel import Panel, lines
 if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Ball
+    from dbbstation.service.board import Board
     from dbbstation.station.events import RunAnnounced
-    from dbbstation.tui.board import Board
 
 
 class SetUpPanel(Panel):
@@ -32,7 +32,7 @@ class SetUpPanel(Panel):
             Content.assemble(what, " ", (on, "bold")),
             Content.assemble("ball ", (ball.name, "bold")),
             Content.assemble("tilt ", (_tilt(circle), "bold")),
-            Content(f"bar {circle.bar_mm:g} mm {_elevation(circle)}"),
+            Content.assemble(f"bar {circle.bar_mm:g} mm {_elevation(circle)}", _too_slow(announced)),
         )
 
 
@@ -42,6 +42,13 @@ def _place(ball: Ball) -> tuple[str, str, str]:
         x, y, z = ball.centre_mm
         return "under spindle", "at", f"X {x:g} Y {y:g} Z {z:g}"
     return "no bore" if ball.bore is None else f"bore {ball.bore}", "holder", ball.holder
+
+
+def _too_slow(announced: RunAnnounced) -> Content:
+    seen = announced.sampling
+    if seen is None or seen.enough:
+        return Content("")
+    return Content.styled(f", only {seen.points_per_turn:.0f} points per turn", "$text-warning")
 
 
 def _touch(announced: RunAnnounced) -> Content:

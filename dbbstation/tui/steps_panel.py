@@ -10,7 +10,7 @@ from dbbstation.station.states import State
 from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
-    from dbbstation.tui.board import Board
+    from dbbstation.service.board import Board
 
 
 class StepsPanel(Panel):

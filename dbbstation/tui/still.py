@@ -10,10 +10,10 @@ from dbbstation.tui.app import DARK, StationApp
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from dbbstation.service.board import SequenceOpened
     from dbbstation.station.commands import Command
     from dbbstation.station.events import Event
     from dbbstation.tui.app import Shown
-    from dbbstation.tui.board import SequenceOpened
 
 
 _ROUNDS = 4

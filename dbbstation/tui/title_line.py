@@ -9,7 +9,7 @@ from textual.content import Content
 from dbbstation.tui.panel import Panel
 
 if TYPE_CHECKING:
-    from dbbstation.tui.board import Board
+    from dbbstation.service.board import Board
 
 
 class TitleLine(Panel):

@@ -12,6 +12,7 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from dbbstation.plan.circle import Direction
+from dbbstation.service.live_trace import Centred
 from dbbstation.tui import braille
 from dbbstation.tui.polar import (
     BAND_SHARE,
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
     from rich.style import Style
 
     from dbbstation.plan.circle import Circle
+    from dbbstation.service.live_trace import LiveTrace
     from dbbstation.tui.braille import Plane
-    from dbbstation.tui.trace import LiveTrace
 
 _SCALE, _CCW, _CW, _LABEL = 1, 2, 4, 8
 """Who has a dot in a cell: the bits of `braille.overlay`, in the order the planes are given, and one for text."""
@@ -70,8 +71,8 @@ class TraceView(Widget):
     def __init__(self, *, cell_aspect: float = CELL_ASPECT, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._cell_aspect = cell_aspect
-        self._traces: dict[Direction, LiveTrace] = {}
-        self._drawn: dict[Direction, tuple[LiveTrace, int]] = {}
+        self._traces: dict[Direction, LiveTrace | Centred] = {}
+        self._drawn: dict[Direction, tuple[LiveTrace | Centred, int]] = {}
         self._head: Direction | None = None
         self._circle: Circle | None = None
         self._scale_um = SMALLEST_SCALE_UM
@@ -87,7 +88,9 @@ class TraceView(Widget):
         """Deviation at the outer ring [µm]."""
         return self._scale_um
 
-    def show(self, circle: Circle | None, traces: Mapping[Direction, LiveTrace], head: Direction | None = None) -> None:
+    def show(
+        self, circle: Circle | None, traces: Mapping[Direction, LiveTrace | Centred], head: Direction | None = None
+    ) -> None:
         """Draw what has come since the last call.
 
         Args:
@@ -217,7 +220,8 @@ class TraceView(Widget):
             return "no circle yet"
         times = self._dial.magnification(self._scale_um, self._circle.radius_mm)
         tests = dict.fromkeys(trace.run.test for trace in self._traces.values())
-        return f"{' '.join(tests)} {'+'.join(self._traces)} · ring ±{self._scale_um:g} µm · ×{_rounded(times)}"
+        centred = " centred" if any(isinstance(trace, Centred) for trace in self._traces.values()) else ""
+        return f"{' '.join(tests)} {'+'.join(self._traces)}{centred} · ring ±{self._scale_um:g} µm · ×{_rounded(times)}"
 
     def _legend(self, wide: int) -> Strip:
         base, styles = self.rich_style, self._styles()

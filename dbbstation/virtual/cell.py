@@ -40,12 +40,15 @@ class VirtualCell:
         self._clock = clock
         self._lock = threading.Lock()
         self._running: _Running | None = None
+        self._block_mm: float | None = None
         self._origin_s: float | None = None
 
     def length_mm_at(self, t_s: float) -> float | None:
         """Reading at a virtual time [mm]; None while the bar lies aside."""
         with self._lock:
-            running = self._running
+            running, block_mm = self._running, self._block_mm
+        if block_mm is not None:
+            return block_mm + self.machine.bar_error_mm + self.machine.noise_mm()
         if running is None:
             return None
         return running.run.length_mm_at(t_s - running.begin_s) + self.machine.noise_mm()
@@ -61,8 +64,21 @@ class VirtualCell:
             names = ", ".join(self.machine.plan.tests)
             raise MachineError(f"the plan has no test {test}", where="virtual machine", remedy=f"its tests: {names}")
         with self._lock:
-            self._running = None
+            self._running = self._block_mm = None
             return self.machine.mount(self.machine.plan.tests[test].ball)
+
+    def calibrate(self, length_mm: float) -> None:
+        """Put the bar on a calibrator, until a ball is put up or a run started.
+
+        Args:
+            length_mm: of the calibrator [mm].
+
+        Raises:
+            MachineError: a run goes on.
+        """
+        self._refuse_while_running("put the bar on its calibrator")
+        with self._lock:
+            self._running, self._block_mm = None, length_mm
 
     def start(self, test: str, direction: Direction, path: CommandedPath | None = None) -> VirtualRun:
         """Start a run now; its ball is put up first where another one stands.
@@ -76,13 +92,14 @@ class VirtualCell:
         # Computing and standing take some real time, which on a fast clock is a while; slow errors do not mind.
         run = self.machine.run(test, direction, path=path, begin_s=self._clock() - self._origin_s)
         with self._lock:
+            self._block_mm = None
             self._running = _Running(run, self._clock() + STAND_S * self._clock.scale)
         return run
 
     def stop(self) -> None:
         """Stop the machine where it is and lay the bar aside."""
         with self._lock:
-            self._running = None
+            self._running = self._block_mm = None
 
     @property
     def running(self) -> bool:

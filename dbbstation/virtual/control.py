@@ -2,6 +2,7 @@
 
     mount TEST                       put up the ball of a test, in any case a new mounting
     start TEST DIRECTION [PROGRAM]   run a circle; its ball is put up first where another one stands
+    calibrator LENGTH_MM             put the bar on a calibrator of this length
     status                           what the machine does
     truth                            everything that is wrong with it
     stop                             stop the machine, lay the bar aside
@@ -13,6 +14,7 @@ Every answer has `ok`; where that is false, `error` says why.
 from __future__ import annotations
 
 import json
+import re
 import selectors
 import socket
 import threading
@@ -63,21 +65,20 @@ class CellCommands:
             case ["start", test, direction, *program] if direction in set(Direction) and len(program) <= 1:
                 run = self._cell.start(test, Direction(direction), self._path(program))
                 return {"mounting": run.mounting, "duration_s": round(run.path.duration_s, 3)}
+            case ["calibrator", length] if re.fullmatch(r"[0-9]{1,4}(\.[0-9]{1,9})?", length):
+                self._cell.calibrate(float(length))
             case ["status"]:
                 return self._cell.status()
             case ["truth"]:
                 return self._cell.machine.describe()
             case ["stop"]:
                 self._cell.stop()
-                return {}
             case ["quit"]:
                 self.quit.set()
-                return {}
-        raise MachineError(
-            f"`{line}` is no command",
-            where="virtual machine",
-            remedy="mount TEST, start TEST ccw|cw [PROGRAM], status, truth, stop, quit",
-        )
+            case _:
+                remedy = "mount TEST, start TEST ccw|cw [PROGRAM], calibrator LENGTH_MM, status, truth, stop, quit"
+                raise MachineError(f"`{line}` is no command", where="virtual machine", remedy=remedy)
+        return {}
 
     def _path(self, program: list[str]) -> CommandedPath | None:
         if not program:

@@ -85,6 +85,11 @@ class VirtualMachine:
         self._bar = self._scatter.bar(_BAR)
         self._noise = np.random.default_rng([seed, 5])
 
+    @property
+    def bar_error_mm(self) -> float:
+        """What the bar reads less the true distance [mm]."""
+        return float(self._bar.values[0])
+
     def check(self) -> None:
         """Compute every run of the plan once, so that what cannot be run is known before anything starts.
 

@@ -5,6 +5,7 @@ It is driven by the same grammar as the driver. What it measures is a function o
 
 from __future__ import annotations
 
+import random
 import threading
 from collections import deque
 from contextlib import suppress
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.codec import encode
+from dbbstation.instrument.fields import Content
 from dbbstation.virtual.wire_clock import ScaledClock
 from dbbstation.virtual.wire_ends import HAS_PTY, open_end
 from dbbstation.virtual.wire_uart import heard_at
@@ -56,6 +58,7 @@ class VirtualInstrument:
         baud: rate that the device is set to. On a pseudo-terminal the rate of the program at the other end is known,
             and where the two differ, both hear what a wrong baud rate makes of the bytes.
         pty: use a pseudo-terminal; otherwise a loopback socket.
+        seed: of the moments, within its bounds, at which a device that is asked takes its length.
 
     Attributes:
         port: what a program opens to talk to it.
@@ -71,6 +74,7 @@ class VirtualInstrument:
         rate_hz: float | None = None,
         baud: int | None = None,
         pty: bool = HAS_PTY,
+        seed: int = 0,
     ) -> None:
         self.protocol = protocol
         self.clock = clock or ScaledClock()
@@ -89,6 +93,8 @@ class VirtualInstrument:
         self._outgoing: deque[_Outgoing] = deque()
         self._incoming = b""
         self._running = not protocol.ask.start
+        self._dice = random.Random(seed)  # noqa: S311 (no secret hangs on it)
+        self._fault = False
         self._counter = 0
         self._next_sample_s = 0.0
         self._silent = False
@@ -196,7 +202,9 @@ class VirtualInstrument:
     def _hear(self, raw: bytes) -> None:
         """Act on every complete command; forget bytes that begin none."""
         ask = self.protocol.ask
-        commands = sorted({ask.request, *(step.send for step in ask.start + ask.stop)} - {b""}, key=len, reverse=True)
+        follow_up = b"" if ask.follow_up is None else ask.follow_up.request
+        known = {ask.request, follow_up, *(step.send for step in ask.start + ask.stop)} - {b""}
+        commands = sorted(known, key=len, reverse=True)
         with self._lock:
             seen_s = self.clock()
             self._incoming += raw
@@ -226,8 +234,14 @@ class VirtualInstrument:
                     self._running = True
                     self._next_sample_s = now_s
                 return
+        replied_s = now_s + timing.reply_latency_s
+        if ask.follow_up is not None and ask.follow_up.request == command:
+            # What explains a fault comes first, that there is none to explain last.
+            frame = ask.follow_up.frames[0 if self._fault else -1]
+            self._send(frame.write(Content(0.0)), replied_s)
+            return
         if self._running:
-            self._send_sample(now_s + timing.latch_delay_s, now_s + timing.reply_latency_s)
+            self._send_sample(now_s + self._dice.uniform(*self.protocol.latch_bounds_s()), replied_s)
 
     def _sample(self, now_s: float, *, connected: bool) -> None:
         """Take the samples of a stream that are due; where nobody listens they are gone, as on a real line."""
@@ -247,7 +261,9 @@ class VirtualInstrument:
         raw = b""
         # A device without a way to say that it has no value says nothing.
         with suppress(InstrumentError):
-            raw = encode(self.protocol, self._length_mm_at(at_s), counter=counter)
+            length_mm = self._length_mm_at(at_s)
+            self._fault = length_mm is None
+            raw = encode(self.protocol, length_mm, counter=counter)
         if self._to_cut is None:
             self._send(raw, start_s)
             return

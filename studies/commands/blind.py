@@ -8,13 +8,15 @@ from typing import Any
 
 import click
 
+from dbbstation.cli.figure_option import figure_option, format_of
+
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path, exists=True, file_okay=False))
 @click.option("--candidates", metavar="A,B,...", help="Error sources to compare [default: all, as in `diagnose`].")
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of processes [default: all cores].")
 @click.option("--again", is_flag=True, help="Diagnose sessions again that have a verdict already.")
-@click.option("--figure", type=click.Path(path_type=Path, dir_okay=False), help="Reliability diagram, as SVG.")
+@figure_option("Draw the reliability diagram here")
 @click.option("--force", is_flag=True, help="Overwrite the figure.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def blind(
@@ -31,7 +33,8 @@ def blind(
 
     FOLDER has one session folder per recording and `answers.json`, which is opened only after every session has
     its verdict. Verdicts are kept in FOLDER/verdicts at once, so that a study can be interrupted and goes on where
-    it stopped. --figure draws how often causes were there that were given a probability. The simulation under tests/plant makes such folders: it shares no code with this program.
+    it stopped. --figure draws how often causes were there that were given a probability. The simulation under
+    tests/plant makes such folders: it shares no code with this program.
 
     \b
     Examples:
@@ -76,7 +79,7 @@ def blind(
         raise InputError([Problem(str(folder), 0, 0, what, "judge the sessions with --again, or leave --figure out")])
     from studies.blind_figure import reliability_figure
 
-    write_bytes(figure, reliability_figure(found["reliability"]), force=force)
+    write_bytes(figure, reliability_figure(found["reliability"], format_of(figure)), force=force)
     say(f"figure written to {figure}")
 
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.number_types import Finite
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     "--size-um",
     default=5.0,
     show_default=True,
-    type=click.FloatRange(0.1, 500.0),
+    type=Finite(0.1, 500.0),
     help="Standard deviation of a joint coordinate's error.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")

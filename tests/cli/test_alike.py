@@ -35,6 +35,7 @@ NO_TESTS = {
     "session accept": "takes one run by its name",
     "session reject": "takes one run by its name",
     "session seal": "hashes all recordings",
+    "session amend": "changes plan or machine of the whole session",
     "session take-in": "takes in all that lie in the folder",
     "settings": "looks beside the session and does not read it",
     "study coverage": "its --plan chooses between its own two plans",

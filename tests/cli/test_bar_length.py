@@ -40,7 +40,7 @@ def test_a_stated_stroke_holds(run, spoilt):
 
 
 def measure(run, tmp_path, instrument, length_mm):
-    told = ("--bar-length-mm", length_mm, "--bar-uncertainty-um", "0.5")
+    told = ("--bar-length-mm", length_mm, "--bar-uncertainty-um", "0.5", "--bar-waiver", "no calibrator here")
     where = ("--port", tmp_path / "no-port", "--out", tmp_path / "session")
     return run("measure", "--plan", PLAN, "--machine", MACHINE, "--instrument", instrument, *where, *told)
 
@@ -56,8 +56,7 @@ def test_the_stroke_comes_from_the_instrument_file(run, tmp_path):
     shipped = shipped_folder("protocols") / "instruments" / "heidenhain-nd281b.yaml"
     own = tmp_path / "short-gauge.yaml"
     text = shipped.read_text().replace("name: heidenhain-nd281b", "name: short-gauge")
-    text = text.replace("dbb-instrument/1", "dbb-instrument/2")
-    own.write_text(text.replace("length:\n", "length:\n  stroke_mm: 1.0\n"))
+    own.write_text(text.replace("\nlength:\n", "\nlength:\n  stroke_mm: 1.0\n"))
     outcome = measure(run, tmp_path, own, "152")
     assert outcome.code == FAILED
     assert "stroke of 1 mm" in outcome.err

@@ -25,9 +25,12 @@ STORED = {
     "dbb-model/1": FIXTURES / "models" / "small.yaml",
     "dbb-model/2": FIXTURES / "models" / "greatest-feed.yaml",
     "dbb-model/3": FIXTURES / "models" / "provenance.yaml",
-    "dbb-settings/1": FIXTURES / "settings" / "every-key.yaml",
+    "dbb-settings/1": FIXTURES / "settings" / "version-1.yaml",
+    "dbb-settings/2": FIXTURES / "settings" / "every-key.yaml",
+    "dbb-bar/1": FIXTURES / "bars" / "zerodur.yaml",
     "dbb-session/1": FIXTURES / "sessions" / "under-spindle",
     "dbb-session/2": FIXTURES / "sessions" / "small",
+    "dbb-session/3": FIXTURES / "sessions" / "sealed",
 }
 """One stored file of each version."""
 

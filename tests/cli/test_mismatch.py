@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import hashlib
+import json
 
 import numpy as np
 import pytest
@@ -153,3 +155,23 @@ def test_what_cannot_be_used_is_left_out_and_said(run, warm, tmp_path):
     assert "`word` has no numbers and is left out" in outcome.err
     assert "`copy` is measured and simulated value over again, and is left out" in outcome.err
     assert {v["name"] for v in outcome.data["variables"]} == {"t_s", "place_mm", "screw_deg", "load_n", "oil_temp_c"}
+
+
+def test_a_table_with_decimal_commas_says_the_same(run, warm, tmp_path):
+    german, out, plain = tmp_path / warm.name, tmp_path / "out.csv", tmp_path / "plain.csv"
+    german.write_text(warm.read_text().replace(",", ";").replace(".", ","))
+    told = run("mismatch", german, *QUICK, "--decimal", ",", "--out", out, "--json").data
+    expected = run("mismatch", warm, *QUICK, "--out", plain, "--json").data
+    assert told["findings"] == expected["findings"]
+    assert out.read_text() == plain.read_text()
+    outcome = run("mismatch", german, *QUICK)
+    assert outcome.code == FAILED
+    assert "not a finite number" in outcome.err
+
+
+def test_the_table_says_where_it_comes_from(run, warm, tmp_path):
+    out = tmp_path / "out.csv"
+    assert run("mismatch", warm, *QUICK, "--out", out).code == DONE
+    told = json.loads((tmp_path / "out.csv.provenance.json").read_text())
+    assert list(told["inputs"].values()) == [hashlib.sha256(warm.read_bytes()).hexdigest()]
+    assert told["command"].startswith("dbbstation mismatch")

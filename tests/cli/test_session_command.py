@@ -12,8 +12,13 @@ import pytest
 
 from dbbstation.cli import main
 from dbbstation.errors import InputError
+from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.recordings.entries import RunState, run_entry
+from dbbstation.files.recordings.seal import chained
 from dbbstation.files.recordings.sealing import sealing
-from dbbstation.files.recordings.session import RunState, read_session
+from dbbstation.files.recordings.session import read_session
+from dbbstation.files.yaml.schema import validate
+from dbbstation.files.yaml.text import parse_yaml
 from tests.plant.session import record
 
 
@@ -74,20 +79,22 @@ def test_no_run_of_that_name(capsys, folder):
 def test_sealing_puts_back_every_hash_and_nothing_else(capsys, folder):
     file = folder / "session.yaml"
     sealed = file.read_text(encoding="utf-8")
-    assert run(capsys, "seal", folder)[1] == "every run has a hash already\n"
     bare = re.sub(r", sha256: [0-9a-f]{64}", "", sealed)
     file.write_text(bare, encoding="utf-8")
     with pytest.raises(InputError, match="no sha256"):
         read_session(folder)
     code, out, _ = run(capsys, "seal", folder, "--dry-run")
     assert code == 0
-    assert out.count("would be sealed") == bare.count("file: runs/")
+    assert out.count("csv: would be sealed") == bare.count("file: runs/")
     assert file.read_text(encoding="utf-8") == bare
     assert run(capsys, "seal", folder)[0] == 0
     assert [r.sha256 for r in read_session(folder).runs] == [
         hashlib.sha256(r.path.read_bytes()).hexdigest() for r in read_session(folder).runs
     ]
-    assert re.sub(r", sha256: [0-9a-f]{64}", "", file.read_text(encoding="utf-8")) == bare
+    whole = file.read_text(encoding="utf-8")
+    assert run(capsys, "seal", folder)[1] == "every run and file is sealed already\n"
+    without = re.sub(r", (chain_)?sha256: [0-9a-f]{64}", "", re.sub(r"seal:\n(  .*\n)+(?=runs:)", "", whole))
+    assert without.replace("dbb-session/3", "dbb-session/1") == bare
 
 
 def test_a_file_written_by_hand_keeps_its_comments(folder):
@@ -110,10 +117,20 @@ runs:
     found = sealing(folder)
     digests = [hashlib.sha256((folder / "runs" / name).read_bytes()).hexdigest() for name in names]
     assert found.files == (f"runs/{names[0]}", f"runs/{names[1]}")
-    assert f"  # the first one\n    sha256: {digests[0]}\n    state: accepted" in found.text
-    assert f"file: runs/{names[1]}, sha256: {digests[1]}, state: accepted}}" in found.text
-    assert found.text.count("sha256") == 2
-    assert found.text.startswith("# made with the old program\n")
+    first, second, never = [
+        run.chain_sha256 for run in chained([run_entry(r, folder) for r in parsed(found.text).runs])
+    ]
+    assert f"  # the first one\n    sha256: {digests[0]}\n    chain_sha256: {first}\n    state: accepted" in found.text
+    assert f"file: runs/{names[1]}, sha256: {digests[1]}, chain_sha256: {second}, state: accepted}}" in found.text
+    assert never == ""
+    assert found.text.count("sha256") == 5
+    assert found.text.startswith("# made with the old program\nformat: dbb-session/3\n")
+    found.write()
+    assert sealing(folder).anything is False
+
+
+def parsed(text: str) -> SessionFile:
+    return validate(parse_yaml(text, "session.yaml", []), SessionFile, [])
 
 
 def test_a_recording_that_is_missing_is_named_with_its_line(capsys, folder):

@@ -129,7 +129,7 @@ def test_two_files_make_no_bar_of_their_parts(run, shop):
     assert values["bar.serial_number"]["value"] is None
 
 
-MEASURE = ("measure", "--plan", PLAN, "--machine", MACHINE, "--out", "session")
+MEASURE = ("measure", "--plan", PLAN, "--machine", MACHINE, "--out", "session", "--bar-waiver", "no bar here")
 
 
 def test_measure_takes_instrument_port_and_bar_and_says_so(run, shop):

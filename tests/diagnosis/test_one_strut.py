@@ -28,6 +28,7 @@ def identified(diagnosis):
     return {f.name: f for f in diagnosis.sources if f.verdict is Verdict.IDENTIFIED}
 
 
+@pytest.mark.slow
 def test_one_strut_that_is_late_is_named_though_circles_see_no_common_lag(tmp_path):
     """The fit holds the lag that all struts share; that of one is then seen as a difference to the five others."""
     late_ms = 0.015

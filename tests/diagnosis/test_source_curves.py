@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.findings import Unexplained
+from dbbstation.diagnosis.shapes import READING, SIGNED, Follows
 from dbbstation.diagnosis.source_curves import BINS, SEEN, found_sources, source_curves
 from dbbstation.machine.kinematics import strut_lengths
 from dbbstation.machine.rotation import Frames
@@ -108,12 +109,23 @@ def test_gravity_is_drawn_over_the_force(reference):
         assert np.all((slope > 9.7e-3 * 0.3) & (slope < 9.7e-3 * 1.3))
 
 
-@pytest.mark.parametrize(("variable", "over"), [("strut-length wave", "strut-length"), ("angle", "angle")])
-def test_what_has_no_name_is_drawn_by_what_organises_it(reference, variable, over):
-    rest = Unexplained(1.0, 2, variable, 30.0, "An error without a known name.")
+@pytest.mark.parametrize(
+    ("follows", "over", "panels"),
+    [
+        (Follows("strut-length", "wave"), "strut-length", (6, 0)),
+        (Follows("strut-length", "", SIGNED), "strut-length", (6, 0)),
+        (Follows("angle", "", READING), "angle", (0, 1)),
+    ],
+    ids=str,
+)
+def test_what_has_no_name_is_drawn_by_what_organises_it(reference, follows, over, panels):
+    rest = Unexplained(1.0, 2, follows, 30.0, "An error without a known name.")
     (one,) = source_curves(joint_fit(reference, ("backlash",), unexplained=rest))
     assert (one.source, one.variable) == ("", over)
-    assert (len(one.struts), len(one.reading)) == ((6, 0) if "wave" in variable else (0, 1))
+    assert (len(one.struts), len(one.reading)) == panels
+    if one.struts:
+        senses = ["lengthening", "shortening"] if follows.moves == SIGNED else [""]
+        assert [branch.sense for branch in one.struts[0]] == senses
     branch = one.struts[1][0] if one.struts else one.reading[0]
     assert np.all(branch.model_um == 0.0)
     assert branch.after_um == pytest.approx(branch.before_um, nan_ok=True)

@@ -11,6 +11,7 @@ import pytest
 from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
+from dbbstation.diagnosis.shapes import READING, Follows
 from dbbstation.diagnosis.summary import diagnosis_summary
 from dbbstation.diagnosis.unexplained_model import keep_unexplained
 from dbbstation.errors import ModelError
@@ -201,7 +202,7 @@ def test_what_no_program_knows_is_not_kept(hollow):
     _, diagnosis = hollow
     with pytest.raises(ModelError, match="nothing is left without a name"):
         keep_unexplained(None, diagnosis.after)
-    late = replace(diagnosis.unexplained.curve, variable="time of the reading")
+    late = replace(diagnosis.unexplained.curve, follows=Follows("time", "", READING))
     with pytest.raises(ModelError, match="follows time of the reading, which no program knows"):
         keep_unexplained(late, diagnosis.after)
 

@@ -7,7 +7,7 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
-from dbbstation.diagnosis.shapes import moves_struts, variable_of
+from dbbstation.diagnosis.shapes import PULL, READING, SIGNED, TOOL, Follows
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
 from tests.plant.mechanisms.kinematics import RandomKinematics
@@ -35,12 +35,10 @@ def values_of(curve):
 def test_a_building_that_sways_is_a_wave_of_time_along_its_direction(tmp_path):
     found = left(tmp_path / "s", 31, BuildingSway(amplitude_um=0.8, period_s=23.0, towards_deg=65.0))
     assert (found.variable, found.strut) == ("time wave of the ball on the table", None)
-    period, unit = found.curve.form.split()[1:]
-    assert (float(period), unit) == (pytest.approx(23.0, rel=1e-3), "s")
+    assert (found.curve.period, found.curve.unit) == (pytest.approx(23.0, rel=1e-3), "s")
     _, value, sigma = values_of(found.curve)
     assert np.hypot(value.max(), value.min()) / np.sqrt(2) == pytest.approx(0.8, abs=4 * sigma.max())
-    along = np.array([float(part) for part in found.curve.convention.split("(")[1].split(")")[0].split(",")])
-    assert abs(along @ [np.cos(np.radians(65)), np.sin(np.radians(65)), 0]) > 0.95
+    assert abs(np.array(found.curve.direction) @ [np.cos(np.radians(65)), np.sin(np.radians(65)), 0]) > 0.95
 
 
 def test_a_belt_that_gives_way_follows_the_acceleration_of_its_strut(tmp_path):
@@ -97,12 +95,16 @@ def test_nothing_is_found_where_nothing_is(tmp_path, seed):
     assert (found.variable, found.curve, found.text) == (None, None, "Nothing is left beyond noise.")
 
 
-def test_printed_names_tell_variable_and_what_moves():
-    assert variable_of("strut-speed-sign") == "strut-speed-sign"
-    assert variable_of("angle since the start wave of the reading") == "angle since the start"
-    assert variable_of("time wave of the ball on the table") == "time"
-    assert moves_struts("strut-length by direction of travel")
-    assert moves_struts("time step")
-    assert not moves_struts("time step of the reading")
-    assert not moves_struts("position of the platform with a pull on it")
-    assert variable_of("position of the platform towards a place that pulls on it").endswith("towards a place")
+@pytest.mark.parametrize(
+    ("follows", "printed", "moves_struts"),
+    [
+        (Follows("strut-length", "", SIGNED), "strut-length by direction of travel", True),
+        (Follows("time", "step"), "time step", True),
+        (Follows("time", "step", READING), "time step of the reading", False),
+        (Follows("angle since the start", "wave", READING), "angle since the start wave of the reading", False),
+        (Follows("position of the platform", "", PULL), "position of the platform with a pull on it", False),
+        (Follows("tilt of the platform", "", TOOL), "tilt of the platform", False),
+    ],
+)
+def test_what_an_effect_follows_is_printed_and_told_apart(follows, printed, moves_struts):
+    assert (str(follows), follows.moves_struts) == (printed, moves_struts)

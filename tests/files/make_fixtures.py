@@ -1,6 +1,7 @@
-"""Makes the sessions of `fixtures` and `fixtures/models` anew: `python -m tests.files.make_fixtures`.
+"""Makes the session `sealed` of `fixtures` and `fixtures/models` anew: `python -m tests.files.make_fixtures`.
 
-The recordings of `small` come from the independent virtual machine of tests/plant, those of `under-spindle` from that of
+The sessions `small` and `under-spindle` are of older versions of the format and stay as those wrote them; `make_session` and
+`make_conventional_session` say what they hold. The recordings of `small` and `sealed` come from the independent virtual machine of tests/plant, those of `under-spindle` from that of
 `emulate`; the numbers of the model are made up.
 """
 
@@ -18,11 +19,15 @@ from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.provenance import Provenance
-from dbbstation.files.recordings.session import Bar, read_session
+from dbbstation.files.recordings.amending import amend
+from dbbstation.files.recordings.entries import Counts
+from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_set_up import SetUpReadings
-from dbbstation.files.recordings.session_writer import FinishedRun, SessionDetails, SessionWriter, write_session
+from dbbstation.files.recordings.session_text import SessionDetails
+from dbbstation.files.recordings.session_writer import FinishedRun, SessionWriter, write_session
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
@@ -50,8 +55,9 @@ def make_session(folder: Path) -> None:
             crc=True,
         )
         source = read_session(recorded)
-        bar = Bar("DBB-0042", 150.0003, 0.0005, BEGUN - timedelta(minutes=20), 20.3, 10.6, 10.0)
-        details = SessionDetails("PM600-0007", "first shift", 20.4, bar)
+        when = BEGUN - timedelta(minutes=20)
+        bar = Bar("DBB-0042", 150.0003, 0.0005, when, 20.3, 10.6, 10.0, 150.0005, 0.3, "ZB-150-17")
+        details = SessionDetails("PM600-0007", "first shift", 20.4, bar, "an example: the bar was on its calibrator")
         writer = SessionWriter.create(folder, source.machine, read_inline_plan(recorded / "plan.yaml"), details)
         runs = [source.runs[0], source.runs[1], *source.runs[1:]]
         for index, run in enumerate(runs):
@@ -70,10 +76,17 @@ def make_session(folder: Path) -> None:
             with journal:
                 for t_s, length_mm in zip(samples.t_s, samples.length_mm, strict=True):
                     journal.append((t_s, length_mm, 20.3, "ok"))
-                entry = writer.finish_run(journal)
+                entry = writer.finish_run(journal, Counts(journal.samples, int(bumped), {}))
             writer.judge(entry, accepted=not bumped, reason="operator")
         with writer.start_run("l", Direction.CW, names, started=started, mounting=3) as journal:
             journal.append((0.0, 151.5, 20.3, "ok"))
+    writer.close()
+    renamed = folder / "renamed.yaml"
+    text = (folder / "machine.yaml").read_text(encoding="utf-8")
+    renamed.write_text(text.replace("name: ", "name: north hall, ", 1), encoding="utf-8")
+    amend(folder, "the machine has a name of its own", made=BEGUN + timedelta(hours=1), machine=renamed)
+    for left in (".lock", renamed.name):
+        (folder / left).unlink()
 
 
 def make_conventional_session(folder: Path) -> None:
@@ -135,8 +148,6 @@ def make_models(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    shutil.rmtree(FIXTURES / "sessions" / "small", ignore_errors=True)
-    make_session(FIXTURES / "sessions" / "small")
-    shutil.rmtree(FIXTURES / "sessions" / "under-spindle", ignore_errors=True)
-    make_conventional_session(FIXTURES / "sessions" / "under-spindle")
+    shutil.rmtree(FIXTURES / "sessions" / "sealed", ignore_errors=True)
+    make_session(FIXTURES / "sessions" / "sealed")
     make_models(FIXTURES / "models")

@@ -196,3 +196,36 @@ def test_all_members_at_once_are_what_each_is_beside_the_others() -> None:
         assert averaged == pytest.approx(scan.log_factor[0], rel=1e-9)
         assert best == pytest.approx(scan.log_best[0], rel=1e-9)
         assert found.scale == scan.best[0].scale
+
+
+def test_a_law_with_several_forms_says_which_one_is_there() -> None:
+    """Two ripples of the load, of which the second one alone is there, 0.2 mm; and they never count as one effect of both."""
+    waves = (lambda d: np.sin(d.load), lambda d: np.sin(0.6 * d.load))
+    data = table(5, lambda d: 0.2 * waves[1](d))
+    both = np.column_stack([wave(data) for wave in waves])
+    third = -float(np.log(3.0))
+    law = Law(
+        "ripple",
+        lambda _: both,
+        np.array([0.3, 0.3]),
+        ("first", "second"),
+        ("mm", "mm"),
+        choices=(((0, 1), third, ""), ((0,), third, "the first"), ((1,), third, "the second")),
+    )
+    found = there(read_off(settle(channel(data, (law,)))))["ripple"]
+    assert found.label == "the second"
+    assert list(found.values) == ["second"]
+    assert found.values["second"].value == pytest.approx(0.2, abs=4 * found.values["second"].uncertainty)
+
+
+def test_a_law_that_is_not_proportional_to_its_amplitude_is_laid_out_about_it() -> None:
+    """What saturates: tanh of amplitude and load. At small amplitudes it is the load itself, which has another shape."""
+    data = table(6, lambda d: 0.3 * np.tanh(2.0 * d.load / 5.0), noise=0.02)
+    share = data.load / 5.0
+
+    def about(_: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (0.3 * np.tanh(amplitudes[0] * share) / amplitudes[0])[:, None]
+
+    law = Law("saturation", lambda _: 0.3 * share[:, None], np.array([1.0]), ("size",), ("",), at=about)
+    found = there(read_off(settle(channel(data, (law,)), look=False, static=False)))["saturation"]
+    assert found.values["size"].value == pytest.approx(2.0, rel=0.1)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 ND = load_instrument("heidenhain-nd281b")
-ENCODER = load_instrument("streaming-encoder")
+ENCODER = load_instrument("streaming-encoder", "no-checksum")
 
 
 def test_everything_on_the_line_is_written_down_and_replayed(tmp_path: Path) -> None:
@@ -27,7 +27,7 @@ def test_everything_on_the_line_is_written_down_and_replayed(tmp_path: Path) -> 
         Instrument(ND, port, log=log) as instrument,
     ):
         live = list(instrument.readings(2))
-    assert logged_instrument(file) == "heidenhain-nd281b"
+    assert logged_instrument(file) == ("heidenhain-nd281b", "")
     chunks = list(read_byte_log(file))
     assert [chunk.raw for chunk in chunks[:2]] == [b"\x02", b"+  150.0003    \r\n"]
     assert [chunk.direction for chunk in chunks[:2]] == [">", "<"]
@@ -57,20 +57,20 @@ def test_a_line_cut_off_by_a_crash_costs_that_line_alone(tmp_path: Path) -> None
     file = tmp_path / "bytes.txt"
     file.write_text("# dbb-byte-log/1\n0.1 < 41 42\n0.2 < 43 4", encoding="utf-8")
     assert list(read_byte_log(file)) == [Chunk(0.1, "<", b"AB")]
-    assert logged_instrument(file) == ""
+    assert logged_instrument(file) == ("", "")
 
 
 def test_replay_counts_gaps_and_shows_what_is_left(tmp_path: Path) -> None:
     file = tmp_path / "bytes.txt"
     with ByteLog(file, instrument=ENCODER.name, port="p") as log:
         log.note("<", b"0.0\r\n00006,+0150.00031,A\r\n00009,+0150.0")
-        log.note("<", b"0032,A\r\nnoise\r\n00002,+0150.00032,A\r\n00003,+01")
+        log.note("<", b"0032,A\r\nnoise\r\n00010,+0150.00032,A\r\n00002,+0150.00032,A\r\n00003,+01")
     rows = list(replayed(ENCODER, read_byte_log(file), where="x"))
-    assert [row.reading.lost for row in rows if row.reading] == [0, 2]
+    assert [row.reading.lost for row in rows if row.reading] == [0, 2, 0]
     assert [(row.raw, row.why) for row in rows if row.reading is None] == [
         (b"0.0\r\n", "joined in the middle"),
         (b"noise\r\n", "no frame of this protocol"),
-        (b"00002,+0150.00032,A\r\n", "the sample counter went from 9 to 2"),
+        (b"00002,+0150.00032,A\r\n", "the sample counter 2 after 10 is out of order"),
         (b"00003,+01", "the log ends within it"),
     ]
 

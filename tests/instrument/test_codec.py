@@ -4,13 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dbbstation.errors import InstrumentError
-from dbbstation.instrument.codec import Decoder, GapCounter, Garbage, Heard, Piece, decode, encode
+from dbbstation.instrument.codec import Decoder, Garbage, Heard, Piece, decode, encode
 from dbbstation.instrument.fields import NotUnderstood
 from dbbstation.instrument.library import load_instrument
 
 ND = load_instrument("heidenhain-nd281b")
-ENCODER = load_instrument("streaming-encoder")
+ENCODER = load_instrument("streaming-encoder", "no-checksum")
 
 
 @pytest.mark.parametrize(
@@ -127,16 +126,3 @@ def test_a_line_without_end_is_garbage_in_the_end() -> None:
 def test_what_is_no_reading_is_refused(raw: bytes) -> None:
     with pytest.raises(NotUnderstood):
         decode(ND, raw)
-
-
-def test_a_gap_of_the_counter_is_counted_over_its_turn() -> None:
-    gaps = GapCounter(100)
-    assert [gaps.lost_before(n, "x") for n in (97, 98, 1, 2, 12)] == [0, 0, 2, 0, 9]
-
-
-@pytest.mark.parametrize("second", [5, 4, 80])
-def test_a_counter_that_goes_back_or_stands_is_an_error(second: int) -> None:
-    gaps = GapCounter(100)
-    gaps.lost_before(5, "COM3")
-    with pytest.raises(InstrumentError, match=f"COM3: the sample counter went from 5 to {second}"):
-        gaps.lost_before(second, "COM3")

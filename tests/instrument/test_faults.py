@@ -87,7 +87,7 @@ def test_wrong_baud_rate_of_a_stream_is_garbage(baud: int) -> None:
         pytest.raises(InstrumentError) as caught,
     ):
         until_the_end(instrument)
-    assert "what comes is not streaming-encoder: " in caught.value.what
+    assert "what comes is not streaming-encoder (profile crc): " in caught.value.what
     assert "most likely the baud rate: the port uses 115200" in caught.value.remedy
     assert str(baud) in caught.value.remedy
 
@@ -107,7 +107,10 @@ def test_parity_in_the_eighth_bit_is_named(protocol: Protocol) -> None:
         virtual.show_parity()
         with (
             Instrument(protocol, virtual.port, timeout_s=PATIENCE_S) as instrument,
-            pytest.raises(InstrumentError, match="without the highest bit it is a reading: set data bits and parity"),
+            pytest.raises(
+                InstrumentError,
+                match="without the highest bit it is a reading, and that bit is even parity: set data bits and parity",
+            ),
         ):
             until_the_end(instrument)
 
@@ -146,8 +149,11 @@ def test_noise_in_mid_run_is_counted_and_survived(protocol: Protocol) -> None:
         Instrument(protocol, virtual.port) as instrument,
     ):
         list(instrument.readings(3))
-        virtual.send_garbage(b"\xfe\x80\x00")
-        assert until_one_is_lost(instrument) == {150.0003}
+        lengths_mm = set()
+        while not instrument.tally.lost:  # noise that falls behind a reply, before the next request, costs nothing
+            virtual.send_garbage(b"\xfe\x80\x00")
+            lengths_mm |= {reading.length_mm for reading in instrument.readings(2)}
+        assert lengths_mm == {150.0003}
         assert instrument.tally.garbage_bytes >= 3
 
 

@@ -64,10 +64,16 @@ def test_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_instruments() -> None:
     text, _ = run(instruments)
-    assert "heidenhain-nd281b\n" in text
+    assert "heidenhain-nd281b (stx, a0200, a0200-inch)\n" in text
+    assert "statements about it are not verified" in text
     assert "9600 baud, 7 data bits, even parity, 2 stop bits, about 14 readings per second" in text
     listed = json.loads(run(instruments, "--json")[0])["instruments"]
     assert {one["name"] for one in listed} >= {"heidenhain-nd281b", "streaming-encoder"}
+    # What the project defines itself needs no page of somebody else.
+    assert {one["name"] for one in listed if not one["not_verified"]} == {
+        "streaming-encoder",
+        "streaming-encoder-binary",
+    }
 
 
 def test_one_instrument() -> None:

@@ -1,7 +1,8 @@
 from __future__ import annotations
 
 import errno
-from typing import TYPE_CHECKING
+import os
+from pathlib import Path
 
 import pytest
 import serial
@@ -12,9 +13,6 @@ from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument
 from dbbstation.instrument.link import open_link
 from dbbstation.virtual.wire import VirtualInstrument
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 ND = load_instrument("heidenhain-nd281b")
 
@@ -31,6 +29,23 @@ def test_no_permission(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serial.Serial, "open", refuse)
     with pytest.raises(InstrumentError, match="no permission to open the port; add yourself to the group that owns it"):
         open_link("/dev/null", ND.line)
+
+
+@pytest.mark.skipif(not hasattr(os, "seteuid"), reason="Windows has no such permissions")
+def test_no_permission_on_a_pseudo_terminal_names_its_group() -> None:
+    with VirtualInstrument(ND, lambda _: 150.0) as virtual:
+        port = Path(virtual.port)
+        port.chmod(0)
+        ours = os.geteuid()
+        if ours == 0:
+            os.seteuid(65_534)  # nobody: root may open anything
+        try:
+            with pytest.raises(InstrumentError) as caught:
+                open_link(virtual.port, ND.line)
+        finally:
+            os.seteuid(ours)
+        assert caught.value.what == "no permission to open the port"
+        assert f"the group that owns it ({port.group()})" in caught.value.remedy
 
 
 def test_in_use_by_another_program() -> None:

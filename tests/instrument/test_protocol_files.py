@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from dbbstation.errors import InputError, InstrumentError
+from dbbstation.instrument.codec import decode, encode
 from dbbstation.instrument.library import instruments_folder, known_instruments, load_instrument, read_protocol
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def test_a_name_that_is_not_known_brings_the_nearest() -> None:
     ):
         load_instrument("heidenhain-nd281")
     with pytest.raises(
-        InstrumentError, match=r"known are heidenhain-nd281b, streaming-encoder.*; or give a \.yaml file of your own"
+        InstrumentError, match=r"known are heidenhain-nd281b, heidenhain-nd287.*; or give a \.yaml file of your own"
     ):
         load_instrument("zzz")
 
@@ -100,4 +101,78 @@ def test_the_instruments_need_nothing_of_ours_but_errors_and_files() -> None:
         "print(*{name.split('.')[1] for name in sys.modules if name.startswith('dbbstation.')})"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert set(done.stdout.split()) == {"errors", "files", "instrument"}
+    assert set(done.stdout.split()) == {"catalogue", "errors", "files", "instrument"}
+
+
+THIRD = GOOD.replace("dbb-instrument/1", "dbb-instrument/3")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("mode: request", "mode: poll", "`poll` came with dbb-instrument/3"),
+        (
+            "kind: decimal,",
+            "kind: decimal, scale: 0.001,",
+            "the key `scale` came with dbb-instrument/3, and this file is",
+        ),
+        ("timing:", "profiles: {x: {title: x}}\ntiming:", "the key `profiles` came with dbb-instrument/3"),
+    ],
+)
+def test_what_is_new_needs_the_third_version(tmp_path: Path, old: str, new: str, fault: str) -> None:
+    assert fault in faults_of(tmp_path, GOOD.replace(old, new))
+    (tmp_path / "gauge.yaml").write_text(THIRD.replace(old, new), encoding="utf-8")
+    assert read_protocol(tmp_path / "gauge.yaml").format == "dbb-instrument/3"
+
+
+@pytest.mark.parametrize(
+    ("added", "fault"),
+    [
+        ("profiles: {x: {title: x, line: {baud: -1}}}", "gauge.yaml:12:39: line.baud: "),
+        ("profiles: {x: {title: x, lenght: {unit: mm}}}", "the key `lenght` is not known; did you mean `length`?"),
+        ('profiles: {x: {title: x, ask: {request: ""}}}', "mode request has request bytes"),
+        ("profiles: {X: {title: x}}", "profiles.X"),
+        ("profiles: {x: {title: x, length: {range_mm: [5, 1]}}}", "range_mm is [lowest, highest]"),
+    ],
+)
+def test_every_profile_is_checked_when_the_file_is_read(tmp_path: Path, added: str, fault: str) -> None:
+    assert fault in faults_of(tmp_path, f"{THIRD}{added}\n")
+
+
+@pytest.mark.parametrize(
+    ("frame", "fault"),
+    [
+        (
+            "{status: fault, means: x, bare: true, parts: [{kind: text, written: x}]}",
+            "a bare frame has fixed bytes only",
+        ),
+        (
+            '{status: fault, means: x, parts: [{kind: errors, codes: [{code: "1", means: x, status: ok}]}]}',
+            "an error has a status that is not ok",
+        ),
+        (
+            '{status: fault, means: x, parts: [{kind: text, width: 2, written: xyz}, {kind: literal, value: "\\r"}]}',
+            "fits into the width",
+        ),
+        ("{status: fault, means: x, parts: [{kind: text, written: x}]}", "every frame ends in the same literal"),
+    ],
+)
+def test_frames_that_make_no_sense_are_refused(tmp_path: Path, frame: str, fault: str) -> None:
+    assert fault in faults_of(tmp_path, THIRD.replace("timing:", f"  - {frame}\ntiming:"))
+
+
+def test_a_number_may_stand_for_more_than_its_digits(tmp_path: Path) -> None:
+    """Nine digits without a point, of which the last is a tenth of a micrometre."""
+    text = THIRD.replace("width: 8, decimals: 3", 'width: 9, pad: "0", scale: 0.0001')
+    (tmp_path / "gauge.yaml").write_text(text, encoding="utf-8")
+    protocol = read_protocol(tmp_path / "gauge.yaml")
+    assert encode(protocol, 15.00031) == b"000150003\r"
+    assert decode(protocol, b"000150003\r").length_mm == 15.0003
+
+
+def test_bounds_of_the_latch_stand_instead_of_its_delay(tmp_path: Path) -> None:
+    both = THIRD.replace("timeout_s: 1", "timeout_s: 1, latch_delay_s: 0.1, latch_bounds_s: [0, 0.1]")
+    assert "stands instead of latch_delay_s" in faults_of(tmp_path, both)
+    assert "[earliest, latest]" in faults_of(
+        tmp_path, THIRD.replace("timeout_s: 1", "timeout_s: 1, latch_bounds_s: [0.2, 0.1]")
+    )

@@ -31,6 +31,7 @@ def off_the_circle_mm(poses: np.ndarray, circle: Circle) -> tuple[np.ndarray, np
     return np.hypot(from_centre[:, 0], from_centre[:, 1]) - circle.radius_mm, from_centre[:, 2]
 
 
+@pytest.mark.slow
 def test_thirty_programs_take_the_machine_to_the_nominal_circles(compensated, table2, crooked):
     assert len(compensated) == 30
     worst_mm = worst_deg = before_mm = 0.0

@@ -10,6 +10,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from dbbstation.diagnosis.findings import Curve, CurvePoint, Unexplained
+from dbbstation.diagnosis.shapes import READING, Follows
 from dbbstation.report.diagnosis_figure import diagnosis_figure
 from dbbstation.report.unexplained_panel import draw_unexplained
 from tests.diagnosis.joint_fits import joint_fit
@@ -53,7 +54,7 @@ def test_same_diagnosis_same_bytes(found, drawn):
 
 def test_an_error_without_a_name(reference):
     rest = Unexplained(
-        1.0, 3, "strut-length wave", 30.0, "An error without a known name, organised by a wave, strut 3."
+        1.0, 3, Follows("strut-length", "wave"), 30.0, "An error without a known name, organised by a wave, strut 3."
     )
     said = texts(diagnosis_figure(joint_fit(reference, ("backlash",), unexplained=rest)))
     assert rest.text in said
@@ -61,9 +62,9 @@ def test_an_error_without_a_name(reference):
     assert not any("causes found" in text for text in said)
 
 
-def curve(variable, unit, at, value, sigma, strut=3, period_mm=None, convention=""):
+def curve(follows, unit, at, value, sigma, strut=3, period=None, convention=""):
     points = tuple(CurvePoint(*map(float, point)) for point in zip(at, value, sigma, strict=True))
-    return Curve(variable, unit, strut, "", period_mm, convention, 2.0, 1.0, points)
+    return Curve(follows, unit, strut, "", period, (), convention, 2.0, 1.0, points)
 
 
 def panel(drawn):
@@ -74,8 +75,10 @@ def panel(drawn):
 
 
 def test_its_curve_has_a_panel_of_its_own(reference):
-    wave = curve("strut-length wave", "mm", [600.0, 610.0, 620.0], [1.0, 0.0, -1.0], [0.1, 0.1, 0.1], 3, 40.0)
-    rest = Unexplained(1.0, 3, "strut-length wave", 30.0, "organised by a wave", wave)
+    wave = curve(
+        Follows("strut-length", "wave"), "mm", [600.0, 610.0, 620.0], [1.0, 0.0, -1.0], [0.1, 0.1, 0.1], 3, 40.0
+    )
+    rest = Unexplained(1.0, 3, Follows("strut-length", "wave"), 30.0, "organised by a wave", wave)
     said = texts(diagnosis_figure(joint_fit(reference, ("backlash",), unexplained=rest)))
     assert said.count("without a name: a wave of 40.00 mm: error of strut 3, cause unknown") == 1
     assert "µm, ±2u" in said
@@ -83,7 +86,7 @@ def test_its_curve_has_a_panel_of_its_own(reference):
 
 def test_the_band_is_two_standard_uncertainties():
     part, axes = panel(
-        curve("strut-force", "N", [0.0, 5.0, 9.0], [1.0, -2.0, 4.0], [0.5, 0.1, 1.0], None, None, "less")
+        curve(Follows("strut-force"), "N", [0.0, 5.0, 9.0], [1.0, -2.0, 4.0], [0.5, 0.1, 1.0], None, None, "less")
     )
     (band,) = (each for each in axes.collections if isinstance(each, PolyCollection))
     corners = {(round(float(x), 6), round(float(y), 6)) for x, y in band.get_paths()[0].vertices}
@@ -104,7 +107,7 @@ def test_a_wave_is_drawn_as_one_with_its_uncertainty_between_the_points():
         return np.sqrt(0.04 * c * c + 0.09 * s * s + 2 * 0.03 * c * s)
 
     at = np.arange(500.0, 601.0, 5.0)
-    _, axes = panel(curve("strut-length wave", "mm", at, value(at), sigma(at), 3, 40.0))
+    _, axes = panel(curve(Follows("strut-length", "wave"), "mm", at, value(at), sigma(at), 3, 40.0))
     x, y = axes.lines[0].get_xydata().T
     assert len(x) > 2 * len(at)
     np.testing.assert_allclose(y, value(x), atol=1e-9)
@@ -116,14 +119,14 @@ def test_a_wave_is_drawn_as_one_with_its_uncertainty_between_the_points():
 
 
 def test_signs_of_travel_are_two_points():
-    part, axes = panel(curve("strut-speed-sign", "sign", [-1.0, 1.0], [-2.0, 2.0], [0.3, 0.3]))
+    part, axes = panel(curve(Follows("strut-speed-sign"), "sign", [-1.0, 1.0], [-2.0, 2.0], [0.3, 0.3]))
     assert [label.get_text() for label in axes.get_xticklabels()] == ["shortening", "lengthening"]
     assert not any(isinstance(each, PolyCollection) for each in axes.collections)
     assert part.get_suptitle() == "without a name: error of strut 3, cause unknown"
 
 
 def test_what_is_of_the_reading_is_no_struts():
-    part, axes = panel(curve("angle", "deg", [0.0, 10.0], [1.0, 2.0], [0.1, 0.1], None))
+    part, axes = panel(curve(Follows("angle", "", READING), "deg", [0.0, 10.0], [1.0, 2.0], [0.1, 0.1], None))
     assert (part.get_suptitle(), axes.get_xlabel()) == (
         "without a name: error of the reading, cause unknown",
         "angle, °",

@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.instrument.reading import Reading
+from dbbstation.station.events import SamplesRecorded
+from dbbstation.station.run_record import recording_of
 from dbbstation.virtual.path import circle_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from dbbstation.plan.circle import Circle
-    from dbbstation.station.events import Event
+    from dbbstation.station.events import Event, RunId, Sample
+    from dbbstation.station.run_record import Recorded
+    from dbbstation.trace.recording import Recording
 
 RATE_HZ = 20.0
 
@@ -25,6 +29,16 @@ def run_readings(circle: Circle, begin_s: float = 0.0, rate_hz: float = RATE_HZ)
     place = np.column_stack([np.interp(t_s, path.t_s, path.poses[:, axis]) for axis in range(3)])
     length = np.linalg.norm(place - np.array(circle.ball_mm), axis=1)
     return [Reading(begin_s + float(t), float(value)) for t, value in zip(t_s, length, strict=True)]
+
+
+def told_and_untold(told: Sequence[Event]) -> Recorded:
+    """The recording of a run of which a list of events has the first samples."""
+
+    def recorded(run: RunId, behind: Sequence[Sample]) -> Recording:
+        batches = [event.samples for event in told if isinstance(event, SamplesRecorded) and event.run == run]
+        return recording_of(run, [*(sample for batch in batches for sample in batch), *behind])
+
+    return recorded
 
 
 def still(length_mm: float | None, seconds: float, begin_s: float = 0.0) -> list[Reading]:

@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+import errno
 import threading
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 import pytest
@@ -8,21 +11,26 @@ import pytest
 from dbbstation.errors import InstrumentError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
+from dbbstation.files.recordings.entries import Counts
+from dbbstation.files.recordings.journal import RunWriter
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import Direction
-from dbbstation.station import events
+from dbbstation.station import events, storage
 from dbbstation.station.assembly import Job, assemble
-from dbbstation.station.commands import Accept, Quit, Repeat, Skip, Start
+from dbbstation.station.commands import Accept, Note, Quit, Repeat, Skip, Start
 from dbbstation.station.engine import Station
+from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import State
+from dbbstation.station.storage import time_of_day
 from tests.station.bench import MACHINE_FILE
 from tests.station.readings import run_readings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from datetime import tzinfo
     from pathlib import Path
 
     from dbbstation.errors import StationError
@@ -52,7 +60,7 @@ class Script:
 
 def made(plan_file: Path, source: Script) -> Station:
     plan = read_plan(plan_file)
-    return Station(Sequencer(plan, Schedule(plan, lambda *_: 1)), source)
+    return Station(Sequencer(plan, Schedule(plan, lambda *_: 1), recording_of), source)
 
 
 def test_commands_from_another_thread_wake_it(plan_file: Path) -> None:
@@ -136,3 +144,117 @@ def test_what_is_stored_is_what_was_read(plan_file: Path, tmp_path: Path) -> Non
         ]
         assert stored.t_s.tolist() == pytest.approx([sample.t_s for sample in seen], abs=1e-6)
         assert stored.length_mm.tolist() == pytest.approx([sample.length_mm for sample in seen], abs=1e-6)
+
+
+def test_what_came_over_the_line_is_counted_in_run_file_and_session(plan_file: Path, tmp_path: Path) -> None:
+    plan = read_inline_plan(plan_file)
+    readings = run_readings(plan.to_domain().tests["a"].circle, 1000.0)
+    # Lost on the arc, few enough for the plan; without a length in the dwell before it, where that harms nothing.
+    readings[300] = replace(readings[300], lost=2)
+    readings[8] = replace(readings[8], length_mm=None, status="fault", said="signal lost")
+    readings[9] = replace(readings[9], status="overrange", said="beyond its range")
+    readings[10] = replace(readings[10], status="overrange", said="beyond its range")
+    source = Script(readings)
+    workplace = assemble(Job(read_machine(MACHINE_FILE), plan, tmp_path / "session"), source)
+    station = workplace.station
+    told: list[events.Event] = []
+
+    def judge(event: events.Event) -> None:
+        told.append(event)
+        if isinstance(event, events.StateChanged) and event.state is State.COMPLETE:
+            station.send(Accept())
+        elif isinstance(event, events.RunAnnounced):
+            station.send(Quit() if event.run.direction is Direction.CW else Start())
+
+    for observer in (source, judge):
+        station.subscribe(observer)
+    station.run()
+    workplace.close()
+    (run,) = read_session(tmp_path / "session").runs
+    completed = next(event for event in told if isinstance(event, events.RunCompleted))
+    text = run.path.read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line[0].isdigit()]
+    assert run.counts == Counts(len(rows), 2, {"fault": 1, "overrange": 2})
+    assert completed.samples == len(rows)
+    assert text.endswith(f"# received: {len(rows)}\n# lost: 2\n# rejected fault: 1\n# rejected overrange: 2\n")
+    assert read_run(run.path).header["lost"] == "2"
+
+
+def test_a_disk_that_is_full_ends_the_run_with_its_cause_and_the_same_command_goes_on(
+    plan_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = read_inline_plan(plan_file)
+    readings = run_readings(plan.to_domain().tests["a"].circle, 1000.0)
+    job = Job(read_machine(MACHINE_FILE), plan, tmp_path / "session")
+    room = [20_000]
+    write = RunWriter._write
+
+    def limited(self: RunWriter, line: bytes) -> None:
+        room[0] -= len(line)
+        if room[0] < 0:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(self, line)
+
+    monkeypatch.setattr(RunWriter, "_write", limited)
+    workplace = assemble(job, source := Script(readings))
+    workplace.station.subscribe(source)
+    told: list[events.Event] = []
+    workplace.station.subscribe(told.append)
+    workplace.station.send(Start())
+    with pytest.raises(OutputError, match="no space left on device; free room on the disk"):
+        workplace.station.run()
+    workplace.close()
+    assert [event.interrupted.label for event in told if isinstance(event, events.Fault)] == ["a-ccw-1"]
+    (dead,) = read_session(job.folder).runs
+    kept = read_run(dead.path)
+    assert kept.warnings == ()
+    assert len(kept.recording) > 500
+    room[0] = 10_000_000
+    workplace = assemble(job, source := Script(readings))
+    station = workplace.station
+
+    def accept(event: events.Event) -> None:
+        if isinstance(event, events.StateChanged) and event.state is State.COMPLETE:
+            station.send(Accept())
+        elif isinstance(event, events.RunAnnounced):
+            station.send(Quit() if event.run.direction is Direction.CW else Start())
+
+    for observer in (source, accept):
+        station.subscribe(observer)
+    station.run()
+    workplace.close()
+    assert [(run.label, run.state.value) for run in read_session(job.folder).runs] == [
+        ("a ccw 1", "recording"),
+        ("a ccw 2", "accepted"),
+    ]
+
+
+def test_a_clock_that_was_stepped_back_does_not_turn_the_order_of_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time of day follows the steady clock within a program, and never falls behind the session's last run in the next."""
+    seconds = [100.0]
+    now = time_of_day(lambda: seconds[0])
+    first = now()
+
+    class SteppedBack(datetime):
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> datetime:
+            return datetime.now(tz) - timedelta(hours=1)
+
+    monkeypatch.setattr(storage, "datetime", SteppedBack)
+    seconds[0] += 60.0
+    assert now() - first == timedelta(seconds=60)
+    assert time_of_day(lambda: seconds[0], last=first)() >= first
+
+
+def test_what_is_noted_is_kept_with_its_time(plan_file: Path, tmp_path: Path) -> None:
+    workplace = assemble(Job(read_machine(MACHINE_FILE), read_inline_plan(plan_file), tmp_path / "session"), Script())
+    before = datetime.now(UTC)
+    for command in (Note("a draught from the gate"), Note(ambient_temp_c=21.5), Quit()):
+        workplace.station.send(command)
+    workplace.station.run()
+    workplace.close()
+    notes = read_session(tmp_path / "session").notes
+    assert [(note.text, note.ambient_temp_c) for note in notes] == [("a draught from the gate", None), ("", 21.5)]
+    assert all(before - timedelta(seconds=1) <= note.made <= datetime.now(UTC) for note in notes)
+    text = (tmp_path / "session" / "session.yaml").read_text(encoding="utf-8")
+    assert text.startswith("format: dbb-session/3")

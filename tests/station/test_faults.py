@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
+import signal
 import subprocess
+import sys
+import time
 from typing import TYPE_CHECKING
 
 import pytest
 
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.run_csv import read_run
-from dbbstation.files.recordings.session import RunState, read_session
+from dbbstation.files.recordings.session import read_session
 from tests.station.bench import POLLED, bench, lines_of, wait_for
 
 if TYPE_CHECKING:
@@ -156,3 +160,32 @@ def test_a_port_that_is_not_there_leaves_no_session(one_circle: Path, tmp_path: 
     assert done.returncode == 1
     assert "there is no such port" in done.stderr
     assert not out.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="processes that are stopped and continued")
+@pytest.mark.parametrize("seconds", [1.0, pytest.param(10.0, marks=pytest.mark.nightly)])
+def test_a_host_that_falls_asleep_in_mid_run(one_circle: Path, tmp_path: Path, seconds: float) -> None:
+    """The run is complete, or what was lost is told and it is measured again; nothing else happens."""
+    out = tmp_path / "session"
+    part = out / "runs" / "a-ccw-1.csv.part"
+    with (
+        bench(one_circle, scale=10.0) as place,
+        subprocess.Popen(place.command(out), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process,
+    ):
+        wait_for(lambda: lines_of(part) > 300, process)
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(seconds)
+        process.send_signal(signal.SIGCONT)
+        _, said = process.communicate(timeout=120.0)
+    assert "Traceback" not in said
+    assert "fault of dbbstation" not in said
+    assert process.returncode == 0, said
+    session = read_session(out)
+    assert [run.state for run in session.runs].count(RunState.ACCEPTED) == 2
+    for run in session.runs:
+        recording = session.load(run).recording
+        assert run.counts is not None
+        assert run.counts.received == len(recording)
+        if run.state is RunState.REJECTED:
+            assert run.counts.lost > 0
+            assert "lost" in run.reason

@@ -14,7 +14,8 @@ import pytest
 
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_plan
-from dbbstation.files.recordings.session import RunState, read_session
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.station.preflight import check_plan
 from dbbstation.trace.cut import cut
@@ -24,7 +25,8 @@ from tests.station.bench import MACHINE_FILE, POLLED, STREAM, bench, lines_of, w
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dbbstation.files.recordings.session import RunEntry, SessionFolder
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.virtual.machine import VirtualMachine
 
 QUIET = Sizes(noise_mm=0.0003, bar_uncertainty_mm=0.0005)
@@ -105,6 +107,7 @@ def test_a_person_answers_with_keys(plan_file: Path, tmp_path: Path) -> None:
     assert "0 of 6 runs accepted" in done.stdout
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_everything_and_the_same_command_goes_on(plan_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "session"
     with bench(plan_file, scale=30.0) as place:

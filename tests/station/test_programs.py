@@ -76,6 +76,7 @@ def test_a_program_outside_the_travel_is_refused(one_way: Path, folder: Path) ->
         load_programs(folder, read_plan(one_way), read_machine(MACHINE_FILE))
 
 
+@pytest.mark.slow
 def test_runs_by_program_are_smaller_in_error_and_carry_the_program(
     one_way: Path, folder: Path, tmp_path: Path
 ) -> None:

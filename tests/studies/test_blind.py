@@ -293,6 +293,7 @@ def _machine_of(truth):
     return {"delta_length_mm": truth.delta_length_mm, "delta_base_mm": truth.delta_base_mm}
 
 
+@pytest.mark.slow
 def test_a_study_goes_on_where_it_stopped(study):
     names = ("gravity", "backlash")
     told = []

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.trace.analysis import best_circle, centred, figures
+from dbbstation.trace.analysis import best_circle, centred, figures, path_about_ball
 from dbbstation.trace.circle import RawCircle
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
@@ -27,6 +27,12 @@ def shifted_circle(radius, x, y):
     return along + np.sqrt(radius**2 - (x * np.sin(theta) - y * np.cos(theta)) ** 2)
 
 
+def ball_beside(radius, x, y):
+    """What a bar reads on a perfect circle at commanded angles, its ball standing (-x, -y) beside the commanded centre."""
+    theta = np.radians(THETA)
+    return np.hypot(radius * np.cos(theta) + x, radius * np.sin(theta) + y)
+
+
 def test_a_shifted_circle_is_found_exactly():
     centre, radius, deviation = best_circle(THETA, shifted_circle(150.1, 0.3, -0.4))
     assert centre == pytest.approx([0.3, -0.4], abs=1e-10)
@@ -35,11 +41,19 @@ def test_a_shifted_circle_is_found_exactly():
 
 
 def test_figures_of_a_shifted_circle():
-    found = figures(raw(shifted_circle(150.1, 0.3, -0.4)))
+    found = figures(raw(ball_beside(150.1, 0.3, -0.4)))
     assert found.centre_deviation_um == pytest.approx(500)
-    # The mean of the distance is R minus d²/4R to second order.
-    assert found.mean_radial_error_um == pytest.approx(100 - 1e3 * 0.25 / 4 / 150, abs=1e-3)
+    # The mean of the distance is R plus d²/4R to second order.
+    assert found.mean_radial_error_um == pytest.approx(100 + 1e3 * 0.25 / 4 / 150, abs=1e-3)
     assert found.circularity_um == pytest.approx(0, abs=1e-6)
+
+
+def test_a_ball_far_beside_the_centre_does_not_bend_a_perfect_circle():
+    """At commanded angles a circle about a ball that stands 2 mm off has 27 µm of cos 2θ; seen from the ball it has none."""
+    length_mm = ball_beside(150.0, 1.2, -1.6)
+    bent = np.ptp(best_circle(THETA, length_mm)[2])
+    assert 1e3 * bent == pytest.approx(1e3 * 2.0**2 / 150.0, rel=0.01)
+    assert figures(raw(length_mm)).circularity_um == pytest.approx(0, abs=1e-4)
 
 
 def test_figures_as_measured_are_worked_out_once(monkeypatch):
@@ -47,10 +61,10 @@ def test_figures_as_measured_are_worked_out_once(monkeypatch):
 
     def counted(theta_deg, radius_mm):
         worked_out.append(radius_mm)
-        return best_circle(theta_deg, radius_mm)
+        return path_about_ball(theta_deg, radius_mm)
 
-    monkeypatch.setattr("dbbstation.trace.analysis.best_circle", counted)
-    one, other = raw(shifted_circle(150.1, 0.3, -0.4)), raw(shifted_circle(150.1, 0.1, 0.0))
+    monkeypatch.setattr("dbbstation.trace.analysis.path_about_ball", counted)
+    one, other = raw(ball_beside(150.1, 0.3, -0.4)), raw(ball_beside(150.1, 0.1, 0.0))
     first = figures(one)
     assert figures(one) == first
     assert len(worked_out) == 1
@@ -71,7 +85,7 @@ def test_circularity_of_an_ellipse():
 def test_a_raised_bar_sees_the_horizontal_shift():
     circle = replace(CIRCLE, elevation_deg=30)
     height = 150 * np.sin(np.radians(30))
-    horizontal = shifted_circle(circle.radius_mm, 0.05, 0.02)
+    horizontal = ball_beside(circle.radius_mm, 0.05, 0.02)
     found = figures(raw(np.hypot(horizontal, height), circle))
     assert found.centre_mm == pytest.approx((0.05, 0.02), abs=1e-9)
 

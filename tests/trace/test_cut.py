@@ -166,3 +166,16 @@ def test_with_recorded_angles_a_machine_may_be_off_as_far_as_a_bar_reaches(feed_
     assert np.allclose(cut(Recording("a run", theta, 150 + off, theta), circle).length_mm, 150 + off)
     with pytest.raises(TraceError, match="mm off the bar's 150 mm"):
         cut(Recording("a run", theta, 150 + off * 1.1, theta), circle)
+
+
+def test_loss_that_the_line_counted_is_named_before_the_feed():
+    """Times of a device that is asked show no loss; its counter does."""
+    recording, circle = trace(feed=970, noise_mm=0.0003), CIRCLE
+    with pytest.raises(TraceError) as alone:
+        cut(recording, circle)
+    assert alone.value.what.startswith(("its ", "the overlap shows"))
+    with pytest.raises(TraceError) as counted:
+        cut(recording, circle, counted_lost=5)
+    assert counted.value.what.startswith("5 of ")
+    assert counted.value.what.endswith(alone.value.what)
+    assert counted.value.remedy.index("cable") < counted.value.remedy.index("set the feed")

@@ -7,12 +7,13 @@ import numpy as np
 from dbbstation.instrument.reading import Reading
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.plan import Ball, Plan, PlannedTest
+from dbbstation.service.board import Board, SequenceOpened
 from dbbstation.station.commands import Start
 from dbbstation.station.events import Event
+from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.tui.app import Shown
-from dbbstation.tui.board import Board, SequenceOpened
 
 BORES = {1: (0.0, 100.0), 2: (-100.0, 100.0), 3: (-100.0, 0.0), 9: (0.0, 0.0), 7: (100.0, 0.0), 5: (0.0, -100.0)}
 RATE_HZ = 20.0
@@ -58,7 +59,7 @@ class Happening:
     def __init__(self, plan: Plan | None = None) -> None:
         self.plan = plan or make_plan()
         self.schedule = Schedule(self.plan, lambda _test, _direction: 1)
-        self.sequencer = Sequencer(self.plan, self.schedule)
+        self.sequencer = Sequencer(self.plan, self.schedule, recording_of)
         self.events: list[Event | SequenceOpened] = [
             SequenceOpened(self.schedule.tasks, self.schedule.open, "session-7"),
             *self.sequencer.begin(),

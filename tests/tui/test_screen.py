@@ -15,16 +15,17 @@ from dbbstation.cli.station_virtual import VirtualPlace, virtual_place
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import InlinePlan, read_inline_plan
-from dbbstation.files.recordings.session import RunState, read_session
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
+from dbbstation.service.runner import Runner
 from dbbstation.station.assembly import Job
 from dbbstation.station.events import Event, FeedInSeen, Observer
 from dbbstation.station.states import State
 from dbbstation.tui.app import Shown, StationApp
-from dbbstation.tui.quit_question import QuitQuestion
-from dbbstation.tui.runner import Runner
+from dbbstation.tui.question import GiveUpQuestion
 from dbbstation.tui.trace_view import TraceView
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ class Bench:
 def switched_on(plan: InlinePlan, folder: Path) -> Iterator[Bench]:
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     with virtual_place(machine, plan.to_domain(), ENCODER, time_scale=TIME_SCALE) as place:
-        yield Bench(place, Job(machine, plan, folder, clock=place.clock))
+        yield Bench(place, Job(machine, plan, folder, clock=place.clock, time_scale=TIME_SCALE))
 
 
 async def until(pilot: Pilot[None], condition: Callable[[], bool]) -> None:
@@ -189,12 +190,12 @@ def test_quitting_a_running_circle_asks_first_and_loses_nothing(slow_plan: Inlin
         assert "▶ running" in row(app, "runs")
         assert "° of 370°" in row(app, "progress")
         await press(app, "ctrl+c")
-        await until(pilot, lambda: isinstance(app.screen, QuitQuestion))
+        await until(pilot, lambda: isinstance(app.screen, GiveUpQuestion))
         await press(app, "n")
-        await until(pilot, lambda: not isinstance(app.screen, QuitQuestion))
+        await until(pilot, lambda: not isinstance(app.screen, GiveUpQuestion))
         assert board.state is State.TURNING
         await press(app, "q")
-        await until(pilot, lambda: isinstance(app.screen, QuitQuestion))
+        await until(pilot, lambda: isinstance(app.screen, GiveUpQuestion))
         await press(app, "y")
         await until(pilot, lambda: board.state is State.STOPPED)
 
@@ -265,6 +266,86 @@ def test_a_closed_line_and_a_port_that_is_not_there(short_plan: InlinePlan, tmp_
 def test_closing_while_the_line_is_being_opened_ends_in_order(short_plan: InlinePlan, tmp_path: Path) -> None:
     async def play(_pilot: Pilot[None], app: StationApp) -> None:
         await press(app, "q")
+
+    with switched_on(short_plan, tmp_path / "session") as bench:
+        bench.press_all(play)
+
+
+def test_a_verdict_that_was_not_given_is_asked_for_again(short_plan: InlinePlan, tmp_path: Path) -> None:
+    async def leave(pilot: Pilot[None], app: StationApp) -> None:
+        await circle(pilot, app)
+        await press(app, "q")
+        await until(pilot, lambda: app.board.state is State.STOPPED)
+
+    async def go_on(pilot: Pilot[None], app: StationApp) -> None:
+        await until(pilot, lambda: app.board.state is State.COMPLETE)
+        await until(pilot, lambda: "is complete: A accepts it" in said(app))
+        assert "waits for its verdict" in row(app, "messages")
+        assert row(app, "figures").count("low-") == 1
+        assert len(app.board.traces[Direction.CCW]) > 100
+        await press(app, "a")
+        await until(pilot, lambda: app.board.accepted == 1 and app.board.state is State.ANNOUNCED)
+
+    with switched_on(short_plan, tmp_path / "session") as bench:
+        bench.press_all(leave)
+        assert bench.states()[-1][1] is RunState.COMPLETE
+        bench.press_all(go_on)
+        assert bench.states()[-1][1] is RunState.ACCEPTED
+
+
+def test_repeat_and_reject_in_mid_circle_ask_first_one_question_at_a_time(
+    slow_plan: InlinePlan, tmp_path: Path
+) -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        board = app.board
+        await until(pilot, lambda: board.state is State.ANNOUNCED)
+        await press(app, "enter")
+        await until(pilot, lambda: board.state is State.TURNING)
+        for key in ("r", "x", "ctrl+c"):
+            await press(app, key)
+            await until(pilot, lambda: isinstance(app.screen, GiveUpQuestion))
+            await press(app, "ctrl+c" if key != "ctrl+c" else "n", "n")
+            await until(pilot, lambda: len(app.screen_stack) == 1)
+            assert board.state is State.TURNING
+        app.action_leave()
+        app.action_leave()  # as two Ctrl-C in one look
+        await until(pilot, lambda: len(app.screen_stack) == 2)
+        await press(app, "n")
+        await until(pilot, lambda: len(app.screen_stack) == 1)
+        await press(app, "x")
+        await until(pilot, lambda: isinstance(app.screen, GiveUpQuestion))
+        await press(app, "y")
+        await until(pilot, lambda: board.state is State.ANNOUNCED and board.announced.run.direction is Direction.CW)
+
+    with switched_on(slow_plan, tmp_path / "session") as bench:
+        bench.press_all(play)
+        assert bench.states() == [("low-ccw-1", RunState.REJECTED)]
+
+
+def test_a_question_goes_with_the_circle_that_it_is_about(short_plan: InlinePlan, tmp_path: Path) -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        board = app.board
+        await until(pilot, lambda: board.state is State.ANNOUNCED)
+        await press(app, "enter")
+        await until(pilot, lambda: board.state is State.TURNING)
+        await press(app, "q")
+        await until(pilot, lambda: board.state in {State.COMPLETE, State.FLAWED})
+        await until(pilot, lambda: len(app.screen_stack) == 1)
+        await press(app, "v")
+        if board.state is State.COMPLETE:
+            await until(pilot, lambda: "centred" in app.query_one(TraceView)._caption())
+
+    with switched_on(short_plan, tmp_path / "session") as bench:
+        bench.press_all(play)
+
+
+def test_nothing_is_waited_for_in_a_pause(short_plan: InlinePlan, tmp_path: Path) -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await until(pilot, lambda: app.board.state is State.ANNOUNCED)
+        await press(app, "p")
+        await until(pilot, lambda: app.board.state is State.PAUSED and "P goes on" in said(app))
+        await press(app, "p")
+        await until(pilot, lambda: app.board.state is State.ANNOUNCED)
 
     with switched_on(short_plan, tmp_path / "session") as bench:
         bench.press_all(play)

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from dbbstation.files.recordings.session import RunState, read_session
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.session import read_session
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

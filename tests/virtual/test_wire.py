@@ -165,8 +165,8 @@ def test_other_baud_rates_are_other_speeds() -> None:
         Instrument(ENCODER, virtual.port, baud=9600) as driver,
     ):
         taken_s = [reading.length_mm for reading in driver.readings(20)]
-    # 21 characters of 10 bits: the line carries 45.7 lines per second, not 250.
-    assert 19 / (taken_s[-1] - taken_s[0]) == pytest.approx(9600 / 210, rel=1e-3)
+    # 26 characters of 10 bits: the line carries 36.9 lines per second, not 250.
+    assert 19 / (taken_s[-1] - taken_s[0]) == pytest.approx(9600 / 260, rel=1e-3)
 
 
 def test_an_error_in_the_length_comes_out() -> None:

@@ -182,7 +182,7 @@ def _law(name: str, source: DriveSource, form: Form, recordings: Recordings, var
         grids=form.grids,
         positive=tuple(p.positive for p in form.amplitudes),
         form_uncertainty=source.form_uncertainty,
-        discrepancy=partial(_departure, along=variables[along].values),
+        discrepancy=lambda effect, _, __: _departure(effect, variables[along].values),
         log_odds=float(odds),
     )
 

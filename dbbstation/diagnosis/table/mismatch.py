@@ -144,7 +144,7 @@ def find_mismatch(
     *,
     hold_out: bool = True,
     lacking: dict[str, str] | None = None,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Callable[..., None] = lambda *_: None,
 ) -> Mismatch:
     """Compare measured with simulated values.
 
@@ -153,7 +153,7 @@ def find_mismatch(
         sources: physics of the user's own that the table has the columns for.
         hold_out: repeat everything for each held-out part; takes most of the time.
         lacking: physics that could not be asked, and why.
-        progress: told what is being done.
+        progress: told what is being done, and how much of how much where that can be counted.
     """
     channel = table.channel(sources)
     channel = replace(channel, static=static_patterns(channel))

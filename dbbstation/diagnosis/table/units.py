@@ -43,6 +43,7 @@ UNITS: dict[str, Meaning] = {
         for way, unit in (*_LENGTHS.items(), ("deg", "deg"), ("rad", "rad"))
         for time in ("s", "min")
     },
+    "n_m": Meaning("N m", Kind.FORCE),
     "rpm": Meaning("rpm", Kind.SPEED),
     "deg": Meaning("deg", Kind.ANGLE, 360.0),
     "rad": Meaning("rad", Kind.ANGLE, 2.0 * math.pi),

@@ -12,7 +12,8 @@ from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.quantities import JointMm, LimitsDeg, LimitsMm, Quantity
-from dbbstation.files.yaml.schema import Schema, read_document, validate
+from dbbstation.files.yaml.out import yaml_text
+from dbbstation.files.yaml.schema import Schema, format_for, read_document, validate
 from dbbstation.machine.geometry import Compliance, Hexapod, JointAxes, Machine, Masses, StrutMasses, Travel
 from dbbstation.machine.rotation import Rotation
 
@@ -189,6 +190,12 @@ def machine_parts(machine: Machine) -> MachineParts:
             and {"base": points(machine.joint_axes.base), "platform": points(machine.joint_axes.platform)},
         }
     )
+
+
+def machine_text(machine: Machine) -> str:
+    """Return the text of a machine's file."""
+    data = machine_data(machine_parts(machine))
+    return yaml_text({"format": format_for(MachineFile, data), **data})
 
 
 def machine_data(parts: MachineParts) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from dbbstation.files.formats.jig import (
     parse_jig,
 )
 from dbbstation.files.formats.quantities import Quantity, twice
+from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, dotted, read_document, validate
 from dbbstation.files.yaml.text import YamlDocument
 from dbbstation.plan.circle import Circle, Direction
@@ -169,6 +170,11 @@ class InlinePlan:
         repeatability = self.plan.holders[ball.holder].repeatability_um / 1e3
         plate = None if ball.bore is None else Plate(origin, self.jig.plate_expansion_um_m_k)
         return Ball(name, ball.bore, ball.holder, centre, ball.uncertainty_um / 1e3, repeatability, plate=plate)
+
+
+def plan_text(plan: InlinePlan) -> str:
+    """Return the text of a plan's file, the jig inline."""
+    return yaml_text(plan_data(plan))
 
 
 def plan_data(plan: InlinePlan) -> dict[str, Any]:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
+from dbbstation.files.csv_rows import csv_rows
 from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.provenance import Provenance, write_table
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,8 +54,8 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=language.separator, skipinitialspace=True)
-    names = next(reader, [])
+    table = csv_rows(io.StringIO(text, newline=""), language.separator, str(path), skip_spaces=True)
+    _, names = next(table, (1, []))
     missing = [name for name in POSE_COLUMNS if name not in names]
     if missing:
         remedy = f"the first line must name {', '.join(POSE_COLUMNS)}"
@@ -63,16 +64,16 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
         raise InputError([Problem(str(path), 1, 1, f"no column {', '.join(missing)}", remedy)])
     rows: list[list[float]] = []
     others: dict[str, list[str]] = {name: [] for name in names if name not in POSE_COLUMNS}
-    for cells in reader:
+    for line, cells in table:
         if not cells:
             continue
         if len(cells) != len(names):
             what = f"{len(cells)} values in {len(names)} columns"
             remedy = f"compare the line with the header; {language.text}"
-            faults.append(Problem(str(path), reader.line_num, 0, what, remedy))
+            faults.append(Problem(str(path), line, 0, what, remedy))
             continue
         row = dict(zip(names, cells, strict=True))
-        rows.append([_number(row[name], name, path, reader.line_num, language, faults) for name in POSE_COLUMNS])
+        rows.append([_number(row[name], name, path, line, language, faults) for name in POSE_COLUMNS])
         for name, kept in others.items():
             kept.append(row[name])
     if faults:
@@ -86,7 +87,7 @@ def _number(cell: str, name: str, path: Path, line: int, language: NumberLanguag
     value = language.number(cell)
     if not np.isfinite(value):
         remedy = f"{language.text}: {ELSE}" if set(cell) & set(DECIMALS) else "correct or remove the line"
-        faults.append(Problem(str(path), line, 0, f"{name} is {cell!r}, not a number", remedy))
+        faults.append(Problem(str(path), line, 0, f"{name} is {shortened(cell)!r}, not a number", remedy))
     return value
 
 

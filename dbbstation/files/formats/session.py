@@ -1,4 +1,4 @@
-"""`dbb-session/2`, which has all of `dbb-session/1`: what was done in a session, one entry per run."""
+"""`dbb-session/3`, which has all of `dbb-session/1` and `/2`: what was done in a session, one entry per run."""
 
 from datetime import datetime
 from pathlib import PurePosixPath
@@ -56,6 +56,12 @@ class BarSchema(Schema):
     """Temperature of the bar then [degC]."""
     expansion_um_m_k: ExpansionUmMK | None = None
     """Thermal expansion of the bar [µm/(m K)]."""
+    reading_mm: Annotated[float, Quantity("mm", 20, 2_000)] | None = None
+    """What it read on its calibrator; the fit knows the difference, recorded lengths stay as read [mm]."""
+    temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)] | None = None
+    """Standard uncertainty of a temperature of the bar; where it is stated, the fit knows what the bar grew by [K]."""
+    calibrator_serial_number: str | None = None
+    """Of the calibrator."""
 
 
 class ProgramSchema(Schema):
@@ -67,6 +73,17 @@ class ProgramSchema(Schema):
     """Of the program file."""
     model_sha256: Sha256Hex | None = None
     """Of the model file that it was compensated with."""
+
+
+class CountsSchema(Schema):
+    """What came over the line during a run, and what did not."""
+
+    received: Annotated[int, Field(ge=0)]
+    """Samples in the run file."""
+    lost: Annotated[int, Field(ge=0)]
+    """Samples that the line lost between them."""
+    rejected: dict[str, Annotated[int, Field(ge=1)]] = Field(default={})
+    """Samples of the file that no calculation uses, by what the instrument said of them, such as `overrange`."""
 
 
 class RunSchema(Schema):
@@ -91,6 +108,10 @@ class RunSchema(Schema):
     """Why it was rejected."""
     sha256: Sha256Hex | None = None
     """Of the run file; absent only while recording."""
+    chain_sha256: Sha256Hex | None = None
+    """Covers this entry and the `chain_sha256` of the sealed run before it in the list."""
+    counts: CountsSchema | None = None
+    """Samples received, rejected and lost; absent where the recording was made elsewhere."""
     program: ProgramSchema | None = None
     """What was commanded, where that was not the plan's nominal circle."""
     centre_mm: Point | None = None
@@ -127,10 +148,49 @@ class SetUpErrorsSchema(Schema):
     """Of each reading, one standard deviation [µm]."""
 
 
+class SealSchema(Schema):
+    """What files beside the runs were when the session was sealed, and how many runs it has."""
+
+    files: dict[str, Sha256Hex]
+    """SHA-256 of machine, plan and the jig file that the plan may name, by their paths as this file names them."""
+    runs: Annotated[int, Field(ge=0)]
+    """Number of sealed runs."""
+    chain_sha256: Sha256Hex | None = None
+    """`chain_sha256` of the last of them; absent where there is none."""
+
+
+class AmendmentSchema(Schema):
+    """A change of what was sealed, made on purpose."""
+
+    what: str
+    """File that was changed, as `seal.files` names it; `runs` for the list of runs."""
+    former_sha256: Sha256Hex | None = None
+    """Of the file before; of the list: `chain_sha256` of its last run. Absent where there was none."""
+    sha256: Sha256Hex | None = None
+    """The same now."""
+    former: InsidePath | None = None
+    """Where the file is kept as it was before, in the session folder."""
+    reason: Annotated[str, Field(min_length=1)]
+    """Why, in the words of who did it."""
+    made: Moment
+    """When."""
+
+
+class NoteSchema(Schema):
+    """What somebody noted while it was measured."""
+
+    made: Moment
+    """When."""
+    text: str = ""
+    """In their words."""
+    ambient_temp_c: TemperatureDegc | None = None
+    """Temperature of the shop then [degC]."""
+
+
 class SessionFile(Schema):
     """What was done: where the machine and plan stand, the bar, one entry per run."""
 
-    format: Literal["dbb-session/1", "dbb-session/2"]
+    format: Literal["dbb-session/1", "dbb-session/2", "dbb-session/3"]
     """Name and version of this format."""
     machine: InsidePath
     """The nominal model that the controller had while measuring, `dbb-machine/1`."""
@@ -144,7 +204,15 @@ class SessionFile(Schema):
     """Temperature of the shop [degC]."""
     bar: BarSchema | None = None
     """The bar."""
+    bar_waiver: str = ""
+    """Why it was measured without a fresh calibration of the bar."""
     set_up_errors: tuple[SetUpErrorsSchema, ...] = ()
     """Micrometer readings of balls that were put up under the spindle, one entry per mounting."""
+    seal: SealSchema | None = None
+    """What was sealed; absent in sessions of older programs and in those that were written by hand."""
+    amendments: tuple[AmendmentSchema, ...] = ()
+    """What was changed on purpose after it was sealed, oldest first."""
+    notes: tuple[NoteSchema, ...] = ()
+    """What was noted while it was measured, oldest first."""
     runs: tuple[RunSchema, ...] = ()
     """Runs in the order they were started."""

@@ -25,6 +25,9 @@ _OPEN = frozenset({"program", "limits"})
 """Blocks whose keys stand for themselves: two files may each give some. The other blocks are one thing, such as one bar,
 and come from one file whole."""
 
+_PART_OF = {"profile": "instrument"}
+"""Keys that say something about another one, and hold only where that one comes from the same file."""
+
 _PROTOCOL_ENDINGS = (".yaml", ".yml")
 
 
@@ -94,7 +97,12 @@ def read_settings(files: Iterable[Path]) -> Settings:
         file, document = found
         blocks = {key.partition(".")[0] for key in values} - _OPEN
         own = {key: Setting(value, path, _line(document, key)) for key, value in _flat(file, path)}
-        values |= {k: one for k, one in own.items() if k not in values and k.partition(".")[0] not in blocks}
+        taken = set(values)
+        values |= {
+            key: one
+            for key, one in own.items()
+            if not taken & {key, _PART_OF.get(key)} and key.partition(".")[0] not in blocks
+        }
         if file.tolerances is not None and not told:
             tolerances = tuple(one.to_domain() for one in file.tolerances)
             told = f"{path}:{_line(document, 'tolerances')}"

@@ -1,4 +1,4 @@
-"""`dbb-settings/1`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
+"""`dbb-settings/2`, which has all of `/1`: what a shop sets once: instrument, port, bar, limits, numbers of tables, tolerances."""
 
 from typing import Annotated, Literal
 
@@ -49,6 +49,8 @@ class LimitSettings(Schema):
     """A model that shifts any point by more is refused [mm]."""
     largest_loss_percent: Annotated[float, Quantity("%", 0.001, 100, or_zero=True)] | None = None
     """A run that lost more of its samples is repeated, where the plan does not say [%]."""
+    largest_bar_age_h: Annotated[float, Quantity("h", 0.1, 10_000)] | None = None
+    """A calibration of the bar that is older is stale [h]."""
 
 
 class NumberSettings(Schema):
@@ -94,10 +96,12 @@ class ToleranceSettings(Schema):
 class SettingsFile(Schema):
     """What holds in a shop where the command line says nothing else; every key but the format may be absent."""
 
-    format: Literal["dbb-settings/1"]
+    format: Literal["dbb-settings/1", "dbb-settings/2"]
     """Name and version of this format."""
     instrument: _Word | None = None
     """Name of an instrument, or path of a protocol file from this file's folder."""
+    profile: _Word | None = None
+    """Variant of the instrument, where it is not the usual one."""
     port: _Word | None = None
     """Port that the instrument is connected to, or a URL."""
     baud: Annotated[int, Field(ge=1)] | None = None
@@ -114,3 +118,11 @@ class SettingsFile(Schema):
     """How numbers are written in tables from elsewhere."""
     tolerances: tuple[ToleranceSettings, ...] | None = None
     """What circles may have."""
+
+    @model_validator(mode="after")
+    def _profile_of_something(self) -> "SettingsFile":
+        if self.profile is not None and self.instrument is None:
+            raise PydanticCustomError(
+                "alone", "a profile is one of an instrument; give `instrument` in the same file", {}
+            )
+        return self

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import decode, read_bytes, shortened
 from dbbstation.trace.drive_recording import DriveRecording
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def _name_faults(
             except ValueError:
                 good = False
             if not good:
-                what = f"{name} is `{cell}`, not a finite number"
+                what = f"{name} is `{shortened(cell)}`, not a finite number"
                 faults.append(Problem(file, number, 0, what, "correct or remove the line"))
 
 

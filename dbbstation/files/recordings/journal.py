@@ -14,19 +14,21 @@ import zlib
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
-from dbbstation.errors import OutputError
+from dbbstation.errors import InputError, OutputError, Problem
 from dbbstation.files.atomic import sync_folder
-from dbbstation.files.recordings.run_csv import PART
+from dbbstation.files.recordings.run_csv import PART, RunFile, parse_run
+from dbbstation.files.source_text import read_bytes
 from dbbstation.trace import columns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
+    from dbbstation.files.recordings.entries import Counts
     from dbbstation.plan.circle import Direction
 
-SYNC_INTERVAL_S = 1.0
-"""Longest time that a sample stays where a power cut reaches it."""
+SYNC_INTERVAL_S = 0.5
+"""Time between two syncs. A sample is on the disk within a second: a sync itself and what comes in batches take time, too [s]."""
 
 
 def run_name(test: str, direction: Direction, repeat: int) -> str:
@@ -46,6 +48,16 @@ def run_header(test: str, direction: Direction, repeat: int, names: Sequence[str
         raise ValueError(f"columns of a run: {unknown} are not known, {missing} are missing")
     top = f"# test: {test}\n# direction: {direction}\n# repeat: {repeat}\n"
     return (top + ",".join([*names, columns.CRC]) + "\n").encode()
+
+
+def run_foot(counts: Counts) -> bytes:
+    """Return the lines that a sealed run file ends with: what came over the line, and what did not.
+
+    They stand below the samples because nobody knows them before; a file without them is one whose recording was broken off.
+    """
+    lines = [f"# received: {counts.received}", f"# lost: {counts.lost}"]
+    lines += [f"# rejected {reason}: {count}" for reason, count in counts.rejected.items()]
+    return ("\n".join(lines) + "\n").encode()
 
 
 def run_line(values: Sequence[float | str], names: Sequence[str]) -> bytes:
@@ -119,7 +131,7 @@ class RunWriter:
         self.close()
 
     def append(self, values: Sequence[float | str]) -> None:
-        """Write one sample, and sync when the last sync is a second old.
+        """Write one sample, and sync when the last sync is old.
 
         Args:
             values: one per column, numbers in the columns' units.
@@ -139,7 +151,7 @@ class RunWriter:
         self.sync_if_due()
 
     def sync_if_due(self) -> None:
-        """Sync when the last sync is a second old; to be called while no samples arrive, too."""
+        """Sync when the last sync is old; to be called while no samples arrive, too."""
         if self._clock() - self._synced_at >= SYNC_INTERVAL_S:
             self.sync()
 
@@ -155,14 +167,32 @@ class RunWriter:
             os.fsync(self._file.fileno())
         self._synced_at = self._clock()
 
-    def seal(self) -> str:
+    def read(self) -> RunFile:
+        """Read what was written so far.
+
+        Raises:
+            InputError: it cannot be read, or not as it was written.
+        """
+        faults: list[Problem] = []
+        data = read_bytes(self.path, faults, is_input=False)
+        if data is None:
+            raise InputError(faults)
+        return parse_run(data, str(self.path))
+
+    def seal(self, counts: Counts | None = None) -> str:
         """Finish the run: sync, hash what is on disk, give the file its final name; return its SHA-256.
+
+        Args:
+            counts: written below the samples; nothing is where they are not known.
 
         Raises:
             OutputError: there is no sample, the final name is taken, or the disk refuses; the `.part` stays then.
         """
         if not self.samples:
             raise OutputError("no sample was recorded", where=str(self.path), remedy="check the instrument's line")
+        if counts is not None:
+            with self._told():
+                self._write(run_foot(counts))
         self.sync()
         self.close()
         with self._told():

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dbbstation.errors import Problem
-from dbbstation.files.source_text import decode
+from dbbstation.files.source_text import decode, shortened
 from dbbstation.trace import columns
 
 _COMMA, _NEWLINE = ord(","), ord("\n")
@@ -121,9 +121,7 @@ def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
     header: dict[str, str] = {}
     at = 0
     while at < len(all_lines) and (all_lines[at].startswith((b"#", b"\xef\xbb\xbf#")) or not all_lines[at].strip()):
-        key, colon, value = all_lines[at].decode("utf-8", "replace").lstrip("\ufeff#").partition(":")
-        if colon:
-            header[key.strip()] = value.strip()
+        header |= _said(all_lines[at])
         at += 1
     if at == len(all_lines):
         what = "the file is empty" if not data.strip() else "there is no line that names the columns"
@@ -137,7 +135,15 @@ def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
     names = tuple(name.strip() for name in text.split(","))
     _check_columns(names, file, at + 1, faults)
     rows = all_lines[at + 1 :]
+    while rows and rows[-1].startswith(b"#"):
+        header |= _said(rows.pop())
     return Lines(file, header, at + 1, names, rows, range(at + 2, at + 2 + len(rows)), ended)
+
+
+def _said(line: bytes) -> dict[str, str]:
+    """What a line `# key: value` above or below the samples says."""
+    key, colon, value = line.decode("utf-8", "replace").lstrip("\ufeff#").partition(":")
+    return {key.strip(): value.strip()} if colon else {}
 
 
 def _check_columns(names: tuple[str, ...], file: str, line: int, faults: list[Problem]) -> None:
@@ -189,7 +195,7 @@ def _fault_of_fields(fields: list[bytes], names: tuple[str, ...]) -> tuple[str, 
     for name, text in zip(names, fields, strict=True):
         if name not in columns.COLUMNS:
             continue
-        shown = text.decode("utf-8", "replace").strip()
+        shown = shortened(text.decode("utf-8", "replace").strip())
         if not _NUMBER.fullmatch(text.strip()):
             kind = "not a finite number" if shown.lower().lstrip("+-") in {"nan", "inf", "infinity"} else "no number"
             return f"{name} is `{shown}`, {kind}", "write digits with a dot as decimal sign, leave no value out"

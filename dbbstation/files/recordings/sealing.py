@@ -1,4 +1,4 @@
-"""Hashes for recordings that were made elsewhere: they are written into the session file as it stands."""
+"""Sealing recordings that were made elsewhere: hashes and chain are written into the session file as it stands."""
 
 from __future__ import annotations
 
@@ -10,12 +10,31 @@ from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from dbbstation.errors import InputError, Problem
+from dbbstation.files.atomic import write_text
+from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.recordings.entries import run_entry
+from dbbstation.files.recordings.seal import (
+    Seal,
+    chained,
+    hashes,
+    keep_copies,
+    seal_entry,
+    seal_faults,
+    sealed_names,
+    sealed_over,
+)
 from dbbstation.files.recordings.session import SESSION_FILE
+from dbbstation.files.recordings.session_text import seal_data
 from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.yaml.out import yaml_text
+from dbbstation.files.yaml.schema import format_of, validate
 from dbbstation.files.yaml.text import parse_yaml
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
+
+    from dbbstation.files.recordings.entries import RunEntry
 
 
 @dataclass(frozen=True)
@@ -24,26 +43,46 @@ class Sealing:
 
     Attributes:
         path: of the session file.
-        text: its text with all hashes.
-        files: run files that got one, as the session file names them.
+        text: its text with all hashes, the chain and the seal.
+        files: run files that got a hash, as the session file names them.
+        linked: runs that came into the chain.
+        seal: what the session carries then.
+        before: text of the session file as it is.
     """
 
     path: Path
     text: str
     files: tuple[str, ...]
+    linked: tuple[str, ...]
+    seal: Seal
+    before: str
+
+    @property
+    def anything(self) -> bool:
+        """Whether the session file lacks something."""
+        return self.text != self.before
+
+    def write(self) -> None:
+        """Write the session file, and copies of what is sealed beside it first.
+
+        Raises:
+            OutputError: the disk refuses; the session file is as before then.
+        """
+        keep_copies(self.path.parent, self.seal.files)
+        write_text(self.path, self.text, force=True, rewrites=True)
 
 
 def sealing(folder: Path) -> Sealing:
-    """Find the runs of a session file that have no hash, and the text that has them all; nothing is written.
+    """Find what a session file lacks of its seal, and the text that has it all; nothing is written.
 
-    Comments, order and spelling of the file stay: each hash stands behind the run's `file`. Runs that are being recorded
-    have none.
+    Comments, order and spelling of the file stay: each hash stands behind the run's `file`, each link behind the hash, the seal
+    above the list of runs. Runs that are being recorded have none.
 
     Args:
         folder: of the session, or its session file.
 
     Raises:
-        InputError: no session file, no list of runs in it, or a run's file that is missing.
+        InputError: no session file, no list of runs in it, a file that is missing, or what was sealed before has changed.
     """
     path = folder if folder.is_file() else folder / SESSION_FILE
     faults: list[Problem] = []
@@ -51,13 +90,18 @@ def sealing(folder: Path) -> Sealing:
     text = None if data is None else decode(data, str(path), faults)
     if text is None or parse_yaml(text, str(path), faults) is None:
         raise InputError(faults)
-    runs = _entry(YAML(typ="safe", pure=True).compose(text), "runs")
-    if not isinstance(runs, SequenceNode) or not runs.value:
-        what = "the session file lists no runs"
-        raise InputError([Problem(str(path), 0, 0, what, "name each recording under `runs`")])
+    hashed, files = _with_hashes(text, path)
+    runs, seal = _chain(hashed, path)
+    whole, linked = _with_links(hashed, path, runs)
+    return Sealing(path, _with_seal(whole, seal), files, linked, seal, text)
+
+
+def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
+    """The text with a hash for every run that has none, and the files that got one."""
+    faults: list[Problem] = []
     additions: list[tuple[int, str]] = []
     named = []
-    for run in runs.value:
+    for run in _runs(text, path):
         file, state = _entry(run, "file"), _entry(run, "state")
         recording = isinstance(state, ScalarNode) and state.value == "recording"
         if not isinstance(file, ScalarNode) or recording or _entry(run, "sha256") is not None:
@@ -68,21 +112,94 @@ def sealing(folder: Path) -> Sealing:
             what = f"the run file {file.value} is missing"
             faults.append(Problem(str(path), *place, what, "put it there or leave the run out"))
             continue
-        hashed = f"sha256: {hashlib.sha256(recorded.read_bytes()).hexdigest()}"
-        indent = next(key.start_mark.column for key, value in run.value if value is file)
-        end = file.end_mark.index
-        if run.flow_style:
-            additions.append((end, f", {hashed}"))
-        else:
-            # Behind a comment, where one stands on the line.
-            newline = text.find("\n", end)
-            additions.append((len(text) if newline < 0 else newline, f"\n{' ' * indent}{hashed}"))
+        additions.append(_behind(run, "file", f"sha256: {hashlib.sha256(recorded.read_bytes()).hexdigest()}", text))
         named.append(file.value)
     if faults:
         raise InputError(faults)
+    return _added(text, additions), tuple(named)
+
+
+def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal]:
+    """Runs of the text with all links, and the seal over them."""
+    faults: list[Problem] = []
+    document = parse_yaml(text, str(path), faults)
+    session = None if document is None else validate(document, SessionFile, faults)
+    if session is None:
+        raise InputError(faults)
+    folder, names = path.parent, (session.machine, session.plan)
+    runs = tuple(run_entry(run, folder) for run in session.runs)
+    seal = seal_entry(session.seal)
+    if seal is None:
+        sealed = sealed_names(folder, names)
+        found = hashes(folder, sealed)
+        faults += [
+            Problem(str(path), 0, 0, f"there is no file `{name}` to be sealed", "put it there")
+            for name in sealed
+            if name not in found
+        ]
+    else:
+        found = dict(seal.files)
+        faults += seal_faults(folder, path, seal, names, [run for run in runs if run.chain_sha256 or not run.sha256])
+    linked = chained(runs)
+    if [run.label for run in linked] != [run.label for run in runs]:
+        what = "runs without a link in the chain stand before runs that have one"
+        faults.append(Problem(str(path), 0, 0, what, "put them behind the runs that are sealed"))
+    if faults:
+        raise InputError(faults)
+    return linked, sealed_over(found, linked)
+
+
+def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, tuple[str, ...]]:
+    """The text with all links of the chain, and the runs that got one."""
+    additions = []
+    named = []
+    for node, run in zip(_runs(text, path), runs, strict=True):
+        if run.chain_sha256 and _entry(node, "chain_sha256") is None:
+            additions.append(_behind(node, "sha256", f"chain_sha256: {run.chain_sha256}", text))
+            named.append(f"{run.test}-{run.direction}-{run.repeat}")
+    return _added(text, additions), tuple(named)
+
+
+def _with_seal(text: str, seal: Seal) -> str:
+    """The text with the seal before the list of runs, in the version of the format that has one."""
+    root = YAML(typ="safe", pure=True).compose(text)
+    starts = {name.value: name.start_mark.index for name, _ in root.value}
+    begin = starts.get("seal", starts.get("set_up_errors", starts["runs"]))
+    after = [start for start in starts.values() if start > begin]
+    end = begin if "seal" not in starts else min(after, default=len(text))
+    line = yaml_text({"seal": seal_data(seal)})
+    given = next(value for name, value in root.value if name.value == "format")
+    text = text[:begin] + line + text[end:]
+    return text[: given.start_mark.index] + format_of(SessionFile) + text[given.end_mark.index :]
+
+
+def _runs(text: str, path: Path) -> Sequence[MappingNode]:
+    root = YAML(typ="safe", pure=True).compose(text)
+    runs = _entry(root, "runs")
+    if not isinstance(runs, SequenceNode) or not runs.value:
+        what = "the session file lists no runs"
+        raise InputError([Problem(str(path), 0, 0, what, "name each recording under `runs`")])
+    if root.flow_style:
+        what = "the whole session file stands in brackets"
+        raise InputError([Problem(str(path), 1, 1, what, "write one key a line")])
+    return list(runs.value)
+
+
+def _behind(run: MappingNode, key: str, addition: str, text: str) -> tuple[int, str]:
+    """Where an addition to a run's entry goes, behind one of its keys, and its text."""
+    name, value = next((name, value) for name, value in run.value if name.value == key)
+    end = value.end_mark.index
+    if run.flow_style:
+        return end, f", {addition}"
+    # Behind a comment, where one stands on the line.
+    newline = text.find("\n", end)
+    return len(text) if newline < 0 else newline, f"\n{' ' * name.start_mark.column}{addition}"
+
+
+def _added(text: str, additions: Sequence[tuple[int, str]]) -> str:
     for at, addition in sorted(additions, reverse=True):
         text = text[:at] + addition + text[at:]
-    return Sealing(path, text, tuple(named))
+    return text
 
 
 def _entry(node: Node | None, key: str) -> Node | None:

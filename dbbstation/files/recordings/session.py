@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
-from datetime import datetime
-from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,9 +13,20 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
-from dbbstation.files.formats.session import BarSchema, ProgramSchema, RunSchema, SessionFile
-from dbbstation.files.recordings.run_csv import PART, RunFile, read_run, sealed_or_part
+from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.recordings.entries import (
+    Note,
+    RunEntry,
+    RunState,
+    bar_entry,
+    count_in,
+    counts_in,
+    note_entry,
+    run_entry,
+)
+from dbbstation.files.recordings.run_csv import PART, RunFile, read_run
 from dbbstation.files.recordings.run_lines import split_file
+from dbbstation.files.recordings.seal import amendment_entry, seal_entry, seal_faults
 from dbbstation.files.recordings.session_checks import check_bar, check_runs
 from dbbstation.files.recordings.session_set_up import SetUpReadings, check_set_up_errors, mounted_name, set_up_readings
 from dbbstation.files.source_text import read_bytes
@@ -31,7 +40,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
+    from dbbstation.files.recordings.seal import Amendment, Seal
     from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.bar import Bar
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Plan
     from dbbstation.trace.recording import Recording
@@ -44,89 +55,6 @@ _UNLIKE_RADIUS = 0.2
 
 _SLOWEST, _FASTEST = 50.0, 0.05
 """Times as long as the circle should take, between which a recording's duration is plausible."""
-
-
-class RunState(StrEnum):
-    """How far a run has come."""
-
-    RECORDING = "recording"
-    COMPLETE = "complete"
-    ACCEPTED = "accepted"
-    REJECTED = "rejected"
-
-
-@dataclass(frozen=True)
-class Program:
-    """An NC program that was commanded.
-
-    Attributes:
-        path: of its file.
-        sha256: of its file.
-        model_sha256: of the model that it was compensated with; empty where none.
-    """
-
-    path: Path
-    sha256: str
-    model_sha256: str
-
-
-@dataclass(frozen=True)
-class RunEntry:
-    """What the session says of one run.
-
-    Attributes:
-        test: name of the test.
-        direction: sense of travel.
-        repeat: counts the runs of this test and direction, from 1.
-        mounting: counts how often a ball was put up; None: one mounting per test.
-        state: how far it has come.
-        reason: why it was rejected; empty otherwise.
-        started: when the first sample was taken; None where not noted.
-        path: of its file.
-        sha256: of its file; empty while recording.
-        program: what was commanded where it was not the plan's circle.
-        centre_mm: centre of the circle as programmed, machine frame (x, y, z) [mm]; None: as planned.
-    """
-
-    test: str
-    direction: Direction
-    repeat: int
-    mounting: int | None
-    state: RunState
-    reason: str
-    started: datetime | None
-    path: Path
-    sha256: str
-    program: Program | None
-    centre_mm: tuple[float, float, float] | None
-
-    @property
-    def label(self) -> str:
-        """Name of the run in messages."""
-        return f"{self.test} {self.direction} {self.repeat}"
-
-
-@dataclass(frozen=True)
-class Bar:
-    """The bar: nothing of it is added to readings; its length is held against the plan's radii.
-
-    Attributes:
-        serial_number: of the bar.
-        calibrated_length_mm: distance between the ball centres that its calibration found [mm].
-        calibrator_uncertainty_mm: of that length, one standard deviation [mm].
-        calibrated: when; None where not noted.
-        temp_c: of the bar then [degC]; None where not noted.
-        expansion_um_m_k: thermal expansion [µm/(m K)]; None where not noted.
-        stroke_mm: travel of its gauge from that length, either way [mm]; None where not noted.
-    """
-
-    serial_number: str
-    calibrated_length_mm: float
-    calibrator_uncertainty_mm: float
-    calibrated: datetime | None
-    temp_c: float | None
-    expansion_um_m_k: float | None
-    stroke_mm: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +74,11 @@ class SessionFolder:
         operator: empty where not noted.
         ambient_temp_c: temperature of the shop [degC]; None where not noted.
         bar: None where not noted.
+        bar_waiver: why it was measured without a fresh calibration of the bar; empty where there was one.
         set_up_errors: micrometer readings of balls that were put up under the spindle, at most one per mounting.
+        seal: what machine, plan and list of runs were when they were sealed; None where nobody sealed them.
+        amendments: what was changed on purpose after that, oldest first.
+        notes: what was noted while it was measured, oldest first.
     """
 
     name: str
@@ -161,7 +93,17 @@ class SessionFolder:
     operator: str = ""
     ambient_temp_c: float | None = None
     bar: Bar | None = None
+    bar_waiver: str = ""
     set_up_errors: tuple[SetUpReadings, ...] = ()
+    seal: Seal | None = None
+    amendments: tuple[Amendment, ...] = ()
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Paths of machine and plan within the folder, with forward slashes."""
+        paths = (self.machine_path, self.plan_path)
+        return tuple(path.relative_to(self.folder).as_posix() for path in paths)  # type: ignore[return-value]  # two of them
 
     def in_state(self, *states: RunState) -> tuple[RunEntry, ...]:
         """Return the runs in one of these states."""
@@ -176,6 +118,7 @@ class SessionFolder:
         """Return ball, mounting and bar of a run, named so that no other session has the same names."""
         ball = self.plan.tests[run.test].ball
         mounted = mounted_name(self.plan, run.test, run.mounting)
+        long_mm, uncertainty_mm = (0.0, 0.0) if self.bar is None else self.bar.reads_long_mm(self.ambient_temp_c)
         readings = (r for r in self.set_up_errors if mounted_name(self.plan, r.test, r.mounting) == mounted)
         return Setup(
             session=self.name,
@@ -185,7 +128,8 @@ class SessionFolder:
             fixed_ball_mm=np.array(ball.centre_mm, dtype=np.float64),
             mounting_repeatability_mm=ball.repeatability_mm,
             ball_uncertainty_mm=ball.uncertainty_mm,
-            bar_uncertainty_mm=0.0 if self.bar is None else self.bar.calibrator_uncertainty_mm,
+            bar_uncertainty_mm=uncertainty_mm,
+            bar_reads_long_mm=long_mm,
             place_known=ball.place_known,
             set_up_errors=next((reading.to_domain() for reading in readings), None),
             plate=ball.plate,
@@ -305,8 +249,17 @@ MOST_NAMED = 4
 """Sessions that are named beside a folder that is none."""
 
 
-def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
-    """Read a session; None with every fault added to `faults`."""
+def parse_session(
+    path: Path, faults: list[Problem], *, as_sealed: bool = True, instead: Mapping[str, Path] | None = None
+) -> SessionFolder | None:
+    """Read a session; None with every fault added to `faults`.
+
+    Args:
+        path: of the folder, or of the session file in it.
+        faults: take what is wrong.
+        as_sealed: what is not as it was sealed is a fault.
+        instead: files that are read as if they stood in the folder, by `machine` and `plan`.
+    """
     if path.is_dir() and not (path / SESSION_FILE).exists():
         faults.append(no_session(path))
         return None
@@ -318,16 +271,22 @@ def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
     session = validate(document, SessionFile, faults)
     data = document.data
     named = {key: data.get(key) for key in ("machine", "plan")}
-    machine = parse_machine(folder / named["machine"], faults) if isinstance(named["machine"], str) else None
-    plan = parse_plan(folder / named["plan"], faults) if isinstance(named["plan"], str) else None
+    paths = {key: folder / name for key, name in named.items() if isinstance(name, str)} | dict(instead or {})
+    machine = parse_machine(paths["machine"], faults) if "machine" in paths else None
+    plan = parse_plan(paths["plan"], faults) if "plan" in paths else None
     planned = None if plan is None else plan.to_domain()
     check_runs(document, planned, folder, faults)
     check_set_up_errors(document, planned, faults)
     if session is not None and planned is not None and session.bar is not None:
         check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, planned, faults)
-    if session is None or machine is None or planned is None:
+    if session is None:
         return None
     entries = [run_entry(run, folder) for run in session.runs]
+    seal = seal_entry(session.seal)
+    if seal is not None and as_sealed:
+        faults += seal_faults(folder, file, seal, (session.machine, session.plan), entries)
+    if machine is None or planned is None:
+        return None
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     return SessionFolder(
         name=folder.resolve().name,
@@ -341,35 +300,13 @@ def parse_session(path: Path, faults: list[Problem]) -> SessionFolder | None:
         serial_number=session.serial_number,
         operator=session.operator,
         ambient_temp_c=session.ambient_temp_c,
-        bar=None if session.bar is None else _bar(session.bar),
+        bar=None if session.bar is None else bar_entry(session.bar),
+        bar_waiver=session.bar_waiver,
         set_up_errors=tuple(map(set_up_readings, session.set_up_errors)),
+        seal=seal,
+        amendments=tuple(map(amendment_entry, session.amendments)),
+        notes=tuple(map(note_entry, session.notes)),
     )
-
-
-def run_entry(run: RunSchema, folder: Path) -> RunEntry:
-    """Return the entry of a run as the rest of the program takes it."""
-    return RunEntry(
-        test=run.test,
-        direction=Direction(run.direction),
-        repeat=run.repeat,
-        mounting=run.mounting,
-        state=RunState(run.state),
-        reason=run.reason or "",
-        started=None if run.started is None else datetime.fromisoformat(run.started),
-        path=sealed_or_part(folder / run.file),
-        sha256=run.sha256 or "",
-        program=None if run.program is None else _program(run.program, folder),
-        centre_mm=run.centre_mm,
-    )
-
-
-def _program(program: ProgramSchema, folder: Path) -> Program:
-    return Program(folder / program.file, program.sha256, program.model_sha256 or "")
-
-
-def _bar(bar: BarSchema) -> Bar:
-    moment = None if bar.calibrated is None else datetime.fromisoformat(bar.calibrated)
-    return Bar(**{**bar.model_dump(), "calibrated": moment})
 
 
 def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Problem]) -> list[RunEntry]:
@@ -400,16 +337,13 @@ def part_entry(path: Path) -> RunEntry | None:
     data = read_bytes(path, [])
     lines = None if data is None else split_file(data, str(path), [])
     header = {} if lines is None else lines.header
-    if (
-        not header.get("test")
-        or header.get("direction") not in set(Direction)
-        or not header.get("repeat", "").isdigit()
-    ):
+    repeat = count_in(header.get("repeat", ""))
+    if not header.get("test") or header.get("direction") not in set(Direction) or repeat is None:
         return None
     return RunEntry(
         test=header["test"],
         direction=Direction(header["direction"]),
-        repeat=int(header["repeat"]),
+        repeat=repeat,
         mounting=None,
         state=RunState.RECORDING,
         reason="",
@@ -418,6 +352,7 @@ def part_entry(path: Path) -> RunEntry | None:
         sha256="",
         program=None,
         centre_mm=None,
+        counts=counts_in(header),
     )
 
 

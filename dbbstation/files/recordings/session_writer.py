@@ -3,64 +3,39 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict, dataclass, fields, replace
-from datetime import UTC, datetime
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError, Problem
 from dbbstation.files.atomic import remove_leftovers, write_bytes, write_folder, write_text
-from dbbstation.files.formats.machine import MachineFile, machine_data, machine_parts
-from dbbstation.files.formats.plan import InlinePlan, plan_data
+from dbbstation.files.formats.machine import machine_text
+from dbbstation.files.formats.plan import plan_text
 from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.recordings.entries import Program, RunEntry, RunState
 from dbbstation.files.recordings.journal import RunWriter, run_header, run_line, run_name
 from dbbstation.files.recordings.lock import SessionLock
-from dbbstation.files.recordings.session import (
-    SESSION_FILE,
-    Bar,
-    Program,
-    RunEntry,
-    RunState,
-    SessionFolder,
-    part_entry,
-    read_session,
-)
+from dbbstation.files.recordings.seal import chained, copy_name, hashes, keep_copies, sealed_names, sealed_over
+from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, part_entry, read_session
 from dbbstation.files.recordings.session_checks import check_bar
 from dbbstation.files.recordings.session_set_up import readings_in
-from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import format_for, validate
+from dbbstation.files.recordings.session_text import SessionDetails, session_text
+from dbbstation.files.yaml.schema import validate
 from dbbstation.files.yaml.text import parse_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from datetime import datetime
     from pathlib import Path
 
     import numpy as np
     from numpy.typing import NDArray
 
-    from dbbstation.files.recordings.session_set_up import SetUpReadings
+    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.recordings.entries import Counts, Note
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
 
 MACHINE_FILE, PLAN_FILE, RUNS, PROGRAMS = "machine.yaml", "plan.yaml", "runs", "programs"
-
-
-@dataclass(frozen=True)
-class SessionDetails:
-    """What a session notes beside its runs; everything optional.
-
-    Attributes:
-        serial_number: of the machine.
-        operator: who measures.
-        ambient_temp_c: temperature of the shop [degC].
-        bar: the bar.
-        set_up_errors: micrometer readings of balls that were put up under the spindle.
-    """
-
-    serial_number: str = ""
-    operator: str = ""
-    ambient_temp_c: float | None = None
-    bar: Bar | None = None
-    set_up_errors: tuple[SetUpReadings, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,11 +113,13 @@ def _make_folder(
     if folder.exists():
         raise OutputError("the session folder exists already", where=str(folder), remedy="choose another name")
     whole: dict[str, str | bytes] = {f"{RUNS}/": "", f"{PROGRAMS}/": "", **files}
-    nominal = machine_data(machine_parts(machine))
-    whole[MACHINE_FILE] = yaml_text({"format": format_for(MachineFile, nominal), **nominal})
-    whole[PLAN_FILE] = yaml_text(plan_data(plan))
-    names = (folder / MACHINE_FILE, folder / PLAN_FILE)
-    whole[SESSION_FILE] = text = _session_text(folder, names, details, entries)
+    whole[MACHINE_FILE], whole[PLAN_FILE] = machine_text(machine), plan_text(plan)
+    sealed = {name: str(whole[name]).encode() for name in (MACHINE_FILE, PLAN_FILE)}
+    now = {name: hashlib.sha256(content).hexdigest() for name, content in sealed.items()}
+    whole |= {copy_name(name, now[name]): content for name, content in sealed.items()}
+    runs = chained(entries)
+    noted = replace(details, seal=sealed_over(now, runs))
+    whole[SESSION_FILE] = text = session_text(folder, (MACHINE_FILE, PLAN_FILE), noted, runs)
     _check_details(text, folder, plan)
     write_folder(folder, whole)
 
@@ -218,7 +195,9 @@ class SessionWriter:
         for run in writer.runs:
             if run.state is RunState.RECORDING and run.path.suffix == ".csv":
                 digest = hashlib.sha256(run.path.read_bytes()).hexdigest()
-                writer._put(replace(run, state=RunState.COMPLETE, sha256=digest))
+                found = part_entry(run.path)
+                counts = None if found is None else found.counts
+                writer._put(replace(run, state=RunState.COMPLETE, sha256=digest, counts=counts))
         writer._write()
         return writer
 
@@ -269,6 +248,8 @@ class SessionWriter:
         if test not in self._session.plan.tests or direction not in self._session.plan.tests[test].directions:
             what = f"the plan has no run {test} {direction}"
             raise InputError([Problem(str(self._session.plan_path), 0, 0, what, "choose a test of the plan")])
+        if self._session.seal is None:
+            self._seal()
         repeat = self.next_repeat(test, direction)
         writer = RunWriter(self._session.folder / RUNS, test, direction, repeat, columns)
         entry = RunEntry(
@@ -288,16 +269,19 @@ class SessionWriter:
         self._write()
         return writer
 
-    def finish_run(self, writer: RunWriter) -> RunEntry:
+    def finish_run(self, writer: RunWriter, counts: Counts | None = None) -> RunEntry:
         """Seal a run and note it as `complete`.
+
+        Args:
+            writer: of its file.
+            counts: what came over the line and what did not, where that is known.
 
         Raises:
             OutputError: it has no sample, or the disk refuses; it stays `recording` then.
         """
         entry = next(run for run in self.runs if run.path == writer.path)
-        digest = writer.seal()
-        done = replace(entry, state=RunState.COMPLETE, path=writer.sealed_path, sha256=digest)
-        self._put(done)
+        digest = writer.seal(counts)
+        done = self._put(replace(entry, state=RunState.COMPLETE, path=writer.sealed_path, sha256=digest, counts=counts))
         self._write()
         return done
 
@@ -310,10 +294,18 @@ class SessionWriter:
         if run.state is RunState.RECORDING:
             raise OutputError("a run that is not complete cannot be judged", where=run.label, remedy="run it again")
         state = RunState.ACCEPTED if accepted else RunState.REJECTED
-        judged = replace(run, state=state, reason="" if accepted else reason)
-        self._put(judged)
+        judged = self._put(replace(run, state=state, reason="" if accepted else reason))
         self._write()
         return judged
+
+    def note(self, note: Note) -> None:
+        """Note something while it is measured.
+
+        Raises:
+            OutputError: the disk refuses.
+        """
+        self._session = replace(self._session, notes=(*self._session.notes, note))
+        self._write()
 
     def take_in(self, path: Path) -> RunEntry:
         """List a sealed run that lies in the folder and is in no list, as `complete`: it is still to be judged.
@@ -336,9 +328,9 @@ class SessionWriter:
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         entry = replace(found, state=RunState.COMPLETE, sha256=digest)
         self._session.load(entry)
-        self._put(entry)
+        taken = self._put(entry)
         self._write()
-        return entry
+        return taken
 
     def add_program(self, name: str, content: bytes, *, model_sha256: str = "") -> Program:
         """Keep an NC program in the session; one of the same name and content is taken as it is.
@@ -351,10 +343,24 @@ class SessionWriter:
             write_bytes(path, content)
         return Program(path, hashlib.sha256(content).hexdigest(), model_sha256)
 
-    def _put(self, entry: RunEntry) -> None:
+    def _seal(self) -> None:
+        """Seal a session of an older program before more is recorded into it."""
+        session = self._session
+        found = hashes(session.folder, sealed_names(session.folder, session.names))
+        keep_copies(session.folder, found)
+        runs = chained(session.runs)
+        self._session = replace(session, runs=runs, seal=sealed_over(found, runs))
+
+    def _put(self, entry: RunEntry) -> RunEntry:
+        """Put an entry into the list, at its place or at the end, and return it as it stands there."""
         key = (entry.test, entry.direction, entry.repeat)
-        runs = {(run.test, run.direction, run.repeat): run for run in self.runs} | {key: entry}
-        self._session = replace(self._session, runs=tuple(runs.values()))
+        runs = tuple(({(run.test, run.direction, run.repeat): run for run in self.runs} | {key: entry}).values())
+        seal = self._session.seal
+        if seal is not None:
+            runs = chained(runs)
+            seal = sealed_over(seal.files, runs)
+        self._session = replace(self._session, runs=runs, seal=seal)
+        return next(run for run in runs if (run.test, run.direction, run.repeat) == key)
 
     def _write(self) -> None:
         file, session = self._session.folder / SESSION_FILE, self._session
@@ -362,58 +368,9 @@ class SessionWriter:
             # Somebody wrote micrometer readings into it while runs come in; nothing else may be changed there.
             session = replace(session, set_up_errors=readings_in(file, session.plan))
         details = SessionDetails(**{each.name: getattr(session, each.name) for each in fields(SessionDetails)})
-        names = (session.machine_path, session.plan_path)
-        text = _session_text(session.folder, names, details, session.runs)
+        text = session_text(session.folder, session.names, details, session.runs)
         write_text(file, text, force=True, rewrites=True)
         self._session = replace(session, sha256=hashlib.sha256(text.encode()).hexdigest())
-
-
-def _session_text(folder: Path, names: tuple[Path, Path], details: SessionDetails, runs: Sequence[RunEntry]) -> str:
-    bar = details.bar
-    data: dict[str, object] = {
-        "format": "",
-        "machine": names[0].relative_to(folder).as_posix(),
-        "plan": names[1].relative_to(folder).as_posix(),
-        "serial_number": details.serial_number,
-        "operator": details.operator,
-        "ambient_temp_c": details.ambient_temp_c,
-        "bar": bar and {each.name: _plain(getattr(bar, each.name)) for each in fields(bar)},
-        "set_up_errors": [_without_none(asdict(readings)) for readings in details.set_up_errors] or None,
-    }
-    data = {key: _without_none(value) for key, value in data.items() if value is not None}
-    data["format"] = format_for(SessionFile, data)
-    return yaml_text({**data, "runs": [_without_none(_run_data(folder, run)) for run in runs]})
-
-
-def _run_data(folder: Path, run: RunEntry) -> dict[str, object]:
-    program = run.program and {
-        "file": run.program.path.relative_to(folder).as_posix(),
-        "sha256": run.program.sha256,
-        "model_sha256": run.program.model_sha256 or None,
-    }
-    return {
-        "test": run.test,
-        "direction": run.direction.value,
-        "repeat": run.repeat,
-        "mounting": run.mounting,
-        "file": run.path.relative_to(folder).as_posix(),
-        "started": _plain(run.started),
-        "state": run.state.value,
-        "reason": run.reason or None,
-        "sha256": run.sha256 or None,
-        "centre_mm": run.centre_mm,
-        "program": _without_none(program),
-    }
-
-
-def _without_none(value: object) -> object:
-    return {key: item for key, item in value.items() if item is not None} if isinstance(value, dict) else value
-
-
-def _plain(value: object) -> object:
-    if not isinstance(value, datetime):
-        return value
-    return value.astimezone(UTC).isoformat().replace("+00:00", "Z")
 
 
 def _run_bytes(run: FinishedRun) -> bytes:

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.csv_rows import csv_rows
+from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
+from dbbstation.files.source_text import decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -34,7 +36,7 @@ class TableFile:
         header: number of the line that names the columns.
         names: of the columns, in order.
         lines: number of the line of each row, shape (n,).
-        cells: texts by column, n each.
+        cells: texts by column, n each, with a dot as decimal sign.
         values: numbers by column, shape (n,): NaN where a cell says that there is none, and where it is no number.
     """
 
@@ -53,7 +55,7 @@ class TableFile:
         found = []
         for line, cell, value in zip(self.lines.tolist(), self.cells[name], self.values[name], strict=True):
             if not np.isfinite(value) and cell.lower() not in NO_NUMBER:
-                what = f"{name} is `{cell}`, not a finite number"
+                what = f"{name} is `{shortened(cell)}`, not a finite number"
                 found.append(Problem(self.file, line, 0, what, "correct the cell, or leave it empty"))
         return found
 
@@ -62,12 +64,13 @@ class TableFile:
         return not np.isfinite(self.values[name]).any()
 
 
-def read_table(path: Path, needed: Iterable[str] = ()) -> TableFile:
+def read_table(path: Path, needed: Iterable[str] = (), numbers: NumberLanguage | None = None) -> TableFile:
     """Read a table.
 
     Args:
         path: of the file.
         needed: columns that must be there.
+        numbers: how they are written; None: a dot in numbers, and the separator that the header has most of.
 
     Raises:
         InputError: it cannot be read, has no rows, lacks a column (and which it may be instead), or has lines of another width.
@@ -77,10 +80,10 @@ def read_table(path: Path, needed: Iterable[str] = ()) -> TableFile:
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)
-    return parse_table(text, str(path), needed)
+    return parse_table(text, str(path), needed, numbers)
 
 
-def parse_table(text: str, file: str, needed: Iterable[str] = ()) -> TableFile:
+def parse_table(text: str, file: str, needed: Iterable[str] = (), numbers: NumberLanguage | None = None) -> TableFile:
     """Parse the text of a table.
 
     Raises:
@@ -94,26 +97,29 @@ def parse_table(text: str, file: str, needed: Iterable[str] = ()) -> TableFile:
     if not lines:
         raise InputError([Problem(file, 0, 0, "the file has no columns and no rows", "begin with a line of names")])
     header, head = lines[0]
-    separator = max(SEPARATORS, key=head.count)
-    names = [name.strip() for name in next(csv.reader([head], delimiter=separator))]
+    separator = numbers.separator if numbers else max(SEPARATORS, key=head.count)
+    names = [name.strip() for name in next(csv_rows([head], separator, file, first_line=header))[1]]
     faults = _faults_of_names(names, needed, file, header)
     if not faults and len(lines) == 1:
         faults.append(Problem(file, header, 0, "there are no rows below this line"))
-    rows, numbers = [], []
+    rows, places = [], []
     for number, line in lines[1:]:
-        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+        cells = [cell.strip() for cell in next(csv_rows([line], separator, file, first_line=number))[1]]
         if len(cells) != len(names):
             what = f"{len(cells)} values in {len(names)} columns"
-            remedy = "compare the line with the header; the decimal sign is a dot"
+            remedy = f"compare the line with the header; {(numbers or PLAIN).text}"
             faults.append(Problem(file, number, 0, what, remedy))
             continue
         rows.append(cells)
-        numbers.append(number)
+        places.append(number)
     if faults:
         raise InputError(faults[:MOST_FAULTS])
     columns = {name: tuple(row[k] for row in rows) for k, name in enumerate(names)}
-    values = {name: _numbers(column) for name, column in columns.items()}
-    return TableFile(file, header, tuple(names), np.array(numbers, dtype=np.int64), columns, values)
+    language = numbers or PLAIN
+    values = {name: _numbers(column, language) for name, column in columns.items()}
+    if language.decimal != PLAIN.decimal:
+        columns = {name: _plain(column, values[name], language) for name, column in columns.items()}
+    return TableFile(file, header, tuple(names), np.array(places, dtype=np.int64), columns, values)
 
 
 def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Problem:
@@ -144,16 +150,19 @@ def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: i
     return faults
 
 
-def _numbers(cells: Sequence[str]) -> NDArray[np.float64]:
+def _plain(cells: Sequence[str], values: NDArray[np.float64], language: NumberLanguage) -> tuple[str, ...]:
+    """Cells with the decimal sign of this program's own files; texts as they are."""
+    return tuple(
+        cell.replace(language.decimal, PLAIN.decimal) if np.isfinite(value) else cell
+        for cell, value in zip(cells, values, strict=True)
+    )
+
+
+def _numbers(cells: Sequence[str], language: NumberLanguage) -> NDArray[np.float64]:
     """Numbers of cells; NaN for those that are none."""
-    try:
-        return np.array(cells, dtype=np.float64)
-    except ValueError:
-        return np.array([_number(cell) for cell in cells])
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return float("nan")
+    if language.decimal == PLAIN.decimal:
+        try:
+            return np.array(cells, dtype=np.float64)
+        except ValueError:
+            pass  # a cell without a number, or with another sign: one by one
+    return np.array([language.number(cell) for cell in cells])

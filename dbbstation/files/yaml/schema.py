@@ -18,16 +18,50 @@ FORMATS = {
     "dbb-jig": "a jig",
     "dbb-model": "a model",
     "dbb-settings": "a shop's settings",
+    "dbb-bar": "the calibration of a bar",
 }
 """Every format by the name before its version, with what it is called in messages."""
 
 
 _OF_MACHINES = {"greatest_feed_mm_min": 2, "greatest_turn_deg_min": 2}
 
+_OF_INSTRUMENTS = dict.fromkeys(
+    (
+        "bare",
+        "feature",
+        "features",
+        "follow_up",
+        "latch_bounds_s",
+        "leading_zero",
+        "min_width",
+        "profile",
+        "profiles",
+        "refused",
+        "relative",
+        "request_end",
+        "scale",
+        "zero_mm",
+        "prefix",
+        "end",
+    ),
+    3,
+)
+
+_OF_BARS = ("reading_mm", "temp_uncertainty_k", "calibrator_serial_number", "bar_waiver")
+
 SINCE: dict[str, dict[str, int]] = {
     "dbb-plan": {"largest_loss_percent": 2},
-    "dbb-session": {"stroke_mm": 2},
-    "dbb-instrument": {"stroke_mm": 2},
+    "dbb-session": {
+        "stroke_mm": 2,
+        "seal": 3,
+        "amendments": 3,
+        "chain_sha256": 3,
+        "counts": 3,
+        "notes": 3,
+        **dict.fromkeys(_OF_BARS, 3),
+    },
+    "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},
+    "dbb-settings": {"largest_bar_age_h": 2, "profile": 2},
     "dbb-machine": _OF_MACHINES,
     "dbb-model": {**_OF_MACHINES, "provenance": 3},
 }
@@ -231,6 +265,7 @@ def keys_at(schema: type[Schema], location: Location) -> Iterator[str]:
             if isinstance(step, int) and "prefixItems" in part:
                 inner += part["prefixItems"][step : step + 1]
             inner += [part[name] for name in ("items", "additionalProperties") if isinstance(part.get(name), dict)]
+            inner += part.get("patternProperties", {}).values()
             inner += [part["properties"][step]] if step in part.get("properties", {}) else []
         parts = [found for option in inner for found in alternatives(option)]
     for part in parts:

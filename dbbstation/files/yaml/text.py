@@ -15,7 +15,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from dbbstation.errors import Problem
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -201,14 +201,6 @@ class _Walk:
 
     def _fault(self, node: Node, what: str, remedy: str) -> None:
         self.faults.append(Problem(self.file, *_place(node), what, remedy))
-
-
-def shortened(text: str) -> str:
-    """Text as it is quoted in a message: of a long one its beginning."""
-    return text if len(text) <= LONGEST_QUOTED else f"{text[:LONGEST_QUOTED]}…"
-
-
-LONGEST_QUOTED = 60
 
 
 def _place(node: Node) -> tuple[int, int]:

@@ -19,9 +19,10 @@ EXAMPLES = {
     "dbb-machine/2": [FIXTURES / "machines" / "every-key.yaml"],
     "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
     "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
-    "dbb-settings/1": [FIXTURES / "settings" / "every-key.yaml"],
+    "dbb-settings/2": [FIXTURES / "settings" / "every-key.yaml"],
+    "dbb-bar/1": [FIXTURES / "bars" / "zerodur.yaml"],
     "dbb-model/3": [FIXTURES / "models" / "provenance.yaml"],
-    "dbb-session/2": [SESSIONS / "small" / "session.yaml", SESSIONS / "under-spindle" / "session.yaml"],
+    "dbb-session/3": [SESSIONS / "sealed" / "session.yaml", SESSIONS / "under-spindle" / "session.yaml"],
 }
 UNITS = ("_mm", "_deg", "_um", "_kg", "_temp_c", "_mm_min", "_um_m_k", "_mm_per_n")
 

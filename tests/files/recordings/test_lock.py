@@ -13,8 +13,9 @@ from dbbstation.errors import InputError, OutputError
 from dbbstation.files.checking import check
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.lock import LOCK_FILE, SessionLock
-from dbbstation.files.recordings.session import RunState, unlisted_sealed
+from dbbstation.files.recordings.session import unlisted_sealed
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from dbbstation.errors import InputError
-from dbbstation.files.recordings.session import RunState, read_session
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 

@@ -11,9 +11,12 @@ import pytest
 from dbbstation.errors import InputError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
-from dbbstation.files.recordings.session import Bar, RunState, read_session
-from dbbstation.files.recordings.session_writer import FinishedRun, SessionDetails, SessionWriter, write_session
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.session_text import SessionDetails
+from dbbstation.files.recordings.session_writer import FinishedRun, SessionWriter, write_session
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
 
 BEGUN = datetime(2026, 11, 20, 8, 0, 0, 250000, tzinfo=UTC)
@@ -47,7 +50,7 @@ def reread(writer: SessionWriter) -> list[tuple[str, str, str]]:
 def test_a_new_session_holds_machine_and_plan(writer: SessionWriter, machine) -> None:
     session = read_session(writer.session.folder)
     assert sorted(path.name for path in session.folder.iterdir()) == [
-        ".lock", "machine.yaml", "plan.yaml", "programs", "runs", "session.yaml"
+        ".lock", "machine.yaml", "plan.yaml", "programs", "runs", "sealed", "session.yaml"
     ]  # fmt: skip
     assert session.plan == PLAN.to_domain()
     assert np.array_equal(session.machine.hexapod.base_joints_mm, machine.hexapod.base_joints_mm)

@@ -1,0 +1,185 @@
+"""From session folders to the figures of their circles, with what the sessions state of bar and balls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis, analyse, analyse_pair
+from dbbstation.circles.budget import SetUpKnowledge
+from dbbstation.errors import InputError, Problem, TraceError
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.judged import judge_session
+from dbbstation.files.recordings.session import SessionFolder, read_session
+from dbbstation.recorded import check_named
+from dbbstation.trace.cut import cut
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from dbbstation.circles.path import Filter
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.quality.judge import Judgement
+    from dbbstation.trace.recording import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredCircle:
+    """One accepted run.
+
+    Attributes:
+        session: name of its session.
+        entry: what the session says of it.
+        analysis: its figures; None where its recording shows no circle.
+        problem: why it shows none; empty where it does.
+        known: what the session states of bar and ball.
+        judgement: what was found of it; None where it was not asked for.
+    """
+
+    session: str
+    entry: RunEntry
+    analysis: CircleAnalysis | None
+    problem: str
+    known: SetUpKnowledge
+    judgement: Judgement | None
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPair:
+    """One circle in both directions.
+
+    Attributes:
+        one: run of the direction that was measured first.
+        analysis: figures of both.
+    """
+
+    one: MeasuredCircle
+    analysis: PairAnalysis
+
+
+@dataclass(frozen=True)
+class Circled:
+    """Circles of one or more sessions.
+
+    Attributes:
+        circles: in the order in which they were measured.
+        pairs: both directions of one test, repeat and mounting.
+        warnings: what was found beside.
+    """
+
+    circles: tuple[MeasuredCircle, ...]
+    pairs: tuple[MeasuredPair, ...]
+    warnings: tuple[str, ...]
+
+
+def load_circles(
+    paths: Sequence[Path],
+    chosen: Filter,
+    tests: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    *,
+    findings: bool = False,
+    model: IdentifiedModel | None = None,
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> Circled:
+    """Read sessions and work out the figures of their accepted runs.
+
+    Findings are made beside all accepted runs of a session, also of tests that are left out: these say what is usual.
+
+    Args:
+        paths: session folders or session files.
+        chosen: filter of G, F and H.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        findings: whether to judge the runs.
+        model: where circles are expected; None: by the nominal machine.
+        progress: told how many of how many runs of a session are done.
+
+    Raises:
+        InputError: every fault of every file; no accepted run; a test that is named and that no session has.
+    """
+    sessions = [read_session(path) for path in paths]
+    every = {test for session in sessions for test in session.plan.tests}
+    check_named(sessions, every, exclude, " to exclude")
+    check_named(sessions, every, tests)
+    circles: list[MeasuredCircle] = []
+    pairs: list[MeasuredPair] = []
+    warnings: list[str] = []
+    for session in sessions:
+        accepted = session.in_state(RunState.ACCEPTED)
+        used = [run for run in accepted if (not tests or run.test in tests) and run.test not in exclude]
+        read = session.load_all(accepted if findings else used)
+        recordings = {run.path: file.recording for run, file in zip(accepted if findings else used, read, strict=True)}
+        judgements = _judged(session, accepted, recordings, model) if findings else {}
+        of_session = []
+        for done, run in enumerate(used):
+            progress(done, len(used))
+            circle = _measured(session, run, recordings[run.path], chosen, judgements.get(run.path))
+            of_session.append(circle)
+            if circle.problem:
+                warnings.append(f"{session.name}: run {run.label} shows no circle: {circle.problem}")
+        progress(len(used), len(used))
+        circles += of_session
+        pairs += _pairs(session, of_session)
+    if not circles:
+        places = ", ".join(str(session.folder) for session in sessions)
+        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
+    return Circled(tuple(circles), tuple(pairs), tuple(warnings))
+
+
+def _judged(
+    session: SessionFolder,
+    accepted: Sequence[RunEntry],
+    recordings: dict[Path, Recording],
+    model: IdentifiedModel | None,
+) -> dict[Path, Judgement]:
+    found = judge_session(session, [(run, recordings[run.path]) for run in accepted], model)
+    return {run.path: judgement for run, judgement in zip(accepted, found, strict=True)}
+
+
+def _measured(
+    session: SessionFolder, run: RunEntry, recording: Recording, chosen: Filter, judgement: Judgement | None
+) -> MeasuredCircle:
+    known = _known(session, run, recording)
+    try:
+        named = replace(recording, name=run.label)
+        analysis = analyse(cut(named, session.circle(run)), named, chosen)
+    except TraceError as error:
+        problem = f"{error.what}; {error.remedy}" if error.remedy else error.what
+        return MeasuredCircle(session.name, run, None, problem, known, judgement)
+    return MeasuredCircle(session.name, run, analysis, "", known, judgement)
+
+
+def _known(session: SessionFolder, run: RunEntry, recording: Recording) -> SetUpKnowledge:
+    """What the session states of bar and ball of a run."""
+    bar, setup = session.bar, session.setup(run)
+    logged = recording.temperature_degc.get("bar")
+    measured = session.ambient_temp_c if logged is None else float(np.mean(logged))
+    scatter = np.zeros(3) + setup.mounting_repeatability_mm
+    ball_um = 1e3 * np.hypot(scatter, setup.ball_uncertainty_mm)
+    return SetUpKnowledge(
+        u_bar_um=None if bar is None else 1e3 * bar.calibrator_uncertainty_mm,
+        expansion_um_m_k=None if bar is None else bar.expansion_um_m_k,
+        calibrated_degc=None if bar is None else bar.temp_c,
+        measured_degc=measured,
+        u_ball_um=float(max(ball_um[:2])) if setup.place_known else None,
+        u_ball_z_um=float(ball_um[2]) if setup.place_known else None,
+    )
+
+
+def _pairs(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[MeasuredPair]:
+    """Both directions of each test, repeat and mounting."""
+    first: dict[tuple[str, int, str], MeasuredCircle] = {}
+    pairs = []
+    for circle in circles:
+        if circle.analysis is None:
+            continue
+        key = (circle.entry.test, circle.entry.repeat, session.setup(circle.entry).mounting)
+        before = first.setdefault(key, circle)
+        if before is not circle and before.analysis is not None:
+            pairs.append(MeasuredPair(before, analyse_pair(before.analysis, circle.analysis)))
+    return pairs

@@ -1,0 +1,199 @@
+"""All figures of one circle, and of both directions of one, after ISO 230-4."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.circles.noise import noise_of
+from dbbstation.circles.path import CirclePath, Filter, both, path_of
+from dbbstation.circles.reversals import AXES_DEG, closure_of, harmonics_of, step_at
+from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.trace.analysis import figures
+from dbbstation.trace.cut import edges_of, overlap_feed
+from dbbstation.trace.loss import lost_samples
+from dbbstation.trace.passes import passes_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.circles.noise import CircleNoise
+    from dbbstation.circles.reversals import Harmonic, Step
+    from dbbstation.plan.circle import Circle
+    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.passes import Passes
+    from dbbstation.trace.recording import Recording
+
+EDITION = "ISO 230-4:2005"
+"""Whose words the figures have. What they mean is written out in docs/circles.md; none of its editions was at hand."""
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Greatest and least radial deviation from the nominal radius.
+
+    Attributes:
+        largest_um: Fmax, outwards positive [µm].
+        least_um: Fmin [µm].
+    """
+
+    largest_um: float
+    least_um: float
+
+
+@dataclass(frozen=True, eq=False)
+class CircleAnalysis:
+    """One circle in one direction.
+
+    Attributes:
+        raw: as measured.
+        chosen: filter of G, F and H.
+        path: filtered.
+        g_um: circular deviation G, minimum zone [µm].
+        g_least_squares_um: the same about the least-squares circle, which is permitted too [µm].
+        centre_mm: of the least-squares circle less the commanded one, X and Y [mm].
+        radius_error_um: radius of the least-squares circle less the nominal one [µm].
+        mean_radial_error_um: mean reading less nominal length of the bar [CAL Table III] [µm].
+        f_centred: F about the least-squares centre.
+        f_commanded: F about the commanded centre.
+        steps: at the reversals of X and Y that can be seen.
+        harmonics: 2 to 10 undulations per revolution.
+        closure: end of the turn less its beginning; None where too few samples stand there.
+        passes: of the overlap; None where there is none.
+        feed_mm_min: feed that the overlap shows and its standard uncertainty [mm/min]; None where it shows none.
+        noise: of the readings.
+        lost: samples that are missing in the recording.
+        residual_um: deviations from the least-squares circle, not filtered, in time order, shape (n,) [µm].
+    """
+
+    raw: RawCircle
+    chosen: Filter
+    path: CirclePath
+    g_um: float
+    g_least_squares_um: float
+    centre_mm: tuple[float, float]
+    radius_error_um: float
+    mean_radial_error_um: float
+    f_centred: Deviations
+    f_commanded: Deviations
+    steps: tuple[Step, ...]
+    harmonics: tuple[Harmonic, ...]
+    closure: Step | None
+    passes: Passes | None
+    feed_mm_min: tuple[float, float] | None
+    noise: CircleNoise
+    lost: int
+    residual_um: NDArray[np.float64]
+
+
+def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter = Filter.NONE) -> CircleAnalysis:
+    """Work out all figures of a circle.
+
+    Args:
+        raw: the turn as measured.
+        recording: that it was cut from, for feed, overlap and lost samples; None where there is nothing but the turn.
+        chosen: filter of G, F and H; centre, radius, steps, harmonics, closure and noise are of the readings as they are.
+
+    Raises:
+        TraceError: the points do not determine a circle.
+    """
+    plain = path_of(raw)
+    path = path_of(raw, chosen) if chosen else plain
+    measured = figures(raw)
+    residual_um = 1e3 * plain.least_squares.deviation_mm
+    noise = noise_of(_without_drift(raw, residual_um), raw.phi_deg, raw.length_mm)
+    sigma = noise.sigma_um
+    steps = (step_at(raw, residual_um, theta_deg, sigma) for theta_deg in AXES_DEG)
+    radius_error_um = 1e3 * (plain.least_squares.radius_mm - plain.radius_mm)
+    return CircleAnalysis(
+        raw=raw,
+        chosen=chosen,
+        path=path,
+        g_um=1e3 * path.zone().width_mm,
+        g_least_squares_um=1e3 * float(np.ptp(path.least_squares.deviation_mm)),
+        centre_mm=measured.centre_mm,
+        radius_error_um=radius_error_um,
+        mean_radial_error_um=measured.mean_radial_error_um,
+        f_centred=_extremes(radius_error_um + 1e3 * path.least_squares.deviation_mm),
+        f_commanded=_extremes(1e3 * (path.about_ball_mm - path.radius_mm)),
+        steps=tuple(step for step in steps if step is not None),
+        harmonics=harmonics_of(plain),
+        closure=closure_of(raw, residual_um, sigma),
+        passes=None if recording is None else passes_of(recording, raw.circle),
+        feed_mm_min=None if recording is None else feed_shown(recording, raw.circle),
+        noise=noise,
+        lost=0 if recording is None else lost_samples(recording.t_s),
+        residual_um=residual_um,
+    )
+
+
+def _without_drift(raw: RawCircle, residual_um: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Deviations of a turn whose end meets its beginning: a step there would stand in every line of the spectrum."""
+    apart = closure_of(raw, residual_um, 0.0)
+    return residual_um if apart is None else residual_um - apart.height_um * raw.phi_deg / FULL_TURN_DEG
+
+
+def _extremes(deviation_um: NDArray[np.float64]) -> Deviations:
+    return Deviations(float(deviation_um.max()), float(deviation_um.min()))
+
+
+def feed_shown(recording: Recording, circle: Circle) -> tuple[float, float] | None:
+    """Return the feed that the overlap shows and its standard uncertainty [mm/min]; None where it shows none.
+
+    Raises:
+        TraceError: feed-in or feed-out is missing.
+    """
+    if recording.theta_deg is not None:
+        return None
+    return overlap_feed(recording, circle, edges_of(recording, circle))
+
+
+@dataclass(frozen=True, eq=False)
+class PairAnalysis:
+    """One circle in both directions, on one mounting.
+
+    Attributes:
+        one: in the sense that was run first.
+        other: in the other sense.
+        g_um: bi-directional circular deviation G(b), minimum zone of both paths [µm].
+        g_least_squares_um: the same about the least-squares circle of both paths [µm].
+        d_um: mean bi-directional radial deviation D: radius of the least-squares circle of both paths less the nominal
+            radius [µm].
+        h_um: circular hysteresis H: greatest radial difference between both paths at one angle [µm].
+        h_deg: that angle, from +X [deg].
+    """
+
+    one: CircleAnalysis
+    other: CircleAnalysis
+    g_um: float
+    g_least_squares_um: float
+    d_um: float
+    h_um: float
+    h_deg: float
+
+
+def analyse_pair(one: CircleAnalysis, other: CircleAnalysis) -> PairAnalysis:
+    """Work out the figures of both directions of a circle.
+
+    Raises:
+        TraceError: the points do not determine a circle.
+    """
+    together = both(one.path, other.path)
+    theta_deg = np.sort(one.path.theta_deg)
+    radii = [
+        np.interp(theta_deg, path.theta_deg, path.about_ball_mm, period=FULL_TURN_DEG)
+        for path in (one.path, other.path)
+    ]
+    apart = 1e3 * np.abs(radii[0] - radii[1])
+    widest = int(np.argmax(apart))
+    return PairAnalysis(
+        one=one,
+        other=other,
+        g_um=1e3 * together.zone().width_mm,
+        g_least_squares_um=1e3 * float(np.ptp(together.least_squares.deviation_mm)),
+        d_um=1e3 * (together.least_squares.radius_mm - together.radius_mm),
+        h_um=float(apart[widest]),
+        h_deg=float(theta_deg[widest]),
+    )

@@ -1,0 +1,126 @@
+"""Steps of a path where an axis turns round, and the undulations of its form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.plan.circle import FULL_TURN_DEG
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.circles.path import CirclePath
+    from dbbstation.trace.circle import RawCircle
+
+AXES_DEG = (0.0, 90.0, 180.0, 270.0)
+"""Where the machine's X and Y turn round."""
+
+NEAR_DEG, FAR_DEG = 1.5, 12.0
+"""Stretch either side of a place on which lines are drawn to it: near enough for a straight line to follow the lower
+harmonics, off the place itself, where a drive takes its time over the step [deg]."""
+
+HIGHEST_HARMONIC = 10
+"""Undulations per revolution up to which amplitudes are given."""
+
+FEWEST = 6
+"""Samples of a stretch that a line is drawn through."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """How much the path rises from before a place to behind it, in the sense of travel.
+
+    Attributes:
+        theta_deg: the place [deg].
+        height_um: outwards positive [µm].
+        u_um: its standard uncertainty by noise [µm].
+    """
+
+    theta_deg: float
+    height_um: float
+    u_um: float
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """One undulation A cos k(θ - θ_0) of the path about its least-squares circle.
+
+    Attributes:
+        undulations: k, per revolution.
+        amplitude_um: A [µm].
+        peak_deg: angle θ_0 of its first peak from +X, below 360 / k [deg].
+    """
+
+    undulations: int
+    amplitude_um: float
+    peak_deg: float
+
+
+def step_at(raw: RawCircle, deviation_um: NDArray[np.float64], theta_deg: float, sigma_um: float) -> Step | None:
+    """Return the step of a path at a place, by straight lines on both its sides.
+
+    Args:
+        raw: the circle.
+        deviation_um: of its samples, shape (n,) [µm].
+        theta_deg: the place [deg].
+        sigma_um: noise of a sample [µm].
+
+    Returns:
+        None where the turn begins and ends there, or where too few samples stand beside it: what differs between a
+        turn's beginning and its end is closure, not a step.
+    """
+    place = float(raw.circle.phi_deg(np.array([theta_deg]))[0])
+    if not FAR_DEG <= place <= FULL_TURN_DEG - FAR_DEG:
+        return None
+    ends = [_line_at(raw.phi_deg - place, deviation_um, side, sigma_um) for side in (-1.0, 1.0)]
+    if any(end is None for end in ends):
+        return None
+    (before, u_before), (behind, u_behind) = (end for end in ends if end is not None)
+    return Step(theta_deg, behind - before, float(np.hypot(u_before, u_behind)))
+
+
+def closure_of(raw: RawCircle, deviation_um: NDArray[np.float64], sigma_um: float) -> Step | None:
+    """Return how far the end of a turn lies outside of its beginning; None where too few samples stand there."""
+    beginning = _line_at(raw.phi_deg, deviation_um, 1.0, sigma_um, near_deg=0.0)
+    end = _line_at(raw.phi_deg - FULL_TURN_DEG, deviation_um, -1.0, sigma_um, near_deg=0.0)
+    if beginning is None or end is None:
+        return None
+    return Step(raw.circle.start_deg, end[0] - beginning[0], float(np.hypot(beginning[1], end[1])))
+
+
+def _line_at(
+    away_deg: NDArray[np.float64],
+    values: NDArray[np.float64],
+    side: float,
+    sigma: float,
+    near_deg: float = NEAR_DEG,
+) -> tuple[float, float] | None:
+    """Height at the place of a straight line through the samples on one side of it, and what noise makes of it."""
+    beside = side * away_deg
+    inside = (beside >= near_deg) & (beside <= FAR_DEG)
+    if np.count_nonzero(inside) < FEWEST:
+        return None
+    x = away_deg[inside]
+    middle = x.mean()
+    spread = float(np.sum((x - middle) ** 2))
+    weight = 1.0 / len(x) - middle * (x - middle) / spread
+    return float(weight @ values[inside]), sigma * float(np.sqrt(weight @ weight))
+
+
+def harmonics_of(path: CirclePath) -> tuple[Harmonic, ...]:
+    """Return the undulations of a path about its least-squares circle, 2 to 10 per revolution."""
+    theta = np.radians(path.theta_deg)
+    orders = np.arange(1, HIGHEST_HARMONIC + 1)
+    waves = np.exp(1j * np.outer(theta, orders))
+    columns = np.hstack([np.ones((len(theta), 1)), waves.real, waves.imag])
+    found, *_ = np.linalg.lstsq(columns, 1e3 * path.least_squares.deviation_mm, rcond=None)
+    cosine, sine = found[1 : HIGHEST_HARMONIC + 1], found[HIGHEST_HARMONIC + 1 :]
+    peaks = np.mod(np.degrees(np.arctan2(sine, cosine)) / orders, FULL_TURN_DEG / orders)
+    return tuple(
+        Harmonic(int(k), float(np.hypot(c, s)), float(peak))
+        for k, c, s, peak in zip(orders, cosine, sine, peaks, strict=True)
+        if k > 1
+    )

@@ -1,0 +1,89 @@
+"""Figures of circles and findings as plain numbers: what `--json` prints and reports show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.circles.analysis import CircleAnalysis, Deviations, PairAnalysis
+    from dbbstation.circles.budget import Budget, Quantity
+    from dbbstation.circles.reversals import Step
+
+
+def circle_summary(one: CircleAnalysis, budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
+    """Figures of one circle, lengths in µm unless the key says otherwise; None where something cannot be told."""
+    x, y = one.centre_mm
+    return {
+        "direction": str(one.raw.circle.direction),
+        "tilt_deg": list(one.raw.circle.tilt_deg),
+        "elevation_deg": one.raw.circle.elevation_deg,
+        "radius_mm": one.path.radius_mm,
+        "bar_mm": one.raw.circle.bar_mm,
+        "feed_mm_min": one.raw.circle.feed_mm_min,
+        "samples": len(one.raw),
+        "samples_lost": one.lost,
+        "g_um": one.g_um,
+        "g_least_squares_um": one.g_least_squares_um,
+        "f_um": _deviations(one.f_centred),
+        "f_about_commanded_centre_um": _deviations(one.f_commanded),
+        "radius_error_um": one.radius_error_um,
+        "mean_radial_error_um": one.mean_radial_error_um,
+        "centre_um": {"x": 1e3 * x, "y": 1e3 * y},
+        "harmonics": [
+            {"undulations": h.undulations, "amplitude_um": h.amplitude_um, "peak_deg": h.peak_deg}
+            for h in one.harmonics
+        ],
+        "reversal_steps": [_step(step) for step in one.steps],
+        "closure": None if one.closure is None else _step(one.closure),
+        "drift_um_per_turn": None if one.passes is None else one.passes.mean_um,
+        "feed_shown_mm_min": None
+        if one.feed_mm_min is None
+        else {"value": one.feed_mm_min[0], "u": one.feed_mm_min[1]},
+        "noise_um": {
+            "of_slow_figures": _finite(one.noise.slow_um),
+            "of_a_reading": _finite(one.noise.reading_um),
+            "step_of_readings": one.noise.resolution_um,
+        },
+        "uncertainty": budget_summary(budgets),
+    }
+
+
+def pair_summary(pair: PairAnalysis, budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
+    """Figures of both directions of a circle [µm]."""
+    return {
+        "g_um": pair.g_um,
+        "g_least_squares_um": pair.g_least_squares_um,
+        "d_um": pair.d_um,
+        "h_um": pair.h_um,
+        "h_deg": pair.h_deg,
+        "uncertainty": budget_summary(budgets),
+    }
+
+
+def budget_summary(budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
+    """Standard uncertainty u, its terms, and what is missing, by figure [µm]."""
+    return {
+        str(quantity): {
+            "u_um": budget.u_um,
+            "terms_um": {str(cause): float(size) for cause, size in budget.terms_um.items()},
+            "missing": list(budget.missing),
+            "noise_adds_up_to_um": budget.noise_adds_um,
+        }
+        for quantity, budget in budgets.items()
+    }
+
+
+def _deviations(both: Deviations) -> dict[str, float]:
+    return {"max": both.largest_um, "min": both.least_um}
+
+
+def _step(step: Step) -> dict[str, float]:
+    return {"theta_deg": step.theta_deg, "height_um": step.height_um, "u_um": step.u_um}
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

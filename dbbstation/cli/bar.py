@@ -1,0 +1,199 @@
+"""`dbbstation bar`: read the bar on its calibrator, and keep what it read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from dbbstation.cli.instrument_options import chosen_protocol, instrument_options
+from dbbstation.cli.number_types import Finite
+from dbbstation.cli.patience import driver_patience
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from dbbstation.files.formats.bar import BarFile
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.trace.steady import Steady
+
+USUAL_TEMP_UNCERTAINTY_K = 0.3
+"""A thermometer of class B may be off by 0.4 K at 20 degC [IEC 60751]; as a rectangular distribution that is 0.23 K, and the bar is
+not quite as warm as it [K]."""
+
+STEEL_BAR_UM_M_K = 11.5
+"""Thermal expansion of unalloyed steel [µm/(m K)]."""
+
+
+@click.command()
+@instrument_options(required=True)
+@click.option("--serial-number", required=True, help="Serial number of the bar.")
+@click.option("--calibrator", "calibrator_serial", required=True, help="Serial number of the calibrator.")
+@click.option(
+    "--calibrator-mm", type=Finite(20, 2000), required=True, help="Its length on the certificate, at 20 degC."
+)
+@click.option("--calibrator-u-um", type=Finite(0, 100), required=True, help="Standard uncertainty of that: half of U.")
+@click.option("--certified", required=True, metavar="YYYY-MM-DD", help="Date of the certificate.")
+@click.option("--certificate", default="", help="Number of the certificate, and who issued it.")
+@click.option("--temp-c", type=Finite(-30, 80), required=True, help="Temperature of the bar [degC].")
+@click.option(
+    "--temp-u-k",
+    type=Finite(0.001, 10),
+    default=USUAL_TEMP_UNCERTAINTY_K,
+    show_default=True,
+    help="Standard uncertainty of that temperature [K].",
+)
+@click.option(
+    "--expansion-um-m-k",
+    type=Finite(0.01, 50),
+    default=STEEL_BAR_UM_M_K,
+    show_default="11.5, steel",
+    help="Thermal expansion of the bar [µm/(m K)].",
+)
+@click.option("--count", type=click.IntRange(20, 1_000_000), default=200, show_default=True, help="Readings.")
+@click.option(
+    "--resolution-um", type=Finite(0.0001, 100), help="Last digit of the display  [default: as readings show]."
+)
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="File of the bar.")
+@click.option("--force", is_flag=True, help="Replace the file.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def bar(
+    *,
+    instrument: str,
+    profile: str | None,
+    zero_mm: float | None,
+    port: str,
+    baud: int | None,
+    serial_number: str,
+    calibrator_serial: str,
+    calibrator_mm: float,
+    calibrator_u_um: float,
+    certified: str,
+    certificate: str,
+    temp_c: float,
+    temp_u_k: float,
+    expansion_um_m_k: float,
+    count: int,
+    resolution_um: float | None,
+    out: Path,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Read the bar on its calibrator and write what it read: the length that `measure --bar FILE` needs.
+
+    Put the bar on the calibrator, a block of known length such as of Zerodur, and wait until it has the temperature of the
+    shop. The readings are averaged. What the bar reads too long or too short is noted and never taken off a recording: the fit of
+    `calibrate` knows it, with its uncertainty, and with what the bar grows by until it measures.
+
+    \b
+    Examples:
+      dbbstation bar --instrument heidenhain-nd281b --port /dev/ttyUSB0 --serial-number DBB-0042 --calibrator ZB-17 \\
+        --calibrator-mm 150.0003 --calibrator-u-um 0.25 --certified 2026-03-01 --temp-c 20.3 --out bar.yaml
+      dbbstation check bar.yaml
+    """  # noqa: D301 (click reads the escape)
+    from datetime import UTC, datetime
+
+    from dbbstation.cli.output import print_json
+    from dbbstation.files.atomic import refuse_existing
+    from dbbstation.files.formats.bar import write_bar
+
+    refuse_existing(out, force=force)
+    protocol = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=calibrator_mm)
+    found = _read(protocol, port, baud, count, resolution_um)
+    file = _file(
+        found,
+        {
+            "serial_number": serial_number,
+            "temp_c": temp_c,
+            "temp_uncertainty_k": temp_u_k,
+            "expansion_um_m_k": expansion_um_m_k,
+        },
+        {
+            "serial_number": calibrator_serial,
+            "length_mm": calibrator_mm,
+            "uncertainty_um": calibrator_u_um,
+            "certified": certified,
+            "certificate": certificate,
+        },
+        instrument,
+        datetime.now(UTC).replace(microsecond=0),
+    )
+    write_bar(out, file, force=force)
+    long_um, u_um = 1e3 * (found.mean_mm - file.length_mm), 1e3 * file.uncertainty_mm
+    if as_json:
+        told = {"readings": found.count, "mean_mm": found.mean_mm, "scatter_um": 1e3 * found.scatter_mm}
+        told |= {"reads_long_um": long_um, "standard_uncertainty_um": u_um, "drift_um": 1e3 * found.drift_mm}
+        print_json({"bar": str(out), **told})
+        return
+    click.echo(f"{found.count} readings, mean {found.mean_mm:.5f} mm, scatter {1e3 * found.scatter_mm:.2f} µm")
+    click.echo(f"the bar reads {long_um:+.2f} µm long on its calibrator, standard uncertainty {u_um:.2f} µm")
+    if abs(found.drift_mm) > _DRIFT * file.uncertainty_mm:
+        click.echo(f"note: it drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: give it time to cool down", err=True)
+    click.echo(f"{out}: `dbbstation measure --bar {out} …` takes it")
+
+
+_DRIFT = 2.0
+"""A drift that is greater than the expanded uncertainty (k = 2) matters."""
+
+
+def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:
+    """Mean of so many good readings.
+
+    Raises:
+        InstrumentError: the line, or too many readings that are no length.
+        click.UsageError: the resolution cannot be told.
+    """
+    import numpy as np
+
+    from dbbstation.errors import InstrumentError
+    from dbbstation.instrument.driver import Instrument
+    from dbbstation.trace.steady import steady
+
+    lengths: list[float] = []
+    with Instrument(protocol, port, baud=baud, **driver_patience(1.0)) as source:
+        for reading in source.readings(2 * count):
+            if reading.length_mm is not None and reading.status == "ok":
+                lengths.append(reading.length_mm)
+            if len(lengths) == count:
+                break
+        else:
+            what = f"only {len(lengths)} of {2 * count} readings are a length"
+            raise InstrumentError(what, where=source.where, remedy="put the bar on the calibrator, check its cable")
+    try:
+        return steady(np.array(lengths), None if resolution_um is None else 1e-3 * resolution_um)
+    except ValueError as error:
+        raise click.UsageError(f"{error}: say with --resolution-um what the display's last digit is") from error
+
+
+def _file(
+    found: Steady, of_bar: dict[str, object], calibrator: dict[str, object], instrument: str, now: datetime
+) -> BarFile:
+    """The calibration as its file has it.
+
+    Raises:
+        click.UsageError: a value that no such file may have.
+    """
+    from pydantic import ValidationError
+
+    from dbbstation.files.formats.bar import BarFile
+
+    readings = {
+        "instrument": instrument,
+        "count": found.count,
+        "mean_mm": found.mean_mm,
+        "uncertainty_um": 1e3 * found.uncertainty_mm,
+        "scatter_um": 1e3 * found.scatter_mm,
+        "resolution_um": 1e3 * found.resolution_mm,
+    }
+    data = {
+        **of_bar,
+        "calibrated": now.isoformat().replace("+00:00", "Z"),
+        "calibrator": calibrator,
+        "readings": readings,
+    }
+    try:
+        return BarFile.model_validate({"format": "dbb-bar/1", **data})
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise click.UsageError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error

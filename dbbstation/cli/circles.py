@@ -1,0 +1,304 @@
+"""`dbbstation circles`: the figures of measured circles after ISO 230-4, without a model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dbbstation.cli.chosen_tests import chosen_tests_options
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from dbbstation.circled import Circled
+    from dbbstation.circles.path import Filter
+
+FILTERS = {"none": 0, "15": 15, "50": 50, "150": 150}
+
+
+@click.command()
+@click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
+@click.option(
+    "--filter",
+    "cut_off",
+    type=click.Choice(list(FILTERS)),
+    default="none",
+    show_default=True,
+    help="Gaussian filter of G, F and H: its cut-off in undulations per revolution.",
+)
+@click.option("--findings", is_flag=True, help="Judge every run too: number, limit, verdict.")
+@click.option(
+    "--model", type=click.Path(path_type=Path), help="Expect circles where this model has them; with --findings."
+)
+@click.option("--budget", is_flag=True, help="Print the uncertainty budget of every figure, term by term.")
+@chosen_tests_options
+@click.option("--csv", "out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table here, as CSV.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def circles(
+    sessions: tuple[Path, ...],
+    *,
+    cut_off: str,
+    findings: bool,
+    model: Path | None,
+    budget: bool,
+    tests: tuple[str, ...],
+    exclude: tuple[str, ...],
+    out: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    r"""Work out the figures of measured circles, in the words of ISO 230-4:2005; no model is needed.
+
+    G is the circular deviation of the minimum zone, G(LS) about the least-squares circle, which is permitted too. F is the
+    radial deviation about the least-squares centre. X and Y are the centre less the commanded one: reported, never taken
+    out of calibration data. G(b), D and H are of both directions together. U is 2 u; --budget shows its terms.
+
+    \b
+    Examples:
+      dbbstation circles session
+      dbbstation circles session --filter 50 --csv circles.csv
+      dbbstation circles session --findings --model model.yaml
+      dbbstation circles session --test a --budget --json
+    """
+    from dbbstation.circled import load_circles
+    from dbbstation.circles.path import Filter
+    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import count_bar
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.files.formats.model import read_model
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.files.provenance import refuse_existing_table, write_table
+    from dbbstation.files.recordings.table_csv import table_csv
+
+    if model is not None and not findings:
+        raise click.UsageError("--model says where circles are expected: give --findings too")
+    if out is not None:
+        refuse_existing_table(out, force=force)
+    identified = None if model is None else read_model(model, every_source(()))
+    with count_bar("circles") as progress:
+        found = load_circles(
+            sessions,
+            Filter(FILTERS[cut_off]),
+            tests,
+            exclude,
+            findings=findings,
+            model=identified,
+            progress=progress,
+        )
+    for warning in found.warnings:
+        say(f"note: {warning}")
+    summary = _summary(found, Filter(FILTERS[cut_off]))
+    if out is not None:
+        names, rows = _flat(summary["runs"])
+        write_table(out, table_csv(names, list(zip(*rows, strict=True))), provenance(), force=force)
+        summary["csv"] = str(out)
+    if as_json:
+        print_json(summary)
+        return
+    _print(summary, several=len(sessions) > 1)
+    if budget:
+        _print_budgets(summary)
+    if findings:
+        _print_findings(summary["runs"])
+
+
+def _summary(found: Circled, chosen: Filter) -> dict[str, Any]:
+    from dbbstation.circles.analysis import EDITION
+    from dbbstation.circles.budget import budgets, pair_budgets
+    from dbbstation.circles.summary import circle_summary, pair_summary
+    from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
+    from dbbstation.quality.summary import findings_summary
+
+    runs = []
+    for circle in found.circles:
+        entry = circle.entry
+        run: dict[str, Any] = {
+            "session": circle.session,
+            "test": entry.test,
+            "direction": str(entry.direction),
+            "repeat": entry.repeat,
+            "problem": circle.problem or None,
+        }
+        if circle.analysis is not None:
+            run |= circle_summary(circle.analysis, budgets(circle.analysis, circle.known))
+        if circle.judgement is not None:
+            run["findings"] = findings_summary(circle.judgement.findings)
+        runs.append(run)
+    pairs = [
+        {
+            "session": pair.one.session,
+            "test": pair.one.entry.test,
+            "repeat": pair.one.entry.repeat,
+            **pair_summary(pair.analysis, pair_budgets(pair.analysis, pair.one.known)),
+        }
+        for pair in found.pairs
+    ]
+    return {
+        "edition": EDITION,
+        "filter": chosen.words,
+        "reference_circle": {"g_um": "minimum zone", "g_least_squares_um": "least squares", "f_um": "least squares"},
+        "false_alarms_per_run": FALSE_ALARMS_PER_RUN,
+        "runs": runs,
+        "pairs": pairs,
+    }
+
+
+def _print(summary: Mapping[str, Any], *, several: bool) -> None:
+    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
+
+    click.echo(f"figures of {summary['edition']}, filter: {summary['filter']}, lengths in µm, {EXPANDED}")
+    head = ["session"] if several else []
+    rows: list[list[object]] = []
+    for run in summary["runs"]:
+        name: list[object] = [run["session"]] if several else []
+        name += [run["test"], run["direction"], run["repeat"]]
+        if run["problem"]:
+            rows.append([*name, *["-"] * 12])
+            continue
+        u = {figure: COVERAGE_FACTOR * budget["u_um"] for figure, budget in run["uncertainty"].items()}
+        steps = [abs(step["height_um"]) for step in run["reversal_steps"]]
+        drift = run["drift_um_per_turn"]
+        rows.append(
+            [
+                *name,
+                run["g_um"],
+                u["G"],
+                run["g_least_squares_um"],
+                run["f_um"]["max"],
+                run["f_um"]["min"],
+                u["F"],
+                run["centre_um"]["x"],
+                run["centre_um"]["y"],
+                u["X"],
+                max(steps) if steps else "-",
+                "-" if run["closure"] is None else run["closure"]["height_um"],
+                "-" if drift is None else drift,
+                _noise(run),
+            ]
+        )
+    titles = [
+        "test",
+        "dir",
+        "n",
+        "G",
+        "U",
+        "G(LS)",
+        "Fmax",
+        "Fmin",
+        "U",
+        "X",
+        "Y",
+        "U",
+        "step",
+        "closure",
+        "drift",
+        "noise",
+    ]
+    print_table([*head, *titles], rows)
+    if not summary["pairs"]:
+        return
+    click.echo("\nboth directions")
+    rows = []
+    for pair in summary["pairs"]:
+        u = {figure: COVERAGE_FACTOR * budget["u_um"] for figure, budget in pair["uncertainty"].items()}
+        name = [pair["session"]] if several else []
+        rows.append(
+            [
+                *name,
+                pair["test"],
+                pair["repeat"],
+                pair["g_um"],
+                u["G(b)"],
+                pair["g_least_squares_um"],
+                pair["d_um"],
+                u["D"],
+                pair["h_um"],
+                pair["h_deg"],
+            ]
+        )
+    print_table([*head, "test", "n", "G(b)", "U", "G(b)(LS)", "D", "U", "H", "at [deg]"], rows)
+
+
+def _noise(run: Mapping[str, Any]) -> object:
+    noise = run["noise_um"]["of_a_reading"]
+    return "-" if noise is None else f"{noise:.2f}"
+
+
+def _print_budgets(summary: Mapping[str, Any]) -> None:
+    from dbbstation.cli.output import print_table
+
+    rows: list[list[object]] = []
+    missing: dict[str, None] = {}
+    for run in [*summary["runs"], *summary["pairs"]]:
+        for figure, budget in run.get("uncertainty", {}).items():
+            name = [run["test"], run.get("direction", "both"), run["repeat"], figure]
+            rows += [[*name, cause, f"{size:.3f}"] for cause, size in budget["terms_um"].items()]
+            rows.append([*name, "u, all together", f"{budget['u_um']:.3f}"])
+            missing |= dict.fromkeys(budget["missing"])
+    click.echo("\nstandard uncertainties u [µm]")
+    print_table(["test", "dir", "n", "figure", "term", "u"], rows)
+    click.echo(f"not stated, and not in U: {', '.join(missing)}")
+
+
+def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
+    from dbbstation.cli.output import print_table
+    from dbbstation.quality.finding import Verdict
+
+    rows: list[list[object]] = [
+        [
+            run["test"],
+            run["direction"],
+            run["repeat"],
+            finding["name"],
+            "-" if finding["value"] is None else f"{finding['value']:.2f}",
+            "-" if finding["limit"] is None else f"{finding['limit']:.2f}",
+            finding["unit"],
+            finding["verdict"],
+        ]
+        for run in runs
+        for finding in run["findings"]
+    ]
+    click.echo("\nfindings")
+    print_table(["test", "dir", "n", "finding", "value", "limit", "unit", "verdict"], rows)
+    wrong = [
+        f"{run['test']} {run['direction']} {run['repeat']}: {finding['name']}: {finding['text']}"
+        for run in runs
+        for finding in run["findings"]
+        if finding["verdict"] == Verdict.WRONG
+    ]
+    click.echo("\n".join(wrong) if wrong else "nothing is wrong")
+
+
+def _flat(runs: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[object]]]:
+    """Columns and rows of a table: every number of a run that is one."""
+    flat = [_flattened(run) for run in runs]
+    names = list(dict.fromkeys(name for run in flat for name in run))
+    return names, [[run.get(name, "") for name in names] for run in flat]
+
+
+def _flattened(run: Mapping[str, Any]) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for key, value in run.items():
+        match value:
+            case str() | int() | float():
+                found[key] = value
+            case {"max": _, "min": _} | {"x": _, "y": _}:
+                found |= {f"{key.removesuffix('_um')}_{part}_um": number for part, number in value.items()}
+            case _:
+                pass
+    for harmonic in run.get("harmonics", ()):
+        found[f"harmonic_{harmonic['undulations']}_um"] = harmonic["amplitude_um"]
+    for step in run.get("reversal_steps", ()):
+        found[f"step_at_{step['theta_deg']:.0f}_deg_um"] = step["height_um"]
+    if run.get("closure"):
+        found["closure_um"] = run["closure"]["height_um"]
+    if run.get("noise_um"):
+        found["noise_um"] = run["noise_um"]["of_a_reading"] or ""
+    for figure, budget in run.get("uncertainty", {}).items():
+        found[f"u_{figure.lower()}_um"] = budget["u_um"]
+    for finding in run.get("findings", ()):
+        found[f"finding_{finding['name'].replace(' ', '_')}"] = finding["verdict"]
+    return found

@@ -1,0 +1,38 @@
+"""Types of options that are numbers: what is not a finite number is refused by the option's name, before anything is read or written."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from click import Context, Parameter
+
+
+class Finite(click.FloatRange):
+    """A finite number, within a range where one is given; arguments as those of `click.FloatRange`.
+
+    `nan` lies in every range, as it is neither below nor above anything, and `inf` in those without an end.
+    """
+
+    def __init__(self, *limits: Any, **more: Any) -> None:  # noqa: ANN401 - as click has it
+        super().__init__(*limits, **more)
+        if self.min is None and self.max is None:
+            self.name = "float"  # what help texts show
+
+    def convert(self, value: Any, param: Parameter | None, ctx: Context | None) -> float:  # noqa: ANN401 - as click has it
+        """Return the number.
+
+        Raises:
+            BadParameter: it is no number, not finite, or out of range.
+        """
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number", param, ctx)
+        return number
+
+    def _describe_range(self) -> str:
+        """The range in help texts; nothing where there is none."""
+        return "" if self.min is None and self.max is None else super()._describe_range()

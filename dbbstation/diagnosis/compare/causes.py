@@ -1,0 +1,222 @@
+"""Error sources as causes of a difference: what changed between two sessions, or acted in one of them, or in both at other times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
+from dbbstation.diagnosis.parts import ALIKE, parts_of
+from dbbstation.inference.channel import Law
+from dbbstation.sources.contract import Effect, LinearSource, Need
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.compare.sides import Sides
+    from dbbstation.sources.contract import ErrorSource, Parameter
+
+EQUIVALENT = 0.045
+"""Share of an effect by which it differs between the sessions up to which nothing tells what acts in B from what no longer acts as
+it did in A: the cosine between the two is 0.999."""
+
+
+@dataclass(frozen=True)
+class When:
+    """One way in which a cause may be at work; a difference is B less A.
+
+    Attributes:
+        label: as printed; empty for a change of a cause that does the same in both sessions.
+        of_a: factor of what it does on the way of A.
+        of_b: factor of what it does on the way of B.
+    """
+
+    label: str
+    of_a: float
+    of_b: float
+
+
+CHANGED, IN_A, IN_BOTH = When("", 0.0, 1.0), When("in A", -1.0, 0.0), When("in both alike", -1.0, 1.0)
+IN_B = When("in B", 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """One error source over both sessions.
+
+    Attributes:
+        source: the cause.
+        sides: both sessions.
+        share: of its plausible sizes that a change has.
+    """
+
+    source: ErrorSource
+    sides: Sides
+    share: float = 1.0
+
+    def law(self, log_odds: float) -> Law:
+        """Columns and forms for the channel; a form per part of the source and per way of being at work."""
+        amplitudes, shapes = self._amplitudes, [p for p in self._parameters if p.shape]
+        parts = parts_of(amplitudes, self._sets)
+        count = len(amplitudes) * self._sets
+        choices: list[tuple[tuple[int, ...], float, str]] = []
+        names: list[str] = []
+        units: list[str] = []
+        plausible: list[float] = []
+        for when in self._whens:
+            first = len(plausible)
+            behind = f", {when.label}" if when.label else ""
+            for k in range(count):
+                parameter = amplitudes[k % len(amplitudes)]
+                number = f" ({k // len(amplitudes) + 1})" if self._sets > 1 else ""
+                names.append(f"{parameter.name}{number}{behind}")
+                units.append(parameter.unit)
+                plausible.append(self.share * parameter.plausible)
+            if self._alike:
+                names.append(f"{ALIKE}{behind}")
+                units.append(amplitudes[0].unit)
+                plausible.append(self.share * amplitudes[0].plausible)
+            for part in parts:
+                own = (first + count,) if part.alike else tuple(first + k for k in part.amplitudes)
+                label = " ".join(text for text in (part.label, when.label) if text)
+                choices.append((own, part.log_weight - float(np.log(len(self._whens))), label))
+        return Law(
+            name=self.source.name + (" by temperature" if self.source.varies_with == "temperature" else ""),
+            columns=self.columns,
+            plausible=np.array(plausible),
+            parameters=(*names, *(p.name for p in shapes)),
+            units=(*units, *(p.unit for p in shapes)),
+            grids=tuple(self._grid(k, p) for k, p in enumerate(shapes)),
+            form_uncertainty=self.source.form_uncertainty,
+            discrepancy=self._discrepancy,
+            log_odds=log_odds,
+            at=None if self._proportional else self._at,
+            choices=tuple(choices),
+        )
+
+    def columns(self, point: tuple[float, ...]) -> NDArray[np.float64]:
+        """Reading of B less that of A by each amplitude of each way of being at work, shape (n, p)."""
+        of_a = self._of(0, point) if len(self._whens) > 1 else None
+        of_b = self._of(1, point)
+        found = []
+        for when in self._whens:
+            own = when.of_b * of_b
+            if of_a is not None and when.of_a:
+                own = own + when.of_a * of_a
+            found += [own, own.sum(axis=1, keepdims=True)] if self._alike else [own]
+        return np.hstack(found)
+
+    def _at(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same about amplitudes, each by itself: what comes of play over a transit is not proportional to the play."""
+        found = self.columns(point)
+        width = len(amplitudes) // len(self._whens)
+        for k in np.flatnonzero(amplitudes).tolist():
+            when, own = self._whens[k // width], k % width
+            values = np.zeros(len(self._amplitudes) * self._sets)
+            values[slice(None) if self._alike and own == width - 1 else own] = amplitudes[k]
+            effect = when.of_b * self._effect(1, point, values)
+            if when.of_a:
+                effect = effect + when.of_a * self._effect(0, point, values)
+            found[:, k] = effect / amplitudes[k]
+        return found
+
+    def _effect(self, side: int, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What a source does to the readings of one session, shape (n,)."""
+        pieces, sides = [], self.sides
+        for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
+            values = self._values(point, np.split(amplitudes, self._sets)[group])
+            effect = self.source.effect(motion, sides.machine, values)
+            pieces.append(reading.by_parameters(_as_derivative(effect))[:, 0])
+        return sides.averaged(side, pieces)
+
+    @property
+    def _proportional(self) -> bool:
+        """Whether effects are proportional to amplitudes: all but those of what has a history."""
+        return isinstance(self.source, LinearSource) or Need.PATH not in self.source.needs
+
+    def _values(self, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+        is_shape = np.array([bool(p.shape) for p in self._parameters])
+        values = np.empty(len(is_shape))
+        values[is_shape], values[~is_shape] = point, amplitudes
+        return values
+
+    @cached_property
+    def _parameters(self) -> tuple[Parameter, ...]:
+        return self.source.parameters(self.sides.machine)
+
+    @cached_property
+    def _amplitudes(self) -> list[Parameter]:
+        return [p for p in self._parameters if not p.shape]
+
+    @cached_property
+    def _groups(self) -> NDArray[np.int64]:
+        return self.sides.groups(self.source)
+
+    @property
+    def _sets(self) -> int:
+        return int(self._groups.max()) + 1
+
+    @cached_property
+    def _alike(self) -> bool:
+        """Whether one amplitude for all struts is one of its forms."""
+        return any(part.alike for part in parts_of(self._amplitudes, self._sets))
+
+    @cached_property
+    def _whens(self) -> tuple[When, ...]:
+        """Ways of being at work that these sessions can show."""
+        point = tuple(p.shape[len(p.shape) // 2] for p in self._parameters if p.shape)
+        of_a, of_b = self._of(0, point), self._of(1, point)
+        size = max(float(np.linalg.norm(of_a)), float(np.linalg.norm(of_b)), 1e-300)
+        apart = float(np.linalg.norm(of_b - of_a)) / size
+        return (CHANGED,) if apart <= EQUIVALENT else (IN_B, IN_A, IN_BOTH)
+
+    def _grid(self, k: int, parameter: Parameter) -> tuple[float, ...]:
+        """Values of a nonlinear parameter that these runs can show, rising."""
+        middle = [p.shape[len(p.shape) // 2] for p in self._parameters if p.shape]
+        values = tuple(sorted(parameter.shape))
+        shown = tuple(v for v in values if self.source.shows(self.sides.motions[1], [*middle[:k], v, *middle[k + 1 :]]))
+        return shown or values[:1]
+
+    def _of(self, side: int, point: tuple[float, ...]) -> NDArray[np.float64]:
+        """What the amplitudes of all sets do to the readings of one session, shape (n, p)."""
+        count = len(self._amplitudes)
+        values = self._values(point, np.zeros(count))
+        amplitudes = [k for k, p in enumerate(self._parameters) if not p.shape]
+        pieces = []
+        for group, reading in zip(self._groups, self.sides.readings[side], strict=True):
+            derivative = reading.by_source(self.source, self.sides.machine, values)
+            own = np.zeros((len(derivative), count * self._sets))
+            own[:, count * group : count * (group + 1)] = derivative[:, amplitudes]
+            pieces.append(own)
+        return self.sides.averaged(side, pieces)
+
+    def _discrepancy(
+        self, effect: NDArray[np.float64], point: tuple[float, ...], amplitudes: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """What the formula may be off by in either session."""
+        count = len(self._amplitudes) * self._sets
+        total = [np.zeros(count), np.zeros(count)]
+        for when, own in zip(self._whens, np.split(amplitudes, len(self._whens)), strict=True):
+            values = own[:count] + (own[count] if self._alike else 0.0)
+            total[0] += when.of_a * values
+            total[1] += when.of_b * values
+        found = [np.zeros((len(effect), 0))]
+        found += [self._slack(side, point, values) for side, values in enumerate(total) if values.any()]
+        return np.hstack(found)
+
+    def _slack(self, side: int, point: tuple[float, ...], amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
+        runs, sides = [], self.sides
+        for group, motion, reading in zip(self._groups, sides.motions[side], sides.readings[side], strict=True):
+            values = self._values(point, np.split(amplitudes, self._sets)[group])
+            runs.append(Effects(motion, reading, values, reading.by_source(self.source, sides.machine, values)))
+        found = discrepancy_of(self.source, sides.machine, runs)
+        return sides.averaged(side, np.split(found, np.cumsum([len(run.derivative) for run in runs])[:-1]))
+
+
+def _as_derivative(effect: Effect) -> Effect:
+    """An effect as its own derivative by one number that it is multiplied with."""
+    arrays = {field.name: getattr(effect, field.name) for field in fields(effect)}
+    return Effect(**{name: None if array is None else np.asarray(array)[..., None] for name, array in arrays.items()})

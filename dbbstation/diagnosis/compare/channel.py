@@ -1,0 +1,68 @@
+"""The channel of two sessions: readings of A as the simulation of B, circle by circle at the same angles.
+
+Base: what is stated of balls, bars and the beginning of turns in both sessions. Causes: error sources that changed or acted in one
+session, balls and bars that sit further off than stated, the jig put down elsewhere. Effects without a name: over the angle and
+what else tells runs apart, on struts, and a curve of its own in every test or run.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES
+from dbbstation.diagnosis.compare.causes import Change
+from dbbstation.diagnosis.compare.set_up import base_of, jig_laws, set_up_laws
+from dbbstation.diagnosis.compare.unnamed import of_each_test, of_readings, of_struts, samples_of_b, variables_of
+from dbbstation.inference.channel import NAMED_ODDS, Channel
+from dbbstation.sources.registry import sources_named
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.diagnosis.compare.sides import Sides
+    from dbbstation.inference.channel import Law
+    from dbbstation.sources.contract import ErrorSource
+
+CHANGE = 0.1
+"""Share of how wrong a machine's geometry may be that a change between two sessions usually is: what was made badly stays so; a
+knock, a new reference run or a joint set anew is a tenth of it."""
+
+GEOMETRY = (*KINEMATIC_SOURCES, "platform-joints", "tool-ball-offset")
+"""Sources of what a machine is made like."""
+
+RESOLUTION_MM = 1e-5
+"""Noise that every difference has at the least, per row: no bar shows less, and simulations have none [mm]."""
+
+
+def channel_of(sides: Sides, sources: Sequence[ErrorSource]) -> Channel:
+    """Put two sessions on a channel.
+
+    Args:
+        sides: both sessions at common angles.
+        sources: named candidates that have what they need in both; the geometry of the machine is asked anyway.
+    """
+    variables, runs = variables_of(sides), samples_of_b(sides)
+    # A run is travelled at one speed: its rows are its clock.
+    time = np.concatenate([np.arange(rows.stop - rows.start, dtype=np.float64) for rows in sides.blocks])
+    return Channel(
+        residual=sides.rows(lambda pair: pair.difference_mm),
+        unit="mm",
+        blocks=sides.blocks,
+        names=tuple(pair.label for pair in sides.pairs),
+        variables=variables,
+        base=base_of(sides),
+        laws=(*_changes(sides, sources), *set_up_laws(sides), *jig_laws(sides, runs)),
+        time=time,
+        time_unit="row",
+        static=(*of_readings(variables, sides, time), *of_struts(sides, runs), of_each_test(sides)),
+        least_noise=RESOLUTION_MM,
+    )
+
+
+def _changes(sides: Sides, sources: Sequence[ErrorSource]) -> list[Law]:
+    """Error sources that changed, or act in one session."""
+    every = {(s.name, s.varies_with): s for s in (*sources_named(KINEMATIC_SOURCES), *sources)}
+    named = [s for s in every.values() if s.name not in MEASUREMENT_SOURCES]
+    return [Change(s, sides, CHANGE if s.name in GEOMETRY else 1.0).law(NAMED_ODDS) for s in named]

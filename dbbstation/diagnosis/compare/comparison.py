@@ -1,0 +1,283 @@
+"""Two sessions side by side: do they differ, where, in what form, by which cause, and what cannot be told apart.
+
+The readings of A are the simulation of B; the difference B less A is a channel like any other (`dbbstation.inference`). Sets of
+causes are compared by their probability, verdicts are read off, and what is left is tested.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import expit, logsumexp
+
+from dbbstation.diagnosis.compare.channel import channel_of
+from dbbstation.diagnosis.compare.details import both_directions, effects_of, noticed_mm, predicted
+from dbbstation.diagnosis.compare.pairs import match
+from dbbstation.diagnosis.compare.sides import Sides
+from dbbstation.errors import TraceError
+from dbbstation.inference.harmonics import bands, basis, coefficients
+from dbbstation.inference.left_over import left_over
+from dbbstation.inference.read_off import OUT, SURE, read_off
+from dbbstation.inference.settle import settle
+from dbbstation.trace.analysis import figures
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.compare.details import EffectOfCause
+    from dbbstation.diagnosis.compare.pairs import Matching, Pair
+    from dbbstation.inference.held_out import HeldOut
+    from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.settle import Settled
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource
+
+CENTRED_MM = 2e-5
+CENTRED_SIGMA = 4.0
+"""A circle whose centre lies this close to the commanded one, in every run, had it removed: balls never sit so well."""
+
+CENTRED_SHAPE = 25.0
+"""... if what is left of it is this many times the smallest centre that would have been noticed."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunDifference:
+    """One run of B less the same run of A.
+
+    Attributes:
+        pair: both recordings.
+        smooth_mm: difference up to the highest smooth harmonic, at the common angles, shape (s,) [mm].
+        noise_mm: root mean square that noise alone leaves in it [mm].
+        found_mm: what the causes that were found do, at the common angles, shape (s,) [mm].
+        sigmas: standard deviations by which that is out.
+        centre_mm: by how much the circle's centre moved, x and y [mm].
+        centre_sigma_mm: standard deviation of either by noise and what is stated of balls [mm].
+        radial_mm: by how much the mean length changed [mm].
+        radial_sigma_mm: standard deviation of that by noise and what is stated of bars, and of balls where the bar is raised [mm].
+        circularity_mm: greatest less least of what is left without mean and centre [mm].
+    """
+
+    pair: Pair
+    smooth_mm: NDArray[np.float64]
+    noise_mm: float
+    found_mm: NDArray[np.float64]
+    sigmas: float
+    centre_mm: tuple[float, float]
+    centre_sigma_mm: float
+    radial_mm: float
+    radial_sigma_mm: float
+    circularity_mm: float
+
+    @property
+    def rms_mm(self) -> float:
+        """Of the smooth difference [mm]."""
+        return _rms(self.smooth_mm)
+
+    @property
+    def differs(self) -> bool:
+        """Whether what was found is there in this run beyond doubt."""
+        return self.sigmas >= OUT
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """Angle [deg] and value [mm] of the greatest smooth difference."""
+        at = int(np.argmax(np.abs(self.smooth_mm)))
+        return float(self.pair.theta_deg[at]), float(self.smooth_mm[at])
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Everything found.
+
+    Attributes:
+        matching: which runs were put side by side.
+        settled: what the comparison of sets of causes came to.
+        findings: what is said of each cause, those that are there first.
+        runs: in the order of session A.
+        left: tests of what is left.
+        held_out: predictions of left-out tests by what is stated of the set-up alone, and with what was found [mm].
+        effects: of the causes of the most probable set, largest first, by name.
+        noticed_mm: change of one strut's length that would have been found, whichever strut it is [mm].
+        lacking: error sources that could not be asked, and why.
+    """
+
+    matching: Matching
+    settled: Settled
+    findings: tuple[Finding, ...]
+    runs: tuple[RunDifference, ...]
+    left: LeftOver
+    held_out: tuple[HeldOut, HeldOut]
+    effects: Mapping[str, EffectOfCause]
+    noticed_mm: float
+    lacking: Mapping[str, str]
+
+    @property
+    def probability(self) -> float:
+        """That anything but noise and what is stated of the set-up lies between the sessions, if that was as likely as not before."""
+        odds = np.array([cause.log_prior_odds for cause in self.settled.causes])
+        nothing = float(-np.logaddexp(0.0, odds).sum())  # log prior probability of none of them
+        before = float(np.log(-np.expm1(nothing))) - nothing
+        weights = self.settled.posterior.weights
+        something = [weight for names, weight in weights.items() if names]
+        return float(expit(logsumexp(something) - weights[frozenset()] - before))
+
+    @property
+    def differ(self) -> bool:
+        """Whether the sessions differ: a cause is there for sure, or what is left is not noise."""
+        return self.probability >= SURE or not self.left.is_noise
+
+    @property
+    def there(self) -> tuple[Finding, ...]:
+        """Findings of causes of the most probable set, largest first."""
+        by_name = {finding.name: finding for finding in self.findings}
+        return tuple(by_name[name] for name in self.effects)
+
+    @cached_property
+    def rms_mm(self) -> float:
+        """Of all smooth differences [mm]."""
+        return _rms(np.concatenate([run.smooth_mm for run in self.runs]))
+
+    @property
+    def noise_mm(self) -> float:
+        """What noise leaves in the smooth differences, root mean square [mm]."""
+        return self.runs[0].noise_mm
+
+    @property
+    def found_rms_mm(self) -> float:
+        """Of what was found, over all runs [mm]."""
+        return _rms(np.concatenate([run.found_mm for run in self.runs]))
+
+    @property
+    def halves_mm(self) -> tuple[float, float] | None:
+        """What was found, in tests that both directions were run of: what they share, what changes its sign; None: no such test."""
+        both = np.array(
+            [[self.runs[k].found_mm for k in runs] for runs in both_directions([run.pair for run in self.runs])]
+        )
+        if not len(both):
+            return None
+        return _rms(both.mean(axis=1)), _rms(0.5 * (both[:, 0] - both[:, 1]))
+
+
+def compare(
+    machine: Machine,
+    a: Sequence[Observation],
+    b: Sequence[Observation],
+    sources: Sequence[ErrorSource] = (),
+    lacking: Mapping[str, str] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Comparison:
+    """Compare two sessions.
+
+    Args:
+        machine: nominal, for the way from struts to readings.
+        a: accepted runs of session A.
+        b: accepted runs of session B.
+        sources: named candidates beside the geometry of the machine; those that lack what they need are left out by the caller.
+        lacking: error sources that could not be asked, and why.
+        progress: told what is being done.
+
+    Raises:
+        TraceError: no run in common; circles of one of them had their centres removed.
+    """
+    for name, session in (("A", a), ("B", b)):
+        _refuse_centred(name, session)
+    matching = match(a, b)
+    progress("candidates")
+    sides = Sides.of(machine, matching.pairs)
+    settled = settle(channel_of(sides, sources), in_time=False, progress=progress)
+    progress("verdicts")
+    return Comparison(
+        matching=matching,
+        settled=settled,
+        findings=read_off(settled),
+        runs=_runs(sides, settled),
+        left=left_over(settled),
+        held_out=predicted(sides, settled),
+        effects=effects_of(sides, settled),
+        noticed_mm=noticed_mm(settled),
+        lacking=lacking or {},
+    )
+
+
+def _runs(sides: Sides, settled: Settled) -> tuple[RunDifference, ...]:
+    members = settled.best.members
+    columns = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
+    samples = settled.bank.samples(columns)
+    values: NDArray[np.float64] = np.zeros(0)
+    covariance: NDArray[np.float64] = np.zeros((0, 0))
+    if members:
+        estimates = settled.comparison.estimates(members)
+        values, covariance = estimates.values, estimates.covariance
+    found = sides.by_angle(samples @ values)
+    out = []
+    for pair, rows, order, own in zip(sides.pairs, sides.blocks, sides.orders, found, strict=True):
+        norm = float(np.linalg.norm(own))
+        towards = samples[rows].T @ (samples[rows] @ values) / max(norm, 1e-300)
+        sigma = float(np.sqrt(max(float(towards @ covariance @ towards), 0.0)))
+        out.append(_run(pair, settled, rows, order, own, norm / sigma if sigma > 0.0 else 0.0))
+    return tuple(out)
+
+
+def _run(
+    pair: Pair,
+    settled: Settled,
+    rows: slice,
+    order: NDArray[np.int64],
+    found: NDArray[np.float64],
+    sigmas: float,
+) -> RunDifference:
+    theta, count = np.radians(pair.theta_deg), len(pair.theta_deg)
+    low, _ = bands(count)
+    row = coefficients(pair.difference_mm, theta, low)
+    columns = basis(theta, low) / np.sqrt(count)
+    first = [0, 1, low + 1]
+    shape = row.copy()
+    shape[first] = 0.0
+    # What is stated of balls, bars and starts, as it shows in constant, first cosine and first sine of this run.
+    base = settled.channel.base
+    by_angle = np.empty((count, len(base.prior)))
+    by_angle[order] = base.samples[rows] * base.prior
+    stated = np.sum((columns[:, first].T @ by_angle) ** 2, axis=1)
+    noise = settled.noise.effective
+    sigma = np.sqrt(stated + noise**2)
+    # Of a raised bar the radius on the level is seen along the bar: less by the cosine of its elevation.
+    per_mm = np.sqrt(count / 2.0) * float(np.cos(np.radians(pair.circle.elevation_deg)))
+    return RunDifference(
+        pair=pair,
+        smooth_mm=np.asarray(columns @ row, dtype=np.float64),
+        noise_mm=noise * float(np.sqrt(len(row) / count)),
+        found_mm=found,
+        sigmas=sigmas,
+        centre_mm=(float(row[1] / per_mm), float(row[low + 1] / per_mm)),
+        centre_sigma_mm=float(sigma[1:].max() / per_mm),
+        radial_mm=float(row[0] / np.sqrt(count)),
+        radial_sigma_mm=float(sigma[0] / np.sqrt(count)),
+        circularity_mm=float(np.ptp(columns @ shape)),
+    )
+
+
+def _refuse_centred(name: str, runs: Sequence[Observation]) -> None:
+    """Refuse a session whose every circle lies on its commanded centre, though it is no circle."""
+    if len(runs) < 2:  # noqa: PLR2004 - one centre may be where it belongs
+        return
+    for run in runs:
+        found = figures(run.raw)
+        rough = np.diff(run.raw.length_mm, 2) / np.sqrt(6.0)  # noise alone: second differences of what is smooth vanish
+        limit = max(CENTRED_SIGMA * float(np.sqrt(2.0 * np.mean(rough**2) / len(run.raw))), CENTRED_MM)
+        if 1e-3 * found.centre_deviation_um > limit or 1e-3 * found.circularity_um < CENTRED_SHAPE * limit:
+            return
+    raise TraceError(
+        f"in session {name} all circles lie on their commanded centres within noise: their centres were removed",
+        remedy="compare raw bar lengths; a circle without its centre does not say where it was",
+    )
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))

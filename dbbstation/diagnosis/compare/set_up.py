@@ -1,0 +1,166 @@
+"""Set-up of two sessions: what is stated of balls, bars and the beginning of turns, and what of it is off by far more."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.channel import OUTSIZE, SET_UP, SETUP_ODDS
+from dbbstation.diagnosis.shapes import LEVER_MM, TABLE
+from dbbstation.inference.channel import Base, Law
+from dbbstation.inference.harmonics import bands, basis
+from dbbstation.sources.registry import sources_named
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.compare.pairs import Pair
+    from dbbstation.diagnosis.compare.sides import Sides
+    from dbbstation.diagnosis.shapes import Samples
+    from dbbstation.sources.contract import ErrorSource, Motion
+
+JIG = "jig-position"
+"""Name of all balls moved as one body."""
+
+JIG_MM = 0.05
+"""How far a jig that was put down again lies from where it lay, one standard deviation per axis, and at 100 mm by its turn [mm]."""
+
+NOTHING = 1e-9
+"""Answer of a reading to a shift of a ball below which it does not see it: a level bar, and the height."""
+
+ANYWHERE_MM = 1.0
+"""Scatter of a ball whose place nobody knows [mm]."""
+
+
+def base_of(sides: Sides) -> Base:
+    """Effects of the set-up of both sessions with the sizes that plans and sessions state."""
+    names: list[str] = []
+    columns: list[NDArray[np.float64]] = []
+    prior: list[NDArray[np.float64]] = []
+    for source in sources_named(SET_UP):
+        for name, samples, sd in _stated(sides, source):
+            seen = (sd > 0.0) & samples.any(axis=0)
+            names += [f"{source.name} {name}"] * int(seen.sum())
+            columns.append(samples[:, seen])
+            prior.append(sd[seen])
+    for k, pair in enumerate(sides.pairs):
+        start_deg = float(np.linalg.norm([runs[k].raw.start_uncertainty_deg for runs in sides.runs]))
+        if start_deg > 0.0:
+            names.append(f"run-start {pair.label}")
+            columns.append(np.zeros((sides.blocks[-1].stop, 1)))
+            columns[-1][sides.blocks[k], 0] = _per_degree(pair)[sides.orders[k]]
+            prior.append(np.array([start_deg]))
+    every = np.concatenate(prior)
+    return Base(tuple(names), np.hstack(columns), every, np.ones(len(every), dtype=bool))
+
+
+def _per_degree(pair: Pair) -> NDArray[np.float64]:
+    """Slope of the smooth reading of A along the angle: what a turn that began elsewhere does, shape (s,) [mm/deg]."""
+    theta, there = np.radians(pair.theta_deg), np.isfinite(pair.a_mm)
+    low, _ = bands(len(theta))
+    found, *_ = np.linalg.lstsq(basis(theta[there], low), pair.a_mm[there], rcond=None)
+    order = np.arange(1, low + 1)
+    by_angle = np.concatenate([[0.0], order * found[low + 1 :], -order * found[1 : low + 1]])
+    return np.asarray(np.radians(1.0) * (basis(theta, low) @ by_angle), dtype=np.float64)
+
+
+def _stated(sides: Sides, source: ErrorSource) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
+    """Random effects of one source: tests that share each, its columns, shape (n, p), and what is stated of it, shape (p,) [mm].
+
+    Runs that share one in A mostly share one in B as well; what is stated of both then adds up to one.
+    """
+    shared = [[source.shared_by(motion) for motion in motions] for motions in sides.motions]
+    together = list(zip(*shared, strict=True))
+    alike = len(set(together)) == len(set(shared[0])) == len(set(shared[1]))
+    zeros = np.zeros(len(source.parameters(sides.machine)))
+    each = sides.averaged(1, [reading.by_source(source, sides.machine, zeros) for reading in sides.readings[1]])
+    found = []
+    for keys in [together] if alike else shared:
+        for key in dict.fromkeys(keys):
+            runs = [k for k, name in enumerate(keys) if name == key]
+            samples = np.zeros_like(each)
+            for rows in (sides.blocks[k] for k in runs):
+                samples[rows] = each[rows]
+            one, other = (_sd(source, motions[runs[0]]) for motions in sides.motions)
+            sd = np.hypot(one, other) if alike else (one if keys is shared[0] else other)
+            found.append((", ".join(dict.fromkeys(sides.pairs[k].test for k in runs)), samples, sd))
+    return found
+
+
+def _sd(source: ErrorSource, motion: Motion) -> NDArray[np.float64]:
+    """What is stated of a random effect; of a ball whose place nobody knows, that it may be anywhere [mm, deg]."""
+    stated = source.stated_mm(motion)
+    known = np.zeros(0) if stated is None else stated
+    lost = source.name == "mounting" and motion.setup is not None and not motion.setup.place_known
+    return np.full(len(known), ANYWHERE_MM) if lost else known
+
+
+def set_up_laws(sides: Sides) -> list[Law]:
+    """Balls and bars that sit further off than stated: one of them, or each of them."""
+    found: list[Law] = []
+    told: set[tuple[str, ...]] = set()
+    for source in sources_named(SET_UP):
+        sets = _stated(sides, source)
+        names = tuple(name for name, _, _ in sets)
+        # A ball that was put up once only is no other matter than its mounting.
+        once = source.name == "ball-coordinate" and names in told
+        told.add(names)
+        if not once and all(sd.max(initial=0.0) < ANYWHERE_MM for _, _, sd in sets):
+            found += _outsize(source, [p.name for p in source.parameters(sides.machine)], sets)
+    return found
+
+
+def _outsize(
+    source: ErrorSource, parameters: Sequence[str], sets: Sequence[tuple[str, NDArray[np.float64], NDArray[np.float64]]]
+) -> list[Law]:
+    """One source of random effects, each of which may be far larger than stated; nothing where nothing is stated."""
+    names: list[str] = []
+    choices: list[tuple[tuple[int, ...], float, str]] = []
+    columns, plausible = [], []
+    for tests, samples, sd in sets:
+        seen = np.flatnonzero((sd > 0.0) & samples.any(axis=0))
+        if len(seen):
+            choices.append((tuple(range(len(names), len(names) + len(seen))), 0.0, f"test {tests}"))
+            names += [f"{parameters[k]} of {tests}" for k in seen.tolist()]
+            columns.append(samples[:, seen])
+            plausible.append(OUTSIZE * sd[seen])
+    if not names:
+        return []
+    single = -float(np.log(2.0 * len(choices)))
+    every = (tuple(range(len(names))), -float(np.log(2.0)), "every one of them")
+    several = (*((own, single, label) for own, _, label in choices), every)
+    samples = np.hstack(columns)
+    return [
+        Law(
+            name=source.name,
+            columns=lambda _: samples,
+            plausible=np.concatenate(plausible),
+            parameters=tuple(names),
+            units=("mm",) * len(names),
+            log_odds=SETUP_ODDS,
+            choices=several if len(choices) > 1 else (),
+        )
+    ]
+
+
+def jig_laws(sides: Sides, runs: Sequence[Samples]) -> list[Law]:
+    """All balls moved as one body: shift, and turns about their middle."""
+    samples = sides.averaged(1, [run.gain[TABLE] for run in runs])
+    seen = np.flatnonzero(np.abs(samples).max(axis=0) > NOTHING)
+    names = [f"{name}_mm" for name in "xyz"] + [f"turn_{name}_rad" for name in "xyz"]
+    per = np.array([1.0] * 3 + [LEVER_MM] * 3)
+    if len({pair.test for pair in sides.pairs}) < 2:  # noqa: PLR2004 - of one ball it is that ball's place
+        return []
+    return [
+        Law(
+            name=JIG,
+            columns=lambda _: samples[:, seen] * per[seen],
+            plausible=JIG_MM / per[seen],
+            parameters=tuple(names[k] for k in seen),
+            units=tuple(("mm", "rad")[k // 3] for k in seen),
+            log_odds=SETUP_ODDS,
+        )
+    ]

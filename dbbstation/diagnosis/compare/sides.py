@@ -1,0 +1,128 @@
+"""Both sessions as a channel sees them: the same circles at the same angles, each with its own times, feeds and temperatures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.compare.pairs import Sectors
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.trace.average import averaged
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.compare.pairs import Pair
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import BarReading
+    from dbbstation.model.observation import Observation
+    from dbbstation.sources.contract import ErrorSource, Motion
+
+
+FINER = 8
+"""Samples in a sector at which a cause is asked for, at the most, and averaged: readings are averages too, and what happens at a
+reversal is over in less than a sector."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Rows of all pairs, pair by pair, in the order of travel of B; motions are finer, each with its own samples.
+
+    Attributes:
+        machine: nominal.
+        pairs: runs of both sessions.
+        runs: of session A, and of session B, per pair; where repeats were averaged, the first of them stands for all.
+    """
+
+    machine: Machine
+    pairs: tuple[Pair, ...]
+    runs: tuple[tuple[Observation, ...], tuple[Observation, ...]]
+
+    @classmethod
+    def of(cls, machine: Machine, pairs: Sequence[Pair]) -> Sides:
+        """Take runs that were put side by side."""
+        a = tuple(_thinned(pair.a[0], pair) for pair in pairs)
+        b = tuple(_thinned(pair.b[0], pair) for pair in pairs)
+        return cls(machine, tuple(pairs), (a, b))
+
+    @cached_property
+    def motions(self) -> tuple[tuple[Motion, ...], tuple[Motion, ...]]:
+        """Motions of these runs."""
+        a, b = ([run.motion() for run in runs] for runs in self.runs)
+        return tuple(a), tuple(b)
+
+    @cached_property
+    def orders(self) -> tuple[NDArray[np.int64], ...]:
+        """Rows of each pair, as places among its common angles."""
+        return tuple(np.argsort(pair.b[0].raw.circle.phi_deg(pair.theta_deg)) for pair in self.pairs)
+
+    @cached_property
+    def readings(self) -> tuple[tuple[BarReading, ...], tuple[BarReading, ...]]:
+        """What the nominal machine reads on the way of A, and on that of B."""
+        model = MachineModel(self.machine)
+        a, b = ([model.bar(motion) for motion in motions] for motions in self.motions)
+        return tuple(a), tuple(b)
+
+    @cached_property
+    def blocks(self) -> tuple[slice, ...]:
+        """Rows of each pair."""
+        ends = np.cumsum([0, *(len(order) for order in self.orders)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    def rows(self, values_of: Callable[[Pair], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Values at the common angles of every pair as rows, shape (n,)."""
+        return np.concatenate([values_of(pair)[order] for pair, order in zip(self.pairs, self.orders, strict=True)])
+
+    def averaged(self, side: int, values: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Values along the motions of one session as rows, shape (n, ...).
+
+        Args:
+            side: 0 for A, 1 for B.
+            values: per pair, in its own order of travel, shape (m, ...).
+        """
+        found = []
+        for sectors, order, one in zip(self._sectors[side], self.orders, values, strict=True):
+            middles = sectors.at_middles(one.reshape(len(one), -1))
+            # A sector without a sample has what the one before it has.
+            last = np.maximum(np.searchsorted(sectors.there, order, side="right") - 1, 0)
+            found.append(middles[sectors.there[last]].reshape(len(order), *one.shape[1:]))
+        return np.concatenate(found)
+
+    @cached_property
+    def _sectors(self) -> tuple[list[Sectors], list[Sectors]]:
+        a, b = (
+            [Sectors.of(run.raw.theta_deg, len(order)) for run, order in zip(runs, self.orders, strict=True)]
+            for runs in self.runs
+        )
+        return a, b
+
+    def each_row(self, values: Sequence[float]) -> NDArray[np.float64]:
+        """One value per pair as rows, shape (n,)."""
+        return np.repeat(np.array(values, dtype=np.float64), [len(order) for order in self.orders])
+
+    def by_angle(self, rows: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Rows as values at the common angles of each pair, shape (s,) each."""
+        found = []
+        for order, block in zip(self.orders, self.blocks, strict=True):
+            values = np.empty(len(order))
+            values[order] = rows[block]
+            found.append(values)
+        return found
+
+    def groups(self, source: ErrorSource) -> NDArray[np.int64]:
+        """Set of values of each pair: pairs that share it in both sessions have the same number, shape (r,)."""
+        names = [(source.shared_by(one), source.shared_by(other)) for one, other in zip(*self.motions, strict=True)]
+        order = list(dict.fromkeys(names))
+        return np.array([order.index(name) for name in names], dtype=np.int64)
+
+
+def _thinned(run: Observation, pair: Pair) -> Observation:
+    """The run at no more angles than is worth it, as if the plan's circle had been commanded."""
+    raw, most = run.raw, FINER * len(pair.theta_deg)
+    return replace(run, raw=averaged(raw, most) if len(raw) > most else raw, commanded=None)

@@ -1,0 +1,57 @@
+"""Forms of a cause by its parts: all its amplitudes, those of one part alone, one for all struts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.sources.contract import Parameter
+
+ALIKE = "all struts alike"
+"""Label of the form that has one amplitude for all struts."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One form of a cause.
+
+    Attributes:
+        label: strut or part; empty for all of them.
+        amplitudes: that it has, among those of all sets, one set after the other; all of them, added up, where `alike`.
+        log_weight: log of its probability among the forms of the cause.
+    """
+
+    label: str
+    amplitudes: tuple[int, ...]
+    log_weight: float
+
+    @property
+    def alike(self) -> bool:
+        """Whether it has one amplitude for all struts."""
+        return self.label == ALIKE
+
+
+def parts_of(amplitudes: Sequence[Parameter], sets: int) -> list[Part]:
+    """Forms of a cause, whose log weights are those of one distribution: kinds of forms are equally likely, and members of a kind.
+
+    What wears or was made badly is often one strut, or all alike; all others free beside it would hide what is faint.
+
+    Args:
+        amplitudes: of one set.
+        sets: how many sets of values there are.
+    """
+    every = tuple(range(len(amplitudes) * sets))
+    labels = [p.alone_with for p in amplitudes] * sets
+    kinds = [[("", every)]]
+    if len(set(labels)) > 1:
+        kinds.append([(part, tuple(k for k in every if labels[k] == part)) for part in sorted(set(labels))])
+    if sets == 1 and [p.strut for p in amplitudes] == list(range(1, STRUTS + 1)):
+        kinds.append([(ALIKE, every)])
+    return [Part(label, own, -float(np.log(len(kinds) * len(kind)))) for kind in kinds for label, own in kind]

@@ -1,0 +1,147 @@
+"""`dbb-bar/1`: a bar that was put on its calibrator, and what it read there."""
+
+import math
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.atomic import write_text
+from dbbstation.files.formats.quantities import ExpansionUmMK, Quantity, TemperatureDegc
+from dbbstation.files.formats.session import Moment
+from dbbstation.files.yaml.out import yaml_text
+from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
+from dbbstation.plan.bar import Bar
+
+_Uncertainty = Annotated[float, Quantity("µm", 0.001, 100, or_zero=True)]
+_Day = Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")]
+
+
+class CalibratorSchema(Schema):
+    """The block of known length that the bar was put on."""
+
+    serial_number: Annotated[str, Field(min_length=1)]
+    """Of the block."""
+    length_mm: Annotated[float, Quantity("mm", 20, 2_000)]
+    """Length that its certificate states, at 20 degC [mm]."""
+    uncertainty_um: _Uncertainty
+    """Standard uncertainty of that length: half of a certificate's U (k = 2) [µm]."""
+    certified: _Day
+    """Date of the certificate."""
+    certificate: str = ""
+    """Its number and who issued it."""
+    expansion_um_m_k: ExpansionUmMK = 0.0
+    """Thermal expansion; that of Zerodur, below 0.05, is taken for zero [µm/(m K)]."""
+
+
+class ReadingsSchema(Schema):
+    """What the instrument showed while the bar stood on the calibrator."""
+
+    instrument: str
+    """Name of the instrument."""
+    count: Annotated[int, Field(ge=2)]
+    """Readings."""
+    mean_mm: Annotated[float, Quantity("mm", 20, 2_000)]
+    """Their mean [mm]."""
+    uncertainty_um: _Uncertainty
+    """Standard uncertainty of the mean, resolution included [µm]."""
+    scatter_um: _Uncertainty
+    """Standard deviation of single readings [µm]."""
+    resolution_um: Annotated[float, Quantity("µm", 0.0001, 100)]
+    """Step of the readings [µm]."""
+
+
+class BarFile(Schema):
+    """One calibration of one bar."""
+
+    format: Literal["dbb-bar/1"]
+    """Name and version of this format."""
+    serial_number: Annotated[str, Field(min_length=1)]
+    """Of the bar."""
+    calibrated: Moment
+    """When it stood on the calibrator."""
+    temp_c: TemperatureDegc
+    """Temperature of the bar then [degC]."""
+    temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)]
+    """Standard uncertainty of a temperature of the bar, then and while it measures [K]."""
+    expansion_um_m_k: ExpansionUmMK
+    """Thermal expansion of the bar [µm/(m K)]."""
+    calibrator: CalibratorSchema
+    """What it was put on."""
+    readings: ReadingsSchema
+    """What it read there."""
+
+    @property
+    def length_mm(self) -> float:
+        """Length of the calibrator at the temperature of the calibration [mm]."""
+        grown = 1e-6 * self.calibrator.expansion_um_m_k * (self.temp_c - 20.0)
+        return self.calibrator.length_mm * (1.0 + grown)
+
+    @property
+    def uncertainty_mm(self) -> float:
+        """Standard uncertainty of what the bar reads less the true distance: calibrator and mean reading [mm]."""
+        return 1e-3 * math.hypot(self.calibrator.uncertainty_um, self.readings.uncertainty_um)
+
+    def to_bar(self, stroke_mm: float | None) -> Bar:
+        """Return the bar as a session notes it.
+
+        Args:
+            stroke_mm: travel of its gauge, as the instrument file states it [mm]; None where it states none.
+        """
+        return Bar(
+            serial_number=self.serial_number,
+            calibrated_length_mm=self.length_mm,
+            calibrator_uncertainty_mm=self.uncertainty_mm,
+            calibrated=datetime.fromisoformat(self.calibrated),
+            temp_c=self.temp_c,
+            expansion_um_m_k=self.expansion_um_m_k,
+            stroke_mm=stroke_mm,
+            reading_mm=self.readings.mean_mm,
+            temp_uncertainty_k=self.temp_uncertainty_k,
+            calibrator_serial_number=self.calibrator.serial_number,
+        )
+
+
+def parse_bar(path: Path, faults: list[Problem]) -> BarFile | None:
+    """Read the calibration of a bar; None with every fault added to `faults`."""
+    document = read_document(path, BarFile, faults)
+    bar = None if document is None else validate(document, BarFile, faults)
+    if document is None or bar is None:
+        return None
+    off_um = 1e3 * (bar.readings.mean_mm - bar.length_mm)
+    if abs(off_um) > LARGEST_OFF_UM:
+        what = f"the bar read {bar.readings.mean_mm:g} mm on a calibrator of {bar.length_mm:g} mm"
+        remedy = "preset the display to the calibrator's length, or check which calibrator and bar it was"
+        faults.append(document.problem(("readings", "mean_mm"), what, remedy))
+        return None
+    return bar
+
+
+def read_bar(path: Path) -> BarFile:
+    """Read the calibration of a bar.
+
+    Raises:
+        InputError: every fault of the file with its place.
+    """
+    faults: list[Problem] = []
+    bar = parse_bar(path, faults)
+    if bar is None or faults:
+        raise InputError(faults)
+    return bar
+
+
+def write_bar(path: Path, bar: BarFile, *, force: bool = False) -> None:
+    """Write the calibration of a bar.
+
+    Raises:
+        OutputError: the file exists and `force` is not given, or it cannot be written.
+    """
+    data = {**bar.model_dump(exclude_defaults=True), "format": format_of(BarFile)}
+    write_text(path, yaml_text(data), force=force)
+
+
+LARGEST_OFF_UM = 1000.0
+"""A display that was preset by hand is off by some micrometres; one that is off by a millimetre was not preset, or the calibrator is
+another one [µm]."""

@@ -1,0 +1,125 @@
+"""Changing on purpose what was sealed: the former file is kept, and the session says what was changed, when and why."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.atomic import write_bytes, write_text
+from dbbstation.files.formats.machine import machine_text, read_machine
+from dbbstation.files.formats.plan import plan_text, read_inline_plan
+from dbbstation.files.recordings.lock import SessionLock
+from dbbstation.files.recordings.seal import (
+    Amendment,
+    chain_faults,
+    chained,
+    copy_name,
+    hashes,
+    keep_copies,
+    sealed_names,
+    sealed_over,
+)
+from dbbstation.files.recordings.session import SESSION_FILE, parse_session
+from dbbstation.files.recordings.session_text import SessionDetails, session_text
+
+if TYPE_CHECKING:
+    from datetime import datetime
+    from pathlib import Path
+
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.recordings.seal import Seal
+    from dbbstation.files.recordings.session import SessionFolder
+
+RUNS = "runs"
+"""What an amendment of the list of runs is called."""
+
+
+def amend(
+    folder: Path, reason: str, *, made: datetime, plan: Path | None = None, machine: Path | None = None
+) -> tuple[Amendment, ...]:
+    """Take a session as it stands now, with another plan or machine where they are given, and note why.
+
+    Args:
+        folder: of the session.
+        reason: why, in the words of who does it.
+        made: the time of day with its zone.
+        plan: file that takes the place of the session's plan, with its jig put into it; None: the one that is there.
+        machine: the same of the machine.
+
+    Returns:
+        What was changed.
+
+    Raises:
+        InputError: no session, faults of the new files, runs that the new plan has not, no seal, or nothing has changed.
+        OutputError: another process writes into the session, or the disk refuses.
+    """
+    _whole(folder, plan, machine)  # no lock is left in what is no session
+    with SessionLock(folder):
+        session, seal = _whole(folder, plan, machine)
+        named = dict(zip((machine, plan), session.names, strict=True))
+        new = {}
+        if machine is not None:
+            new[named[machine]] = machine_text(read_machine(machine)).encode()
+        if plan is not None:
+            new[named[plan]] = plan_text(read_inline_plan(plan)).encode()
+        keep_copies(folder, hashes(folder, [*new, *seal.files]))
+        now = hashes(folder, sealed_names(folder, session.names))
+        now |= {name: hashlib.sha256(content).hexdigest() for name, content in new.items()}
+        if plan is not None:
+            now = {name: now[name] for name in session.names}  # the jig is in the plan
+        found = [
+            Amendment(name, seal.files.get(name, ""), now.get(name, ""), _kept(folder, name, seal), reason, made)
+            for name in dict.fromkeys((*seal.files, *now))
+            if seal.files.get(name) != now.get(name)
+        ]
+        runs = session.runs
+        if next(chain_faults(folder, seal, runs), None) is not None:
+            former = session_copy(folder, session)
+            runs = chained([replace(run, chain_sha256="") for run in runs])
+            found.append(Amendment(RUNS, seal.chain_sha256, _last_link(runs), former, reason, made))
+        if not found:
+            what = "nothing differs from what was sealed"
+            raise InputError([Problem(str(folder), 0, 0, what, "give --plan or --machine, or change the file first")])
+        details = SessionDetails(
+            **{each.name: getattr(session, each.name) for each in fields(SessionDetails)}
+            | {"seal": sealed_over(now, runs), "amendments": (*session.amendments, *found)}
+        )
+        for name, content in new.items():
+            write_bytes(folder / copy_name(name, now[name]), content, force=True, rewrites=True)
+            write_bytes(folder / name, content, force=True, rewrites=True)
+        keep_copies(folder, now)
+        text = session_text(folder, session.names, details, runs)
+        write_text(folder / SESSION_FILE, text, force=True, rewrites=True)
+    return tuple(found)
+
+
+def session_copy(folder: Path, session: SessionFolder) -> str:
+    """Keep a copy of the session file as it stands, and return where."""
+    keep_copies(folder, {SESSION_FILE: session.sha256})
+    return copy_name(SESSION_FILE, session.sha256)
+
+
+def _whole(folder: Path, plan: Path | None, machine: Path | None) -> tuple[SessionFolder, Seal]:
+    """The session with the new files in place of its own, and its seal, whatever has changed since."""
+    faults: list[Problem] = []
+    instead = {key: path for key, path in (("plan", plan), ("machine", machine)) if path is not None}
+    session = parse_session(folder, faults, as_sealed=False, instead=instead)
+    if session is None or faults:
+        raise InputError(faults)
+    if session.seal is None:
+        what = "the session carries no seal: there is nothing to be amended"
+        raise InputError([Problem(str(folder), 0, 0, what, f"`dbbstation session seal {folder}` seals it as it is")])
+    return session, session.seal
+
+
+def _kept(folder: Path, name: str, seal: Seal) -> str:
+    """Where a sealed file is kept as it was; empty where it is not."""
+    stored = seal.files.get(name, "")
+    copy = copy_name(name, stored)
+    return copy if stored and hashes(folder, (copy,)).get(copy) == stored else ""
+
+
+def _last_link(runs: tuple[RunEntry, ...]) -> str:
+    return next((run.chain_sha256 for run in reversed(runs) if run.chain_sha256), "")

@@ -1,0 +1,173 @@
+"""What a session says of one run, of the bar and of a program: its entries as the rest of the program takes them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from dbbstation.files.recordings.run_csv import sealed_or_part
+from dbbstation.plan.bar import Bar
+from dbbstation.plan.circle import Direction
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from dbbstation.files.formats.session import BarSchema, NoteSchema, ProgramSchema, RunSchema
+
+
+class RunState(StrEnum):
+    """How far a run has come."""
+
+    RECORDING = "recording"
+    COMPLETE = "complete"
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class Program:
+    """An NC program that was commanded.
+
+    Attributes:
+        path: of its file.
+        sha256: of its file.
+        model_sha256: of the model that it was compensated with; empty where none.
+    """
+
+    path: Path
+    sha256: str
+    model_sha256: str
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What came over the line during a run, and what did not.
+
+    Attributes:
+        received: samples in the run file.
+        lost: samples that the line lost between them.
+        rejected: samples of the file that no calculation uses, by what the instrument said of them.
+    """
+
+    received: int
+    lost: int
+    rejected: Mapping[str, int]
+
+    @property
+    def text(self) -> str:
+        """The counts in words: `1200 received, 3 lost, 2 rejected (overrange 2)`."""
+        reasons = ", ".join(f"{reason} {count}" for reason, count in self.rejected.items())
+        told = f"{self.received} received, {self.lost} lost, {sum(self.rejected.values())} rejected"
+        return f"{told} ({reasons})" if reasons else told
+
+    def data(self) -> dict[str, object]:
+        """The counts as plain values."""
+        return {"received": self.received, "lost": self.lost, "rejected": dict(self.rejected)}
+
+
+@dataclass(frozen=True)
+class Note:
+    """What somebody noted while a session was measured.
+
+    Attributes:
+        made: when.
+        text: in their words; empty for a temperature alone.
+        ambient_temp_c: temperature of the shop then [degC]; None where it was not read.
+    """
+
+    made: datetime
+    text: str = ""
+    ambient_temp_c: float | None = None
+
+
+def note_entry(note: NoteSchema) -> Note:
+    """Return a note as the rest of the program takes it."""
+    return Note(datetime.fromisoformat(note.made), note.text, note.ambient_temp_c)
+
+
+@dataclass(frozen=True)
+class RunEntry:
+    """What the session says of one run.
+
+    Attributes:
+        test: name of the test.
+        direction: sense of travel.
+        repeat: counts the runs of this test and direction, from 1.
+        mounting: counts how often a ball was put up; None: one mounting per test.
+        state: how far it has come.
+        reason: why it was rejected; empty otherwise.
+        started: when the first sample was taken; None where not noted.
+        path: of its file.
+        sha256: of its file; empty while recording.
+        program: what was commanded where it was not the plan's circle.
+        centre_mm: centre of the circle as programmed, machine frame (x, y, z) [mm]; None: as planned.
+        chain_sha256: its link in the chain of sealed runs; empty where it has none.
+        counts: samples received, rejected and lost; None where not noted.
+    """
+
+    test: str
+    direction: Direction
+    repeat: int
+    mounting: int | None
+    state: RunState
+    reason: str
+    started: datetime | None
+    path: Path
+    sha256: str
+    program: Program | None
+    centre_mm: tuple[float, float, float] | None
+    chain_sha256: str = ""
+    counts: Counts | None = None
+
+    @property
+    def label(self) -> str:
+        """Name of the run in messages."""
+        return f"{self.test} {self.direction} {self.repeat}"
+
+
+def run_entry(run: RunSchema, folder: Path) -> RunEntry:
+    """Return the entry of a run as the rest of the program takes it."""
+    return RunEntry(
+        test=run.test,
+        direction=Direction(run.direction),
+        repeat=run.repeat,
+        mounting=run.mounting,
+        state=RunState(run.state),
+        reason=run.reason or "",
+        started=None if run.started is None else datetime.fromisoformat(run.started),
+        path=sealed_or_part(folder / run.file),
+        sha256=run.sha256 or "",
+        program=None if run.program is None else _program(run.program, folder),
+        centre_mm=run.centre_mm,
+        chain_sha256=run.chain_sha256 or "",
+        counts=None if run.counts is None else Counts(**run.counts.model_dump()),
+    )
+
+
+def _program(program: ProgramSchema, folder: Path) -> Program:
+    return Program(folder / program.file, program.sha256, program.model_sha256 or "")
+
+
+def counts_in(header: Mapping[str, str]) -> Counts | None:
+    """Return the counts that a run file states in its `# key: value` lines; None where it states none."""
+    received, lost = count_in(header.get("received", "")), count_in(header.get("lost", ""))
+    if received is None or lost is None:
+        return None
+    prefix = "rejected "
+    said = {key.removeprefix(prefix): count_in(value) for key, value in header.items() if key.startswith(prefix)}
+    return Counts(received, lost, {reason: count for reason, count in said.items() if count})
+
+
+def count_in(text: str) -> int | None:
+    """Return the whole number that a text is; None where it is none, or one that counts nothing."""
+    return int(text) if re.fullmatch(r"[0-9]{1,12}", text) else None
+
+
+def bar_entry(bar: BarSchema) -> Bar:
+    """Return the bar of a session file as the rest of the program takes it."""
+    moment = None if bar.calibrated is None else datetime.fromisoformat(bar.calibrated)
+    return Bar(**{**bar.model_dump(), "calibrated": moment})

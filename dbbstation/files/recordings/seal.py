@@ -1,0 +1,253 @@
+"""The seal of a session: hashes of machine, plan and jig, and a chain through its runs.
+
+Every sealed run's entry carries a link: the SHA-256 of the link before it and of what the entry says of the recording. Who takes
+an entry out of the list, exchanges two or changes one breaks a link. The seal counts the runs and has the last link, so that
+runs taken out at the end are told as well. A copy of every sealed file is kept in the folder `sealed`, so that it can be said
+which key has changed, and the file can be put back.
+
+It tells what was changed by mistake or without a note. It keeps nobody from writing a whole new seal.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import Problem
+from dbbstation.files.atomic import write_folder
+from dbbstation.files.source_text import read_bytes
+from dbbstation.files.yaml.changes import changes
+from dbbstation.files.yaml.text import load_yaml
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.files.formats.session import AmendmentSchema, SealSchema
+    from dbbstation.files.recordings.entries import RunEntry
+
+SEALED = "sealed"
+"""Folder in the session with a copy of every file that was ever sealed."""
+
+AMEND = "restore it, or say why it was changed: `dbbstation session amend {folder} --reason TEXT`"
+"""What to do about a file that is not the sealed one."""
+
+_MOST_NAMED = 4
+"""Changed keys that are named; a file that was exchanged has hundreds."""
+
+
+@dataclass(frozen=True)
+class Seal:
+    """What a session was when it was sealed.
+
+    Attributes:
+        files: SHA-256 by path as the session file names it.
+        runs: number of sealed runs.
+        chain_sha256: link of the last of them; empty where there is none.
+    """
+
+    files: Mapping[str, str] = field(default_factory=dict)
+    runs: int = 0
+    chain_sha256: str = ""
+
+
+@dataclass(frozen=True)
+class Amendment:
+    """A change of what was sealed, made on purpose.
+
+    Attributes:
+        what: path of the file as the seal names it, or `runs`.
+        former_sha256: hash before; empty where there was none.
+        sha256: hash now; empty where there is none.
+        former: path in the session folder where the file is kept as it was; empty where it is not.
+        reason: why.
+        made: when.
+    """
+
+    what: str
+    former_sha256: str
+    sha256: str
+    former: str
+    reason: str
+    made: datetime
+
+    @property
+    def text(self) -> str:
+        """The change in words."""
+        kept = f"; as it was: {self.former}" if self.former else ""
+        return f"{self.what} was changed on purpose, {self.made:%Y-%m-%d %H:%M %Z}: {self.reason}{kept}"
+
+
+def seal_entry(seal: SealSchema | None) -> Seal | None:
+    """Return the seal of a session file as the rest of the program takes it."""
+    return None if seal is None else Seal(seal.files, seal.runs, seal.chain_sha256 or "")
+
+
+def amendment_entry(entry: AmendmentSchema) -> Amendment:
+    """Return an amendment of a session file as the rest of the program takes it."""
+    texts = (entry.what, entry.former_sha256 or "", entry.sha256 or "", entry.former or "", entry.reason)
+    return Amendment(*texts, datetime.fromisoformat(entry.made))
+
+
+def sealed_names(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the files that a seal covers, by their paths: machine and plan as named, and the jig file that the plan names.
+
+    Args:
+        folder: of the session.
+        names: paths of machine and plan in it, in this order.
+    """
+    plan = load_yaml(folder / names[1], [])
+    jig = plan.data.get("jig") if plan is not None and isinstance(plan.data, dict) else None
+    beside = names[1].rpartition("/")[0]
+    return (*names, f"{beside}/{jig}" if beside else jig) if isinstance(jig, str) else tuple(names)
+
+
+def hashes(folder: Path, names: Sequence[str]) -> dict[str, str]:
+    """Return the SHA-256 of files by their names; without those that cannot be read."""
+    read = {name: read_bytes(folder / name, [], is_input=False) for name in names}
+    return {name: hashlib.sha256(data).hexdigest() for name, data in read.items() if data is not None}
+
+
+def copy_name(name: str, sha256: str) -> str:
+    """Return where a sealed file is kept in the session folder."""
+    stem, dot, ending = name.rpartition("/")[2].rpartition(".")
+    return f"{SEALED}/{stem}-{sha256[:16]}{dot}{ending}" if dot else f"{SEALED}/{ending}-{sha256[:16]}"
+
+
+def keep_copies(folder: Path, sealed: Mapping[str, str]) -> None:
+    """Keep a copy of every sealed file in the session, so that nothing of it is lost when it changes.
+
+    Args:
+        folder: of the session.
+        sealed: SHA-256 by path in the folder.
+
+    Raises:
+        OutputError: the disk refuses.
+    """
+    copies = {copy_name(name, digest): read_bytes(folder / name, []) for name, digest in sealed.items()}
+    write_folder(
+        folder, {copy: data for copy, data in copies.items() if data is not None and not (folder / copy).exists()}
+    )
+
+
+def link(before: str, run: RunEntry) -> str:
+    """Return the link of a sealed run in the chain.
+
+    The SHA-256 of these lines in UTF-8, each with a line end, empty where there is nothing: link of the sealed run before it in
+    the list, test, direction, repeat, mounting, start in UTC (ISO 8601), SHA-256 of the run file, of the program and of its
+    model, x, y and z of the centre as programmed [mm].
+    """
+    program = ("", "") if run.program is None else (run.program.sha256, run.program.model_sha256)
+    started = "" if run.started is None else run.started.astimezone(UTC).isoformat()
+    said = (before, run.test, run.direction.value, run.repeat, run.mounting or "", started, run.sha256, *program)
+    centre = ("", "", "") if run.centre_mm is None else tuple(repr(float(value)) for value in run.centre_mm)
+    return hashlib.sha256("".join(f"{value}\n" for value in (*said, *centre)).encode()).hexdigest()
+
+
+def chained(runs: Sequence[RunEntry]) -> tuple[RunEntry, ...]:
+    """Return runs with a link for every sealed one that has none yet; it stands behind all that have one.
+
+    Args:
+        runs: in the order of the list; links that are there stay as they are.
+    """
+    done = [run for run in runs if run.chain_sha256]
+    behind = runs.index(done[-1]) if done else -1
+    kept = [run for run in runs if not (run.sha256 and not run.chain_sha256 and runs.index(run) < behind)]
+    last, out = "", []
+    for run in (*kept, *(run for run in runs if run not in kept)):
+        linked = run if run.chain_sha256 or not run.sha256 else replace(run, chain_sha256=link(last, run))
+        last = linked.chain_sha256 or last
+        out.append(linked)
+    return tuple(out)
+
+
+def sealed_over(files: Mapping[str, str], runs: Sequence[RunEntry]) -> Seal:
+    """Return the seal over files with their hashes, and over runs with their links."""
+    links = [run.chain_sha256 for run in runs if run.chain_sha256]
+    return Seal(dict(files), len(links), links[-1] if links else "")
+
+
+def seal_faults(folder: Path, file: Path, seal: Seal, names: Sequence[str], runs: Sequence[RunEntry]) -> list[Problem]:
+    """Return what is not as it was sealed: which file and which of its keys, which run.
+
+    Args:
+        folder: of the session.
+        file: the session file.
+        seal: as noted.
+        names: paths of machine and plan in the folder, in this order.
+        runs: as the session lists them.
+    """
+    faults = [*_file_faults(folder, file, seal, names)]
+    faults += [Problem(str(file), 0, 0, what, remedy) for what, remedy in chain_faults(folder, seal, runs)]
+    return faults
+
+
+def _file_faults(folder: Path, file: Path, seal: Seal, names: Sequence[str]) -> Iterator[Problem]:
+    now = hashes(folder, tuple(dict.fromkeys((*seal.files, *sealed_names(folder, names)))))
+    for name, stored in seal.files.items():
+        if name not in now:
+            what = f"{name}, which was sealed, is not there"
+            yield Problem(str(file), 0, 0, what, f"restore it{_from(folder, name, stored)}")
+        elif now[name] != stored:
+            what = f"the file is not the one that was sealed: its SHA-256 was {stored}, is {now[name]}"
+            keys = _changed_keys(folder / copy_name(name, stored), folder / name)
+            remedy = AMEND.format(folder=folder).replace("restore it", f"restore it{_from(folder, name, stored)}")
+            yield Problem(str(folder / name), 0, 0, f"{what}; {keys}" if keys else what, remedy)
+    for name in now:
+        if name not in seal.files:
+            what = f"{name} was not sealed: the session named another file then"
+            yield Problem(str(file), 0, 0, what, AMEND.format(folder=folder).replace("restore it", "name that one"))
+
+
+def _from(folder: Path, name: str, stored: str) -> str:
+    """Where a file can be restored from, in words."""
+    copy = copy_name(name, stored)
+    return f" from {copy}" if hashes(folder, (copy,)).get(copy) == stored else ""
+
+
+def _changed_keys(before: Path, after: Path) -> str:
+    """Which keys of a file have changed; empty where that cannot be told."""
+    documents = load_yaml(before, []), load_yaml(after, [])
+    if documents[0] is None or documents[1] is None:
+        return ""
+    found = changes(documents[0].data, documents[1].data)
+    more = f" and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
+    return ", ".join(found[:_MOST_NAMED]) + more if found else "no value differs, only how it is written"
+
+
+def chain_faults(folder: Path, seal: Seal, runs: Sequence[RunEntry]) -> Iterator[tuple[str, str]]:
+    """Yield what is wrong with the chain of runs, and what to do; arguments as of `seal_faults`."""
+    sealed = [run for run in runs if run.sha256]
+    linked = [run for run in sealed if run.chain_sha256]
+    remedy = AMEND.format(folder=folder).replace("restore it", "restore the list of runs").replace("it was", "that was")
+    missing = seal.runs - len(linked)
+    if missing > 0:
+        yield f"the list of runs lacks {missing} of {seal.runs} sealed runs: {_run_s(missing)} taken out", remedy
+    elif missing < 0:
+        yield f"the list has {len(linked)} sealed runs, the seal counts {seal.runs}", remedy
+    links = {run.chain_sha256: run for run in linked}
+    before = ""
+    for run in linked:
+        if run.chain_sha256 != link(before, run):
+            after = next((one for one in ("", *links) if link(one, run) == run.chain_sha256), None)
+            if after is not None:
+                place = f"was sealed after run {links[after].label}" if after else "was sealed as the first"
+                now = f"stands after run {links[before].label}" if before else "stands first"
+                yield f"run {run.label} {place} and {now}: runs were exchanged or taken out", remedy
+            elif missing > 0:
+                yield f"run {run.label} was sealed after a run that is not in the list any more", remedy
+            else:
+                yield f"the entry of run {run.label} is not the one that was sealed", remedy
+        before = run.chain_sha256
+    if not missing and linked and linked[-1].chain_sha256 != seal.chain_sha256:
+        yield f"run {linked[-1].label} stands last, and another run was the last that was sealed", remedy
+    for run in sealed:
+        if not run.chain_sha256:
+            what = f"run {run.label} was put into the list after the session was sealed"
+            yield what, f"`dbbstation session seal {folder}` takes it into the chain"
+
+
+def _run_s(count: int) -> str:
+    return "it was" if count == 1 else "they were"

@@ -1,0 +1,125 @@
+"""The text of a session file: everything that a session notes, in the oldest version of the format that has it all."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.yaml.out import yaml_text
+from dbbstation.files.yaml.schema import format_for
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from dbbstation.files.recordings.entries import Note, RunEntry
+    from dbbstation.files.recordings.seal import Amendment, Seal
+    from dbbstation.files.recordings.session_set_up import SetUpReadings
+    from dbbstation.plan.bar import Bar
+
+
+@dataclass(frozen=True)
+class SessionDetails:
+    """What a session notes beside its runs; everything optional.
+
+    Attributes:
+        serial_number: of the machine.
+        operator: who measures.
+        ambient_temp_c: temperature of the shop [degC].
+        bar: the bar.
+        bar_waiver: why it is measured without a fresh calibration of the bar; empty where there is one.
+        set_up_errors: micrometer readings of balls that were put up under the spindle.
+        seal: hashes of machine, plan and jig, and the end of the chain of runs.
+        amendments: what was changed on purpose after it was sealed.
+        notes: what was noted while it was measured, oldest first.
+    """
+
+    serial_number: str = ""
+    operator: str = ""
+    ambient_temp_c: float | None = None
+    bar: Bar | None = None
+    bar_waiver: str = ""
+    set_up_errors: tuple[SetUpReadings, ...] = ()
+    seal: Seal | None = None
+    amendments: tuple[Amendment, ...] = ()
+    notes: tuple[Note, ...] = ()
+
+
+def session_text(folder: Path, names: Sequence[str], details: SessionDetails, runs: Sequence[RunEntry]) -> str:
+    """Return the text of a session file.
+
+    Args:
+        folder: of the session.
+        names: paths of machine and plan in it, in this order.
+        details: what it notes beside its runs.
+        runs: in the order of the list.
+    """
+    bar, seal = details.bar, details.seal
+    data: dict[str, object] = {
+        "format": "",
+        "machine": names[0],
+        "plan": names[1],
+        "serial_number": details.serial_number,
+        "operator": details.operator,
+        "ambient_temp_c": details.ambient_temp_c,
+        "bar": bar and {each.name: _plain(getattr(bar, each.name)) for each in fields(bar)},
+        "bar_waiver": details.bar_waiver or None,
+        "seal": seal and seal_data(seal),
+        "amendments": [_amendment_data(amendment) for amendment in details.amendments] or None,
+        "notes": [_note_data(note) for note in details.notes] or None,
+        # Directly above the runs, where people write them in.
+        "set_up_errors": [_without_none(asdict(readings)) for readings in details.set_up_errors] or None,
+    }
+    data = {key: _without_none(value) for key, value in data.items() if value is not None}
+    data["runs"] = [_without_none(_run_data(folder, run)) for run in runs]
+    data["format"] = format_for(SessionFile, data)
+    return yaml_text(data)
+
+
+def seal_data(seal: Seal) -> dict[str, object]:
+    """Return a seal as its file holds it."""
+    data = {"files": dict(seal.files), "runs": seal.runs, "chain_sha256": seal.chain_sha256 or None}
+    return {key: value for key, value in data.items() if value is not None}
+
+
+def _amendment_data(amendment: Amendment) -> object:
+    return _without_none({each.name: _plain(getattr(amendment, each.name)) or None for each in fields(amendment)})
+
+
+def _note_data(note: Note) -> object:
+    return _without_none({**asdict(note), "made": _plain(note.made), "text": note.text or None})
+
+
+def _run_data(folder: Path, run: RunEntry) -> dict[str, object]:
+    program = run.program and {
+        "file": run.program.path.relative_to(folder).as_posix(),
+        "sha256": run.program.sha256,
+        "model_sha256": run.program.model_sha256 or None,
+    }
+    return {
+        "test": run.test,
+        "direction": run.direction.value,
+        "repeat": run.repeat,
+        "mounting": run.mounting,
+        "file": run.path.relative_to(folder).as_posix(),
+        "started": _plain(run.started),
+        "state": run.state.value,
+        "reason": run.reason or None,
+        "sha256": run.sha256 or None,
+        "chain_sha256": run.chain_sha256 or None,
+        "counts": run.counts and run.counts.data(),
+        "centre_mm": run.centre_mm,
+        "program": _without_none(program),
+    }
+
+
+def _without_none(value: object) -> object:
+    return {key: item for key, item in value.items() if item is not None} if isinstance(value, dict) else value
+
+
+def _plain(value: object) -> object:
+    if not isinstance(value, datetime):
+        return value
+    return value.astimezone(UTC).isoformat().replace("+00:00", "Z")

@@ -1,0 +1,202 @@
+"""One kind of frame on the wire: parts in order, as a pattern that reads them and as a writer."""
+
+from __future__ import annotations
+
+import re
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+
+from pydantic import Field
+
+from dbbstation.files.yaml.schema import Schema
+from dbbstation.instrument.checksum_part import Checksum
+from dbbstation.instrument.fields import Choice, Flags, Found, Literally, Sign, Skip
+from dbbstation.instrument.numbers import DecimalText, Ieee, Integer
+from dbbstation.instrument.reading import Status  # noqa: TC001 (pydantic needs it at run time)
+from dbbstation.instrument.telling import ErrorTable, Text
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.fields import Bit, Code, Content
+
+Number: TypeAlias = DecimalText | Integer | Ieee
+
+PlainPart: TypeAlias = Annotated[
+    Literally | Sign | DecimalText | Integer | Ieee | Choice | Flags | Skip | Text | ErrorTable,
+    Field(discriminator="kind"),
+]
+
+
+class Optionally(Schema):
+    """Parts that are on the wire only while the device has a feature switched on; both ways are understood.
+
+    Attributes:
+        feature: its name; the virtual instrument writes the parts where the protocol's `features` name it.
+        parts: in wire order.
+    """
+
+    kind: Literal["optional"]
+    feature: str = Field(min_length=1)
+    parts: tuple[PlainPart, ...] = Field(min_length=1)
+
+    @property
+    def width(self) -> None:
+        """None: the width varies."""
+        return
+
+    def pattern(self) -> bytes:
+        """Return the regular expression of all the parts, or of nothing."""
+        return b"(?:" + b"".join(part.pattern() for part in self.parts) + b")?"
+
+    def read(self, raw: bytes, found: Found) -> None:
+        """Take what the parts say, where they are there.
+
+        Raises:
+            NotUnderstood: the right characters, but a part means nothing.
+        """
+        match = self._pattern.fullmatch(raw) if raw else None
+        if match is None:
+            return
+        for group, part in enumerate(self.parts, start=1):
+            part.read(match[group], found)
+
+    def write(self, content: Content) -> bytes:
+        """Return the parts where the feature is on.
+
+        Raises:
+            NotRepresentable: a number does not fit.
+        """
+        if self.feature not in content.features:
+            return b""
+        return b"".join(part.write(content) for part in self.parts)
+
+    @cached_property
+    def _pattern(self) -> re.Pattern[bytes]:
+        return re.compile(b"".join(b"(" + part.pattern() + b")" for part in self.parts))
+
+
+Part: TypeAlias = Annotated[
+    Literally | Sign | DecimalText | Integer | Ieee | Choice | Flags | Checksum | Skip | Text | ErrorTable | Optionally,
+    Field(discriminator="kind"),
+]
+
+
+class Frame(Schema):
+    """One kind of frame: parts in wire order. A frame without a length is a message, and says what it means.
+
+    Attributes:
+        bare: it is exactly its parts: neither the prefix nor the end that the protocol gives to replies, and no line end
+            is waited for; for control characters that come alone.
+        means: what it tells; with the text or the code in it.
+    """
+
+    name: str = "reading"
+    status: Status = "ok"
+    means: str = ""
+    remedy: str = ""
+    bare: bool = False
+    parts: tuple[Part, ...] = Field(min_length=1)
+
+    @property
+    def is_message(self) -> bool:
+        """Whether it carries no length."""
+        return self.number is None
+
+    @property
+    def number(self) -> Number | None:
+        """The part that carries the length."""
+        return self._number_of("length")
+
+    @property
+    def counter(self) -> Number | None:
+        """The part that carries the sample counter."""
+        return self._number_of("counter")
+
+    def _number_of(self, what: str) -> Number | None:
+        return next((part for part in self.parts if isinstance(part, Number) and part.of == what), None)
+
+    def fault(self) -> str:
+        """Return what makes no sense about it, empty where all is well."""
+        kinds = [part.of for part in self.parts if isinstance(part, Number)]
+        if kinds.count("length") > 1 or kinds.count("counter") > 1:
+            return "a frame has at most one length and one counter"
+        if self.is_message and (self.status == "ok" or not self.means):
+            return "a frame without a length is a message: give it a status that is not ok, and means"
+        if self.bare and any(not isinstance(part, Literally) for part in self.parts):
+            return "a bare frame has fixed bytes only: nothing else says where it ends"
+        return ""
+
+    @property
+    def width(self) -> int | None:
+        """Bytes of the frame, None where they vary."""
+        widths = [part.width for part in self.parts]
+        return None if None in widths else sum(width for width in widths if width is not None)
+
+    @property
+    def terminator(self) -> bytes:
+        """The fixed bytes at its end, empty where it ends otherwise."""
+        last = self.parts[-1]
+        return last.value if isinstance(last, Literally) else b""
+
+    @property
+    def binary(self) -> bool:
+        """Whether bytes inside can look like a line end by chance."""
+        return any(
+            isinstance(part, Flags)
+            or (isinstance(part, Number) and part.binary)
+            or (isinstance(part, Checksum) and part.written == "binary")
+            for part in self.parts
+        )
+
+    @cached_property
+    def pattern(self) -> re.Pattern[bytes]:
+        """The whole frame as a regular expression, one group per part."""
+        return re.compile(b"".join(b"(" + part.pattern() + b")" for part in self.parts))
+
+    @property
+    def voices(self) -> tuple[Code | Bit, ...]:
+        """Every code and bit with which this frame can speak of a status."""
+        found: list[Code | Bit] = []
+        for part in self.parts:
+            if isinstance(part, Choice | ErrorTable):
+                found += part.codes
+            elif isinstance(part, Flags):
+                found += part.bits
+            elif isinstance(part, Number):
+                found += part.specials
+        return tuple(voice for voice in found if voice.status != "ok")
+
+    def read(self, match: re.Match[bytes]) -> Found:
+        """Return what a match of `pattern` says.
+
+        Raises:
+            NotUnderstood: the characters are right but a number or the checksum is not.
+        """
+        found = Found()
+        found.report(self.status, self.means, self.remedy)
+        for group, part in enumerate(self.parts, start=1):
+            if isinstance(part, Checksum):
+                part.verify(match.string[match.start() : match.start(group)], match[group])
+            else:
+                part.read(match[group], found)
+        if found.text:
+            found.said = f"{found.said}: {found.text}" if found.said else found.text
+        return found
+
+    def write(self, content: Content) -> bytes:
+        """Return the frame as bytes.
+
+        Raises:
+            NotRepresentable: a number does not fit.
+        """
+        number = self.number
+        value = (number.as_read(content.value) if number else 0.0) + 0.0
+        signed = content.of(value)
+        unsigned = content.of(abs(value))
+        has_sign = any(isinstance(part, Sign) for part in self.parts)
+        raw = b""
+        for part in self.parts:
+            if isinstance(part, Checksum):
+                raw += part.over(raw)
+            else:
+                raw += part.write(signed if isinstance(part, Sign) or not has_sign else unsigned)
+        return raw

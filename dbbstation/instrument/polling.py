@@ -1,0 +1,181 @@
+"""Reading an instrument that is asked for each length."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage, Piece
+from dbbstation.instrument.latch import latch_of
+from dbbstation.instrument.reading import Reading
+from dbbstation.instrument.reception import INCOMPLETE
+from dbbstation.instrument.sequence import Sequence
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.codec import Heard
+    from dbbstation.instrument.link import Link
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.instrument.reception import Reception
+
+_PAUSE_TICK_S = 0.001
+
+_MARGIN_S = 0.02
+"""Behind the time that a reply takes, before the line counts as quiet [s]."""
+
+EXCHANGES = 20
+"""Requests over which noise is counted."""
+
+MOST_NOISY = 7
+"""Of these, as many with bytes that belong to no reply are no noise but another instrument, whose replies are cut in the wrong
+places. Where one exchange in twenty is disturbed, so many come once in 30 000 times (binomial)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came after a request.
+
+    Attributes:
+        heard: the reply, or as garbage whatever came instead before patience ended.
+        first_s: when its first byte was seen [s].
+        raw: all bytes, in wire order.
+    """
+
+    heard: Heard
+    first_s: float
+    raw: bytes
+
+    @property
+    def clean(self) -> bool:
+        """Whether the reply is all that came."""
+        return isinstance(self.heard, Piece) and self.heard.raw == self.raw
+
+
+class Poller:
+    """Asks, waits for the reply, asks again, until it shall stop.
+
+    Args:
+        link: the open line.
+        reception: where readings go, and how long is waited.
+    """
+
+    def __init__(self, link: Link, reception: Reception) -> None:
+        self._link = link
+        self._to = reception
+        self._protocol = reception.protocol
+        self._sequence = Sequence[tuple[Piece, Reading]](self._protocol.counter_modulus, reception.where)
+        self._last_s = float("-inf")
+        self._failed: list[Garbage] = []
+        self._recent: deque[Answer] = deque(maxlen=EXCHANGES)
+        self._explained = ""
+
+    def run(self) -> None:
+        """Read until `stop` is set.
+
+        Raises:
+            InstrumentError: the line is silent, closed or garbled, or the device restarted; OutputError: the byte log is full.
+        """
+        rate_hz, clock, stop = self._protocol.timing.rate_hz, self._to.clock, self._to.stop
+        pause_s = 1.0 / rate_hz if rate_hz else 0.0
+        self._until_quiet()
+        while not stop.is_set():
+            asked_s = clock()
+            self._link.write(self._protocol.ask.request)
+            answer = self._answer(self._protocol)
+            if stop.is_set():
+                return
+            self._recent.append(answer)
+            if isinstance(answer.heard, Garbage):
+                self._fail(answer.heard)
+                continue
+            self._take(answer.heard, answer.first_s, asked_s)
+            self._refuse_strangers()
+            while clock() < asked_s + pause_s and not stop.wait(_PAUSE_TICK_S):
+                pass
+
+    def _take(self, heard: Piece, first_s: float, asked_s: float) -> None:
+        """Stamp a reading, let a fault be explained, and hand out what has its place."""
+        latch = latch_of(self._protocol, asked_s=asked_s, first_byte_s=first_s, baud=self._to.baud)
+        self._last_s = max(latch.t_s, self._last_s + 1e-6)
+        reading = replace(heard.reading, t_s=self._last_s, t_uncertainty_s=latch.uncertainty_s, first_byte_s=first_s)
+        if reading.status == "fault":
+            # Asked once: while the fault lasts the words stay the same.
+            self._explained = self._explained or self._explanation() or reading.said
+            reading = replace(reading, said=self._explained)
+        else:
+            self._explained = ""
+        for placed in self._sequence.place(reading.counter, (heard, reading)):
+            piece, one = placed.sample
+            if placed.lost is None:
+                self._to.tally.reject(piece.raw, "counter")
+            else:
+                self._to.put(replace(one, lost=placed.lost if self._sequence.counts else len(self._failed)))
+        self._failed.clear()
+
+    def _fail(self, heard: Garbage) -> None:
+        """Take note of a reply that did not come or cannot be read; give up after some in a row."""
+        self._failed.append(heard)
+        self._to.tally.reject(heard.raw, heard.reason)
+        self._until_quiet()
+        self._refuse_strangers()
+        if len(self._failed) > self._protocol.timing.retries:
+            # The attempt that brought something says more than the silence after it.
+            telling = next((one for one in reversed(self._failed) if one.raw), heard)
+            raise self._to.symptom(telling.raw, telling.why)
+
+    def _refuse_strangers(self) -> None:
+        """Give up where bytes that belong to no reply come again and again: part of what comes only looks like replies."""
+        noisy = [answer for answer in self._recent if answer.raw and not answer.clean]
+        if len(noisy) >= MOST_NOISY:
+            raw = b"".join(answer.raw for answer in self._recent)[-LONGEST_LINE:]
+            raise self._to.symptom(raw, f"{len(noisy)} of {len(self._recent)} replies have bytes that belong to none")
+
+    def _explanation(self) -> str:
+        """Ask for the text of a fault; empty where the device has none to tell or is not asked."""
+        follow_up, protocol = self._protocol.ask.follow_up, self._protocol.explaining
+        if follow_up is None or protocol is None:
+            return ""
+        self._link.write(follow_up.request)
+        heard = self._answer(protocol).heard
+        if isinstance(heard, Garbage):
+            self._to.tally.reject(heard.raw, heard.reason)
+            return ""
+        # Only the first of the frames has words; the others say that there are none.
+        return heard.reading.said if protocol.frames[0].pattern.fullmatch(heard.raw) else ""
+
+    def _until_quiet(self) -> None:
+        """Let a reply to an earlier request pass, perhaps one of a program before, lest it be taken for the next one.
+
+        The line is quiet when nothing came for longer than a reply takes from the request to its last byte.
+        """
+        quiet_s = self._protocol.timing.reply_latency_s + _MARGIN_S
+        quiet_s += self._protocol.frame_characters * self._to.character_s
+        now_s = heard_s = time.monotonic()
+        end_s = now_s + self._to.timeout_s + quiet_s
+        while now_s < min(heard_s + quiet_s, end_s) and not self._to.stop.is_set():
+            raw = self._link.read()
+            now_s = time.monotonic()
+            heard_s = now_s if raw else heard_s
+            self._to.tally.reject(raw, "bytes")
+
+    def _answer(self, protocol: Protocol) -> Answer:
+        """Wait for a reply in a protocol's frames."""
+        decoder = Decoder(protocol, joining=False)
+        deadline_s = time.monotonic() + self._to.timeout_s
+        first_s, came = 0.0, b""
+        while time.monotonic() < deadline_s and not self._to.stop.is_set():
+            raw = self._link.read()
+            if raw and not came:
+                first_s = self._to.clock() - (len(raw) - 1) * self._to.character_s
+            came = (came + raw)[: 2 * LONGEST_LINE]
+            heard = decoder.feed(raw)
+            pieces = [one for one in heard if isinstance(one, Piece)]
+            if pieces:
+                noise = b"".join(one.raw for one in heard if isinstance(one, Garbage)) + decoder.take_pending()
+                self._to.tally.reject(noise, "bytes")
+                return Answer(pieces[-1], first_s, came)
+            if heard and not decoder.pending:
+                # A whole line that is no reading: asking again is quicker than waiting.
+                return Answer(heard[-1], first_s, came)
+        return Answer(Garbage(decoder.take_pending(), INCOMPLETE), first_s, came)

@@ -1,0 +1,135 @@
+"""Variants of a device in one protocol file: firmware, resolution, amplifier. Each says what it has instead."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field
+
+from dbbstation.files.yaml.schema import Schema, validate
+from dbbstation.instrument.fields import Bytes  # noqa: TC001 (pydantic needs it at run time)
+from dbbstation.instrument.frame import Frame  # noqa: TC001 (pydantic needs it at run time)
+from dbbstation.instrument.protocol import FollowUp, Name, Protocol, Reference, Step
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.errors import Problem
+    from dbbstation.files.yaml.text import Location, YamlDocument
+
+
+class LineInstead(Schema):
+    """Keys of `line` that a profile has instead."""
+
+    baud: int | None = None
+    baud_choices: tuple[int, ...] | None = None
+    data_bits: int | None = None
+    parity: str | None = None
+    stop_bits: int | None = None
+    flow: str | None = None
+
+
+class AskInstead(Schema):
+    """Keys of `ask` that a profile has instead."""
+
+    mode: str | None = None
+    request: Bytes | None = None
+    request_end: Bytes | None = None
+    start: tuple[Step, ...] | None = None
+    stop: tuple[Step, ...] | None = None
+    follow_up: FollowUp | None = None
+
+
+class ReplyInstead(Schema):
+    """Keys of `reply` that a profile has instead."""
+
+    prefix: Bytes | None = None
+    end: Bytes | None = None
+
+
+class LengthInstead(Schema):
+    """Keys of `length` that a profile has instead."""
+
+    unit: str | None = None
+    mm_per_count: float | None = None
+    sense: int | None = None
+    range_mm: tuple[float, float] | None = None
+    stroke_mm: float | None = None
+    relative: bool | None = None
+    zero_mm: float | None = None
+
+
+class TimingInstead(Schema):
+    """Keys of `timing` that a profile has instead."""
+
+    latch_delay_s: float | None = None
+    latch_bounds_s: tuple[float, float] | None = None
+    reply_latency_s: float | None = None
+    rate_hz: float | None = None
+    timeout_s: float | None = None
+    retries: int | None = None
+
+
+class Profile(Schema):
+    """One variant: keys that it has instead of those of the file. Lists are replaced whole, and nothing removes a key.
+
+    Attributes:
+        title: what the variant is.
+        references: more of them, beside those of the file.
+    """
+
+    title: str = Field(min_length=1)
+    setup: tuple[str, ...] | None = None
+    references: tuple[Reference, ...] = ()
+    features: tuple[str, ...] | None = None
+    line: LineInstead | None = None
+    ask: AskInstead | None = None
+    reply: ReplyInstead | None = None
+    length: LengthInstead | None = None
+    frames: tuple[Frame, ...] | None = None
+    timing: TimingInstead | None = None
+
+
+class ProtocolFile(Protocol):
+    """A protocol file: the protocol of the usual variant, named by `profile`, and the others."""
+
+    profiles: dict[Name, Profile] = Field(default_factory=dict)
+
+
+def variant(document: YamlDocument, name: str, faults: list[Problem]) -> Protocol | None:
+    """Return one variant of a protocol file; None with every fault added where it makes no sense.
+
+    Args:
+        document: of the file, which is valid as a `ProtocolFile`.
+        name: of the profile; any other than those under `profiles` is the usual one.
+        faults: where faults are added.
+    """
+    chosen = _merged(document, name if name in document.data.get("profiles", {}) else "")
+    protocol = validate(chosen, Protocol, faults)
+    return None if protocol is None else protocol.whole()
+
+
+def _merged(document: YamlDocument, name: str) -> YamlDocument:
+    """Return the document as if the keys of a profile stood in place of its own, and no profiles in it."""
+    data = {key: value for key, value in document.data.items() if key != "profiles"}
+    values, keys = dict(document.value_places), dict(document.key_places)
+    if name:
+        instead = document.data["profiles"][name]
+        data = _over(data, instead) | {"profile": name}
+        if "references" in instead:
+            data["references"] = (*document.data.get("references", ()), *instead["references"])
+        before: Location = ("profiles", name)
+        for places in (values, keys):
+            for place in [place for place in places if len(place) > len(before) and place[: len(before)] == before]:
+                places[place[len(before) :]] = places[place]
+    keys = {place: where for place, where in keys.items() if place[:1] != ("profiles",)}
+    return replace(document, data=data, value_places=values, key_places=keys)
+
+
+def _over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    both = dict(below)
+    for key, value in above.items():
+        whole = not (isinstance(value, dict) and isinstance(below.get(key), dict))
+        both[key] = value if whole else _over(below[key], value)
+    return both

@@ -1,0 +1,95 @@
+"""What polling and listening share: the line's protocol, clock and patience, and where readings and faults go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from dbbstation.instrument import symptoms
+from dbbstation.instrument.codec import LONGEST_LINE
+
+if TYPE_CHECKING:
+    import threading
+    from collections.abc import Callable
+
+    from dbbstation.errors import InstrumentError
+    from dbbstation.instrument.fields import Reason
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.instrument.reading import Reading
+
+INCOMPLETE = "incomplete"
+"""Why bytes are no frame that only began to be one."""
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a driver has seen since `start`.
+
+    Attributes:
+        readings: handed out.
+        lost: samples that never came, or came and were rejected.
+        rejected: frames and stretches of bytes that were not believed, by reason.
+        garbage_bytes: bytes of these.
+        garbage: an example of them.
+        reconnected: how often the line was opened again.
+    """
+
+    readings: int = 0
+    lost: int = 0
+    rejected: dict[Reason, int] = field(default_factory=dict)
+    garbage_bytes: int = 0
+    garbage: bytes = b""
+    reconnected: int = 0
+
+    def reject(self, raw: bytes, reason: Reason) -> None:
+        """Count bytes that were not believed."""
+        if raw:
+            self.rejected[reason] = self.rejected.get(reason, 0) + 1
+            self.garbage_bytes += len(raw)
+            self.garbage = self.garbage or raw[:LONGEST_LINE]
+
+
+@dataclass(frozen=True, slots=True)
+class Reception:
+    """One line that is being read.
+
+    Attributes:
+        protocol: of the instrument.
+        where: name of the port.
+        baud: rate of the line.
+        clock: what stamps readings [s].
+        timeout_s: patience before a silent line is an error, in real seconds.
+        memory_s: how long the quickest arrival of a stream's samples is remembered, by the clock.
+        tally: counts what comes.
+        stop: set when reading shall end.
+        put: takes every reading.
+    """
+
+    protocol: Protocol
+    where: str
+    baud: int
+    clock: Callable[[], float]
+    timeout_s: float
+    memory_s: float
+    tally: Tally
+    stop: threading.Event
+    put: Callable[[Reading], None]
+
+    @property
+    def character_s(self) -> float:
+        """How long a character takes on the line [s]."""
+        return self.protocol.line.character_s(self.baud)
+
+    def symptom(self, raw: bytes, why: str) -> InstrumentError:
+        """Return the error for a line that brings no readings.
+
+        Args:
+            raw: what came instead, empty where nothing did.
+            why: what was wrong with it.
+        """
+        if not raw:
+            heard_before = self.tally.readings > 0
+            return symptoms.silence(self.protocol, self.where, self.timeout_s, self.baud, heard_before=heard_before)
+        if why == INCOMPLETE and symptoms.begins_well(self.protocol, raw):
+            return symptoms.half_line(raw, self.where, self.timeout_s)
+        return symptoms.garbage(self.protocol, self.where, raw, why, self.baud)

@@ -1,0 +1,135 @@
+"""The device's own sample counter: what was lost, and what a counter out of order means.
+
+Three things put a counter out of order. A line is damaged (a digit of the counter is wrong) or doubled: then the lines that
+follow go on where the line before it stood. Samples were lost: the following lines go on from the new counter, which is
+ahead. The device was restarted: they go on from the new counter, which is behind. One line alone cannot tell these apart,
+so it is held until the next ones have spoken. A damaged counter followed by another that happens to continue it would need
+two faults in a row and one value in `modulus`: where one line in a thousand is damaged, and the modulus is 256, that is one
+chance in 250 million.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from dbbstation.errors import InstrumentError
+
+Held = TypeVar("Held")
+
+GAP_FOLLOWERS = 1
+"""Lines that must go on from a counter ahead before samples count as lost."""
+
+RESTART_FOLLOWERS = 2
+"""Lines that must count on, one by one, from a counter behind before a restart is believed: it ends a measurement, a gap does
+not, so it takes one more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Placed(Generic[Held]):
+    """A sample with its place in the sequence.
+
+    Attributes:
+        sample: as given.
+        lost: samples missing before it; None: it is rejected.
+        why: why it is rejected.
+    """
+
+    sample: Held
+    lost: int | None
+    why: str = ""
+
+
+class Sequence(Generic[Held]):
+    """Puts samples in order by their counter; hands them out in wire order, the doubtful ones some lines later.
+
+    Args:
+        modulus: where the counter starts again from 0; None: the wire has no counter, and nothing is held or counted.
+        where: the port, for messages.
+    """
+
+    def __init__(self, modulus: int | None, where: str) -> None:
+        self._modulus = modulus
+        self._where = where
+        self._last: int | None = None
+        self._held: list[tuple[int, Held]] = []
+
+    @property
+    def counts(self) -> bool:
+        """Whether the wire has a counter."""
+        return self._modulus is not None
+
+    def left(self) -> list[Placed[Held]]:
+        """Return the samples that still wait for what follows them, as rejected: nothing follows."""
+        return self._rejected()
+
+    def place(self, counter: int | None, sample: Held) -> list[Placed[Held]]:
+        """Take the next sample; return those whose place is known now.
+
+        Raises:
+            InstrumentError: the device restarted. Everything before the restart was returned earlier, what was held since is
+                in `left`.
+        """
+        if self._modulus is None or counter is None:
+            return [Placed(sample, 0)]
+        if self._last is None or (self._step(self._last, counter) == 1 and not self._held):
+            self._last = counter
+            return [Placed(sample, 0)]
+        if self._held and self._goes_on_from_before(counter):
+            return [*self._rejected(), *self._accepted([(counter, sample)])]
+        if self._held and not self._ahead(self._held[-1][0], counter):
+            rejected = self._rejected()
+            self._held = [(counter, sample)]
+            return rejected
+        self._held.append((counter, sample))
+        return self._decided()
+
+    def _goes_on_from_before(self, counter: int) -> bool:
+        """Whether a counter continues the sequence before the held lines: each of them took one place at most."""
+        last = self._last or 0
+        if not self._ahead(last, counter):
+            return False
+        return self._step(last, counter) <= len(self._held) + 1 or not self._ahead(self._held[-1][0], counter)
+
+    def _decided(self) -> list[Placed[Held]]:
+        first, followers = self._held[0][0], len(self._held) - 1
+        if self._ahead(self._last or 0, first):
+            return self._accepted(self._held) if followers >= GAP_FOLLOWERS else []
+        if self._step(self._held[-2][0], self._held[-1][0]) != 1 if followers else False:
+            # Behind, and not counting on: damaged lines in a row.
+            *damaged, newest = self._held
+            self._held = damaged
+            rejected = self._rejected()
+            self._held = [newest]
+            return rejected
+        if followers >= RESTART_FOLLOWERS:
+            self._held.pop()
+            raise InstrumentError(
+                f"the sample counter went from {self._last} to {first} and counts on from there",
+                where=self._where,
+                remedy="the instrument was restarted, or another program reads the same port: start the measurement again",
+            )
+        return []
+
+    def _accepted(self, lines: list[tuple[int, Held]]) -> list[Placed[Held]]:
+        placed = []
+        for counter, sample in lines:
+            placed.append(Placed(sample, self._step(self._last or 0, counter) - 1))
+            self._last = counter
+        self._held = []
+        return placed
+
+    def _rejected(self) -> list[Placed[Held]]:
+        held, self._held = self._held, []
+        return [Placed(sample, None, self._why(counter)) for counter, sample in held]
+
+    def _why(self, counter: int) -> str:
+        if counter == self._last:
+            return f"the sample counter {counter} a second time"
+        return f"the sample counter {counter} after {self._last} is out of order"
+
+    def _step(self, before: int, after: int) -> int:
+        return (after - before) % (self._modulus or 1)
+
+    def _ahead(self, before: int, after: int) -> bool:
+        return 0 < self._step(before, after) <= (self._modulus or 1) // 2

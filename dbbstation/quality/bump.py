@@ -1,0 +1,121 @@
+"""A place where the path leaves its own form: a knock, a chip under a ball, a cable that pulled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.quality.finding import Finding, Name, found
+from dbbstation.quality.limits import ROBUST_SHARE, largest_of, scale_of
+from dbbstation.trace.gaussian import gaussian
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.circles.analysis import CircleAnalysis
+
+FORM_UPR = 30.0
+"""Undulations per revolution that count as form, as in `evaluate`: a bump is shorter, below 12 degrees."""
+
+WIDTHS_DEG = (0.5, 1.0, 2.0, 4.0)
+"""Widths that are tried: each is seen by its neighbour at 9/10 of its height or more [deg]."""
+
+REVERSAL_DEG = 6.0
+"""How far beside a strut's reversal its step shows in what the filter leaves: half of the shortest form [deg]."""
+
+FEWEST = 3
+"""Samples of a stretch, and reversals of a turn, of which a mean or a scatter is taken."""
+
+
+@dataclass(frozen=True)
+class _Peak:
+    """The stretch that sticks out most, against its limit [µm, deg]."""
+
+    height_um: float
+    limit_um: float
+    theta_deg: float
+    width_deg: float
+    at_reversal: bool
+
+    @property
+    def ratio(self) -> float:
+        return abs(self.height_um) / self.limit_um if self.limit_um > 0.0 else 0.0
+
+
+def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
+    """Return the stretch that sticks out most of the path's form.
+
+    Away from reversals of struts the limit follows from noise and from the scatter of all stretches; at reversals, where
+    machines have steps and spikes, from what the other reversals of the turn show.
+
+    Args:
+        one: the circle.
+        reversals_deg: angles at which struts turn round; none where they are not known [deg].
+    """
+    rest = one.residual_um - gaussian(one.raw.phi_deg, one.residual_um, FORM_UPR)
+    near = _near(one.raw.theta_deg, reversals_deg)
+    peaks = [peak for width in WIDTHS_DEG for peak in _peaks(one, rest, near, width)]
+    if not peaks:
+        return found(Name.BUMP, 0.0, np.inf, "µm", "too few samples for stretches of 4 degrees", "")
+    worst = max(peaks, key=lambda peak: peak.ratio)
+    place = f"{worst.height_um:+.1f} µm over {worst.width_deg:g} degrees at {worst.theta_deg:.0f} degrees"
+    beside = ", where a strut turns round" if worst.at_reversal else ""
+    return found(
+        Name.BUMP,
+        abs(worst.height_um),
+        worst.limit_um,
+        "µm",
+        f"nothing sticks out: at most {place}{beside}",
+        f"{place}{beside}: look for chips, knocks and cables that pull, and repeat the run",
+    )
+
+
+def _near(theta_deg: NDArray[np.float64], reversals_deg: Sequence[float]) -> NDArray[np.int64]:
+    """Number of the reversal that each sample stands beside, -1 for none, shape (n,)."""
+    near = np.full(len(theta_deg), -1, dtype=np.int64)
+    for number, place in enumerate(reversals_deg):
+        near[np.abs(np.mod(theta_deg - place + 180.0, FULL_TURN_DEG) - 180.0) <= REVERSAL_DEG] = number
+    return near
+
+
+def _peaks(one: CircleAnalysis, rest: NDArray[np.float64], near: NDArray[np.int64], width_deg: float) -> list[_Peak]:
+    """Greatest mean of stretches of a width, away from reversals and at each of them."""
+    samples = max(round(width_deg / FULL_TURN_DEG * len(rest)), 1)
+    if samples < FEWEST and width_deg < WIDTHS_DEG[-1]:
+        return []
+    means = np.convolve(rest, np.full(samples, 1.0 / samples), mode="valid")
+    middle = np.arange(len(means)) + samples // 2
+    theta_deg, beside = one.raw.theta_deg[middle], near[middle]
+    # The two ends of the turn do not meet where anything drifted: the filter makes a step of that.
+    phi = one.raw.phi_deg[middle]
+    inner = (phi > REVERSAL_DEG) & (phi < FULL_TURN_DEG - REVERSAL_DEG)
+    found_peaks = []
+    away = np.flatnonzero(inner & (beside < 0))
+    usual = 0.0
+    if len(away) >= FEWEST * samples:
+        # Not the noise of the spectrum, which a bump itself makes louder: the median of the stretches does not see one. They
+        # overlap, so that fewer are independent: half a width apart they are all but so.
+        usual, _ = scale_of(list(means[away]))
+        apart = len(away) / samples
+        limit = largest_of(2.0 * apart * len(WIDTHS_DEG), ROBUST_SHARE * apart) * usual
+        top = _top(means, away)
+        found_peaks.append(_Peak(float(means[top]), limit, float(theta_deg[top]), width_deg, at_reversal=False))
+    numbers = [n for n in np.unique(beside[inner]) if n >= 0]
+    tops = [_top(means, np.flatnonzero(inner & (beside == n))) for n in numbers]
+    for k, top in enumerate(tops):
+        others = [float(means[t]) for j, t in enumerate(tops) if j != k]
+        if len(others) < FEWEST:
+            continue
+        scale, freedom = scale_of(others)
+        limit = largest_of(len(tops) * len(WIDTHS_DEG), freedom) * max(scale, usual)
+        found_peaks.append(_Peak(float(means[top]), limit, float(theta_deg[top]), width_deg, at_reversal=True))
+    return found_peaks
+
+
+def _top(means: NDArray[np.float64], among: NDArray[np.int64]) -> int:
+    return int(among[int(np.argmax(np.abs(means[among])))])

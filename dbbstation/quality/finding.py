@@ -1,0 +1,78 @@
+"""One finding: a number, the limit that chance keeps it under, and what both say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Name(StrEnum):
+    """What is looked for, in the order in which it is told."""
+
+    CIRCLE = "circle"
+    """The recording shows no full circle: nothing else can be told of it."""
+    LOST = "lost samples"
+    NOISE = "noise"
+    CLOSURE = "closure"
+    DRIFT = "drift"
+    BUMP = "bump"
+    DIRECTION = "direction"
+    RADIUS = "radius"
+    FEED = "feed"
+    BORE = "bore"
+    OTHER_DIRECTION = "other direction"
+    REPEAT = "repeat"
+
+
+class Verdict(StrEnum):
+    """What a finding says."""
+
+    GOOD = "good"
+    WRONG = "wrong"
+    CANNOT_TELL = "cannot tell"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked for in one run.
+
+    Attributes:
+        name: what.
+        value: the number found; None where there is none.
+        limit: greatest value of a sound run; None where none can be given.
+        unit: of both.
+        verdict: whether the value keeps the limit.
+        text: what was found, where, and what to do where it is wrong; why nothing can be told where it cannot.
+    """
+
+    name: Name
+    value: float | None
+    limit: float | None
+    unit: str
+    verdict: Verdict
+    text: str
+
+    @property
+    def wrong(self) -> bool:
+        """Whether the run should not be used as it is."""
+        return self.verdict is Verdict.WRONG
+
+
+def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: str) -> Finding:
+    """Return a finding of a value that a limit is held against.
+
+    Args:
+        name: what was looked for.
+        value: its size.
+        limit: greatest that is sound.
+        unit: of both.
+        sound: text where the limit is kept.
+        wrong: text where it is not.
+    """
+    verdict = Verdict.WRONG if value > limit else Verdict.GOOD
+    return Finding(name, value, limit, unit, verdict, wrong if verdict is Verdict.WRONG else sound)
+
+
+def untold(name: Name, why: str, unit: str = "", value: float | None = None) -> Finding:
+    """Return a finding of which nothing can be told, and why."""
+    return Finding(name, value, None, unit, Verdict.CANNOT_TELL, why)

@@ -1,0 +1,134 @@
+"""All findings of all runs of a session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.quality.between import direction, other_direction, repeat
+from dbbstation.quality.finding import Finding, Name
+from dbbstation.quality.knowledge import Others, Run, Seen, across, apart_um, seen
+from dbbstation.quality.place import bore, radius
+from dbbstation.quality.single import by_itself
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from dbbstation.circles.analysis import CircleAnalysis
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """What was found of one run.
+
+    Attributes:
+        run: the run.
+        analysis: its figures without a filter; None where it shows no circle.
+        findings: all that was looked for, in the order of `Name`.
+    """
+
+    run: Run
+    analysis: CircleAnalysis | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def wrong(self) -> tuple[Finding, ...]:
+        """Findings that pass their limit."""
+        return tuple(finding for finding in self.findings if finding.wrong)
+
+
+def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _done, _of: None) -> tuple[Judgement, ...]:
+    """Judge the runs of one session, each beside all others.
+
+    Args:
+        runs: in the order in which they were recorded.
+        progress: told how many of how many are analysed.
+    """
+    known = []
+    for done, run in enumerate(runs):
+        progress(done, len(runs))
+        known.append(seen(run))
+    progress(len(runs), len(runs))
+    session = SessionRuns(known)
+    return tuple(session.judge(one) for one in known)
+
+
+class SessionRuns:
+    """The runs of one session, analysed, with their pairs; judges any of them, and a new one beside them.
+
+    Args:
+        runs: in the order in which they were recorded.
+    """
+
+    def __init__(self, runs: Sequence[Seen]) -> None:
+        self._runs = [one for one in runs if one.analysis is not None]
+        pairs = [(one, match) for one in self._runs if (match := self._opposite(one)) is not None]
+        repeats = [(one, match) for one in self._runs if (match := self._earlier(one)) is not None]
+        taken: set[int] = set()
+        self._directions: list[tuple[Seen, Seen, tuple[float, float]]] = []
+        for one, other in pairs:
+            if id(other) not in taken:
+                taken.add(id(one))
+                self._directions.append((one, other, apart_um(one, other)))
+        self._repeats = [(one, other, apart_um(one, other)) for one, other in repeats]
+
+    def judge(self, one: Seen) -> Judgement:
+        """Judge one run, of these or another of the same session."""
+        others = self._others(one)
+        findings = list(by_itself(one, others))
+        if one.analysis is not None:
+            expected = one.run.expected
+            findings += [
+                direction(one, others),
+                radius(one.analysis, expected),
+                bore(one.analysis, expected),
+                other_direction(one, others),
+                repeat(one, others),
+            ]
+        order = list(Name)
+        findings.sort(key=lambda finding: order.index(finding.name))
+        return Judgement(one.run, one.analysis, tuple(findings))
+
+    def _others(self, one: Seen) -> Others:
+        analyses = [o.analysis for o in self._runs if o is not one and o.analysis is not None]
+        return Others(
+            noise_um=tuple(a.noise.reading_um for a in analyses),
+            closure_um=tuple((a.closure.height_um, a.closure.u_um) for a in analyses if a.closure is not None),
+            drift_um=tuple(
+                (a.passes.mean_um, a.passes.u_mean_um(a.noise.sigma_um)) for a in analyses if a.passes is not None
+            ),
+            directions_um=tuple(apart for a, b, apart in self._directions if one is not a and one is not b),
+            repeats_um=tuple(apart for a, b, apart in self._repeats if one is not a and one is not b),
+            across_um=tuple(
+                float(np.linalg.norm(across(a) - across(b)))
+                for a, b, _ in self._directions
+                if one is not a and one is not b
+            ),
+            opposite=self._opposite(one),
+            earlier=self._earlier(one),
+        )
+
+    def _opposite(self, one: Seen) -> Seen | None:
+        """Return the same repeat of a test on the same mounting in the other direction."""
+        for other in self._runs:
+            same = (other.run.test, other.run.repeat, other.run.mounting) == (
+                one.run.test,
+                one.run.repeat,
+                one.run.mounting,
+            )
+            if same and other.run.circle.direction is not one.run.circle.direction:
+                return other
+        return None
+
+    def _earlier(self, one: Seen) -> Seen | None:
+        """Return the repeat before, in the same direction."""
+        earlier = [
+            other
+            for other in self._runs
+            if other.run.test == one.run.test
+            and other.run.circle.direction is one.run.circle.direction
+            and other.run.repeat < one.run.repeat
+        ]
+        return max(earlier, key=lambda other: other.run.repeat, default=None)

@@ -1,0 +1,157 @@
+"""What is known before a run is judged, as plain numbers: where its circle should lie, and what other runs of its session show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.circles.analysis import CircleAnalysis, analyse, feed_shown
+from dbbstation.errors import TraceError
+from dbbstation.trace.cut import cut, lost_on_turn
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.plan.circle import Circle
+    from dbbstation.trace.recording import Recording
+
+HIGHEST_HARMONIC = 3
+"""Undulations per revolution up to which runs are compared: mean, centre, ellipse and triangle are what a wrong ball, bar, tilt
+or direction changes, and seven numbers of thousands of samples are known to hundredths of a micrometre."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """Where a circle should lie, by the nominal machine or by a model.
+
+    Attributes:
+        centre_mm: X and Y of the centre less the commanded one, shape (2,) [mm].
+        radial_mm: mean reading less nominal length of the bar [mm].
+        covariance_mm2: of these three numbers, ball, mounting and bar included, shape (3, 3) [mm²].
+        place_known: False for a ball put up under the spindle: its centre says nothing.
+        mounting_mm: standard deviation of where a ball comes to stand when it is put up again, in X and in Y [mm].
+        reversals_deg: angles from +X at which a strut turns round [deg].
+    """
+
+    centre_mm: NDArray[np.float64]
+    radial_mm: float
+    covariance_mm2: NDArray[np.float64]
+    place_known: bool = True
+    mounting_mm: float = 0.0
+    reversals_deg: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run as it is judged.
+
+    Attributes:
+        test: name of its test.
+        repeat: counts the runs of this test and direction.
+        mounting: name of the putting-up of its ball; runs that share it share where the ball stands.
+        circle: as commanded.
+        recording: as recorded.
+        expected: where its circle should lie; None where nobody knows.
+        largest_loss_percent: share of samples that may be lost [%].
+    """
+
+    test: str
+    repeat: int
+    mounting: str
+    circle: Circle
+    recording: Recording
+    expected: Expected | None = None
+    largest_loss_percent: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """Name in texts."""
+        return f"{self.test} {self.circle.direction} {self.repeat}"
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A run with what was worked out of it once.
+
+    Attributes:
+        run: the run.
+        analysis: its figures; None where it shows no circle.
+        problem: why it shows none; empty where it does.
+        lost: samples lost on the turn, and kept.
+        feed_mm_min: feed that its overlap shows and its standard uncertainty [mm/min]; None where it shows none.
+        coefficients_um: orthonormal Fourier coefficients of the readings less the bar's length, harmonics 0 to 3 by
+            commanded angle from the start of the turn towards +Y: mean, cosines, sines, shape (7,) [µm].
+    """
+
+    run: Run
+    analysis: CircleAnalysis | None
+    problem: str
+    lost: tuple[int, int]
+    feed_mm_min: tuple[float, float] | None = None
+    coefficients_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2 * HIGHEST_HARMONIC + 1))
+
+    @property
+    def u_um(self) -> float:
+        """Standard uncertainty of each coefficient by noise [µm]."""
+        if self.analysis is None:
+            return 0.0
+        return self.analysis.noise.sigma_um / float(np.sqrt(len(self.analysis.raw)))
+
+
+def seen(run: Run) -> Seen:
+    """Cut and analyse a run."""
+    lost = lost_on_turn(run.recording, run.circle)
+    try:
+        analysis = analyse(cut(run.recording, run.circle), run.recording)
+    except TraceError as error:
+        return Seen(run, None, f"{error.what}; {error.remedy}", lost, _feed_of(run))
+    raw = analysis.raw
+    theta = np.radians(raw.theta_deg - raw.circle.start_deg)
+    orders = np.outer(theta, np.arange(1, HIGHEST_HARMONIC + 1))
+    columns = np.hstack([np.ones((len(theta), 1)), np.sqrt(2.0) * np.cos(orders), np.sqrt(2.0) * np.sin(orders)])
+    found, *_ = np.linalg.lstsq(columns, 1e3 * (raw.length_mm - raw.circle.bar_mm), rcond=None)
+    return Seen(run, analysis, "", lost, analysis.feed_mm_min, np.asarray(found, dtype=np.float64))
+
+
+def _feed_of(run: Run) -> tuple[float, float] | None:
+    try:
+        return feed_shown(run.recording, run.circle)
+    except TraceError:
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Others:
+    """What the other runs of a session show, and which of them belong to this one.
+
+    Attributes:
+        noise_um: noise of each [µm].
+        closure_um: closure of each and its uncertainty by noise [µm].
+        drift_um: drift over the turn of each, likewise [µm].
+        directions_um: root mean square of the difference of both directions, of each other circle, likewise [µm].
+        repeats_um: the same of repeats.
+        across_um: difference of both directions, of each other circle, off the axis through the start of the turn [µm].
+        opposite: same test, mounting and repeat in the other direction; None where there is none.
+        earlier: same test and direction, the repeat before; None where there is none.
+    """
+
+    noise_um: tuple[float, ...] = ()
+    closure_um: tuple[tuple[float, float], ...] = ()
+    drift_um: tuple[tuple[float, float], ...] = ()
+    directions_um: tuple[tuple[float, float], ...] = ()
+    repeats_um: tuple[tuple[float, float], ...] = ()
+    across_um: tuple[float, ...] = ()
+    opposite: Seen | None = None
+    earlier: Seen | None = None
+
+
+def apart_um(one: Seen, other: Seen) -> tuple[float, float]:
+    """Root mean square of the difference of two runs up to three undulations, and each coefficient's uncertainty [µm]."""
+    return float(np.linalg.norm(one.coefficients_um - other.coefficients_um)), float(np.hypot(one.u_um, other.u_um))
+
+
+def across(one: Seen) -> NDArray[np.float64]:
+    """Odd coefficients that change sign when a circle is mirrored about the axis through its start, shape (2,) [µm]."""
+    return one.coefficients_um[HIGHEST_HARMONIC + 1 :][::2]

@@ -1,0 +1,106 @@
+"""Limits that chance passes with a stated probability."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import chdtri, fdtri, stdtrit
+
+from dbbstation.quality.finding import Name
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FALSE_ALARMS_PER_RUN = 1e-3
+"""Probability that a sound run has any finding: one in a thousand runs, which is one in thirty-three sessions of thirty. A
+false alarm costs a repeated circle, two minutes; one that is missed may cost the calibration."""
+
+TESTED = len(Name) - 2
+"""Findings that share it: all but a recording without a circle and lost samples, which are counted and not estimated."""
+
+SHARE = FALSE_ALARMS_PER_RUN / TESTED
+"""Probability of each [Bonferroni]: they may depend on one another."""
+
+
+FEWEST_OTHERS = 3
+"""Other runs, or pairs of runs, that must be there for their scatter to say what is usual: of two nobody knows which is spoilt."""
+
+
+def quantile(freedom: float, share: float = SHARE) -> float:
+    """Size in standard deviations that a sound value passes, up or down, with probability `share` [Student].
+
+    Args:
+        freedom: degrees of freedom of the standard deviation; infinite where it is known.
+        share: probability of both sides together.
+    """
+    freedom = min(max(freedom, 1.0), _MANY)
+    return float(-stdtrit(freedom, 0.5 * share))
+
+
+def largest_of(count: float, freedom: float) -> float:
+    """The same for the largest of `count` independent values."""
+    return quantile(freedom, SHARE / max(count, 1.0))
+
+
+def length_quantile(dimensions: int) -> float:
+    """Length in standard deviations that a sound vector of so many dimensions passes with probability SHARE."""
+    return float(np.sqrt(chdtri(dimensions, SHARE)))
+
+
+def ratio_quantile(above: float, below: float) -> float:
+    """Ratio of two estimates of one variance that chance passes with probability SHARE [Fisher].
+
+    Args:
+        above: degrees of freedom of the numerator.
+        below: of the denominator.
+    """
+    return float(fdtri(above, below, 1.0 - SHARE))
+
+
+_MANY = 1e6
+"""Degrees of freedom from which Student's distribution is the normal one."""
+
+
+def scale_of(values: Sequence[float]) -> tuple[float, float]:
+    """Standard deviation about zero of values of which some may be spoilt, and its degrees of freedom.
+
+    The median of their sizes over that of a normal value. It knows the standard deviation as well as 0.37 times as many
+    values known to be sound would [Rousseeuw and Croux, J. Am. Stat. Assoc. 88 (1993)].
+    """
+    if not values:
+        return 0.0, 0.0
+    return float(np.median(np.abs(values))) / _NORMAL_MEDIAN, ROBUST_SHARE * len(values)
+
+
+_NORMAL_MEDIAN = 0.674490
+"""Median of the size of a normal value of standard deviation one."""
+
+ROBUST_SHARE = 0.37
+"""Share of values that a median of sizes knows a standard deviation as well as: 37 sound ones of 100 that may be spoilt."""
+
+
+def length_limit(lengths: Sequence[float], dimensions: int) -> float:
+    """Length that a sound vector passes with probability SHARE, where other vectors of its kind are known [Fisher].
+
+    Args:
+        lengths: of the others, of which some may be spoilt: the median of their squares counts.
+        dimensions: in which they scatter alike.
+    """
+    median = float(chdtri(dimensions, 0.5)) / dimensions
+    variance = float(np.median(np.square(lengths))) / median
+    known = ROBUST_SHARE * dimensions * len(lengths)
+    return float(np.sqrt(variance * ratio_quantile(dimensions, max(known, 1.0))))
+
+
+def joined(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Standard deviation of a sum of independent parts and its degrees of freedom [Welch, Satterthwaite; GUM G.4.1].
+
+    Args:
+        parts: standard deviation and degrees of freedom of each.
+    """
+    variance = sum(size**2 for size, _ in parts)
+    if not variance > 0.0:
+        return 0.0, _MANY
+    below = sum(size**4 / freedom for size, freedom in parts if size > 0.0 and freedom > 0.0)
+    return float(np.sqrt(variance)), float(variance**2 / below) if below > 0.0 else _MANY

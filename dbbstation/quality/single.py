@@ -1,0 +1,172 @@
+"""Findings that a run shows by itself, its limits widened by what other runs of its session show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.circles.noise import LEAST_UM
+from dbbstation.quality.bump import bump
+from dbbstation.quality.finding import Finding, Name, Verdict, found, untold
+from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
+from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE
+from dbbstation.trace.loss import AFTER_LOSS, share_lost
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.circles.analysis import CircleAnalysis
+    from dbbstation.plan.circle import Circle
+    from dbbstation.quality.knowledge import Others, Seen
+
+
+def lost_samples(one: Seen) -> Finding:
+    """Share of the turn's samples that were lost, against what the plan allows."""
+    lost, kept = one.lost
+    percent = 100.0 * lost / max(lost + kept, 1)
+    told = share_lost(lost, kept) if lost else "no sample is missing on the turn"
+    return found(Name.LOST, percent, one.run.largest_loss_percent, "%", told, f"{told}; {AFTER_LOSS}")
+
+
+def noise(one: CircleAnalysis, others: Others) -> Finding:
+    """Noise against that of the other runs."""
+    value = max(one.noise.reading_um, LEAST_UM)
+    if not one.noise.known:
+        return untold(Name.NOISE, "too few samples to tell noise from form", "µm")
+    known = [max(other, LEAST_UM) for other in others.noise_um if np.isfinite(other)]
+    if len(known) < FEWEST_OTHERS:
+        return untold(
+            Name.NOISE, f"{value:.2f} µm; fewer than {FEWEST_OTHERS} other runs to hold it against", "µm", value
+        )
+    logs = np.log(known)
+    middle = float(np.median(logs))
+    own = 1.0 / float(np.sqrt(2.0 * one.noise.reading_freedom))
+    # The median of n values is off by sqrt(pi / 2n) of their scatter.
+    u = own * float(np.sqrt(1.0 + 0.5 * np.pi / len(known)))
+    limit = float(np.exp(middle + _beyond(u, np.inf, [(float(log - middle), own) for log in logs])))
+    return found(
+        Name.NOISE,
+        value,
+        limit,
+        "µm",
+        f"{value:.2f} µm per reading",
+        f"{value:.2f} µm per reading, {np.exp(middle):.2f} µm in the other runs: look after balls, cable and what shakes the "
+        "machine, and repeat the run",
+    )
+
+
+def closure(one: CircleAnalysis, others: Others) -> Finding:
+    """End of the turn less its beginning, against noise and what the other runs do."""
+    if one.closure is None or not one.noise.known:
+        return untold(Name.CLOSURE, "too few samples, at the ends of the turn or to tell noise from form", "µm")
+    u = one.closure.u_um
+    limit = _beyond(u, one.noise.freedom, others.closure_um)
+    size = abs(one.closure.height_um)
+    told = f"the turn ends {one.closure.height_um:+.2f} µm off its beginning"
+    return found(
+        Name.CLOSURE,
+        size,
+        limit,
+        "µm",
+        told,
+        f"{told}: something moved or warmed during the run, or the angles are wrong; repeat it",
+    )
+
+
+def drift(one: CircleAnalysis, others: Others) -> Finding:
+    """Second pass of the overlap less the first, against noise, feed and what the other runs do."""
+    if one.passes is None:
+        return untold(Name.DRIFT, "the recording was cut to its turn: no place is passed twice", "µm")
+    if not one.noise.known:
+        return untold(Name.DRIFT, "too few samples to tell noise from form", "µm")
+    passes = one.passes
+    u = passes.u_mean_um(one.noise.sigma_um)
+    limit = _beyond(float(np.hypot(u, _by_feed_um(one))), one.noise.freedom, others.drift_um)
+    told = f"the bar reads {passes.mean_um:+.2f} µm more after one turn of {passes.turn_s:.0f} s"
+    return found(
+        Name.DRIFT,
+        abs(passes.mean_um),
+        limit,
+        "µm",
+        told,
+        f"{told}, the same place passed twice: let bar and machine warm through, tighten the holder, and repeat the run",
+    )
+
+
+def _by_feed_um(one: CircleAnalysis) -> float:
+    """What the second pass comes out different by because it is taken at a slightly wrong feed [µm]."""
+    if one.feed_mm_min is None:
+        return 0.0
+    shown, u = one.feed_mm_min
+    share = float(np.hypot(shown - one.raw.circle.feed_mm_min, u)) / one.raw.circle.feed_mm_min
+    reach = np.radians(one.raw.circle.overshoot_deg)
+    phi = np.radians(one.raw.phi_deg)
+    ends = np.interp([reach, 2.0 * np.pi - reach], phi, one.raw.length_mm)
+    slope_um = 1e3 * abs(float(ends[0] - ends[1])) / (2.0 * reach)
+    return 2.0 * np.pi * share * slope_um
+
+
+def _beyond(u: float, freedom: float, others: Sequence[tuple[float, float]]) -> float:
+    """Limit of a value about zero, from its own uncertainty and from what others scatter beyond theirs.
+
+    Args:
+        u: standard uncertainty of the value.
+        freedom: its degrees of freedom.
+        others: value and standard uncertainty of each other run.
+    """
+    parts = [(u, freedom)]
+    if others:
+        scale, known = scale_of([value / own for value, own in others])
+        # Few runs scatter by more than their noise by chance alone.
+        if scale > 1.0 + CHANCE_SIGMAS / np.sqrt(2.0 * known):
+            usual = float(np.median([own for _, own in others]))
+            parts.append((usual * float(np.sqrt(scale**2 - 1.0)), known))
+    total, together = joined(parts)
+    return quantile(together) * total
+
+
+CHANCE_SIGMAS = 1.645
+"""By so much more than by chance, one time in twenty, other runs must scatter to widen a limit: without it a few runs, whose
+scatter is hardly known, would let pass whatever comes."""
+
+
+def feed(circle: Circle, shown_mm_min: tuple[float, float] | None) -> Finding:
+    """Feed that the overlap shows against the programmed one, by the limits that cutting has."""
+    if shown_mm_min is None:
+        return untold(Name.FEED, "the overlap is too short or too round to show the feed", "mm/min")
+    shown, u = shown_mm_min
+    programmed = circle.feed_mm_min
+    limit = max(FEED_TOLERANCE * programmed, FEED_SIGMAS * u)
+    told = f"the overlap shows {shown:.1f} ± {u:.1f} mm/min, programmed are {programmed:g}"
+    return found(
+        Name.FEED,
+        abs(shown - programmed),
+        limit,
+        "mm/min",
+        told,
+        f"{told}: set the feed of the plan to the one that was run, or the override to 100 %",
+    )
+
+
+def no_circle(one: Seen) -> tuple[Finding, ...]:
+    """Findings of a recording that shows no circle."""
+    whole = Finding(Name.CIRCLE, None, None, "", Verdict.WRONG, one.problem)
+    shown = feed(one.run.circle, one.feed_mm_min)
+    return (whole, lost_samples(one), *((shown,) if shown.wrong else ()))
+
+
+def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
+    """Everything that needs no knowledge of place or counterpart."""
+    if one.analysis is None:
+        return no_circle(one)
+    expected = one.run.expected
+    reversals = () if expected is None else expected.reversals_deg
+    return (
+        lost_samples(one),
+        noise(one.analysis, others),
+        closure(one.analysis, others),
+        drift(one.analysis, others),
+        bump(one.analysis, reversals),
+        feed(one.run.circle, one.feed_mm_min),
+    )

@@ -1,0 +1,254 @@
+"""What a screen shows: events folded into the state that is drawn."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from dbbstation.service.live_trace import LiveTrace
+from dbbstation.service.messages import Message, Weight, message_of
+from dbbstation.service.reading_rate import ReadingRate
+from dbbstation.station import events
+from dbbstation.station.states import State
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.station.commands import Command
+    from dbbstation.station.schedule import Task
+
+_MESSAGES = 50
+
+
+class Mark(StrEnum):
+    """How a planned run stands; the text is what people read beside the sign."""
+
+    OPEN = "open"
+    NEXT = "next"
+    RUNNING = "running"
+    COMPLETE = "verdict?"
+    FLAWED = "no circle"
+    ACCEPTED = "accepted"
+    PASSED = "left out"
+
+
+class Verdict(StrEnum):
+    """What was decided about a recorded run; the text is what people read."""
+
+    NONE = ""
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class SequenceOpened:
+    """Instrument and session are ready; sent by the runner before the first event of a sequence.
+
+    Attributes:
+        tasks: runs that the plan asks for, in their order.
+        open: those without an accepted recording.
+        session: where the recordings are.
+    """
+
+    tasks: tuple[Task, ...]
+    open: tuple[Task, ...]
+    session: str
+
+
+_RUN_MARKS = {
+    State.ANNOUNCED: Mark.NEXT,
+    State.ARMED: Mark.NEXT,
+    State.DWELLING: Mark.RUNNING,
+    State.TURNING: Mark.RUNNING,
+    State.LEAVING: Mark.RUNNING,
+    State.COMPLETE: Mark.COMPLETE,
+    State.FLAWED: Mark.FLAWED,
+}
+"""How the announced run stands in each state."""
+
+
+@dataclass
+class Board:
+    """The state that is drawn.
+
+    Attributes:
+        state: of the sequence; None before it began.
+        allowed: commands that it takes now.
+        announced: the run that is next or goes on.
+        tasks: planned runs in their order.
+        marks: how each of them stands.
+        session: where the recordings are.
+        sample: the last one.
+        rate: of the readings.
+        lost: samples that the line lost during the run that goes on, or went on last.
+        swept_deg: travelled since the feed-in [deg].
+        traces: of the test that was started last, by direction.
+        running: direction of the run that is on its circle; None where none is.
+        results: what completed runs say, the last ones.
+        verdicts: on runs that were judged here, by their names.
+        completed: the run that waits for a verdict, or waited last.
+        fault: what ended the sequence.
+        finished: the end of the plan.
+        messages: the last ones, newest last.
+    """
+
+    state: State | None = None
+    allowed: frozenset[type[Command]] = frozenset()
+    announced: events.RunAnnounced | None = None
+    tasks: tuple[Task, ...] = ()
+    marks: list[Mark] = field(default_factory=list)
+    session: str = ""
+    sample: events.Sample | None = None
+    rate: ReadingRate = field(default_factory=ReadingRate)
+    lost: int = 0
+    swept_deg: float = 0.0
+    traces: dict[Direction, LiveTrace] = field(default_factory=dict)
+    running: Direction | None = None
+    results: deque[events.RunCompleted] = field(default_factory=lambda: deque(maxlen=2))
+    verdicts: dict[str, Verdict] = field(default_factory=dict)
+    completed: events.RunCompleted | None = None
+    fault: events.Fault | None = None
+    finished: events.SessionFinished | None = None
+    messages: deque[Message] = field(default_factory=lambda: deque(maxlen=_MESSAGES))
+
+    @property
+    def circle(self) -> Circle | None:
+        """The circle that the traces are of, before the first run the announced one; None before anything."""
+        announced = self.announced.circle if self.announced else None
+        return next((trace.circle for trace in self.traces.values()), announced)
+
+    @property
+    def accepted(self) -> int:
+        """Planned runs that have an accepted recording."""
+        return self.marks.count(Mark.ACCEPTED)
+
+    def take(self, event: events.Event | SequenceOpened) -> None:  # noqa: C901, PLR0912 - a line per event, nothing nested
+        """Note what happened."""
+        message = message_of(event)
+        if message is not None:
+            self.messages.append(message)
+        match event:
+            case events.SamplesRecorded() | events.ReadingsSeen():
+                self._samples(event)
+            case events.Progress():
+                self.swept_deg = event.swept_deg
+            case events.StateChanged():
+                self._enter(event)
+            case events.RunAnnounced():
+                self.announced, self.swept_deg = event, 0.0
+            case events.RunStarted():
+                self._begin(event.run)
+            case events.RunCompleted():
+                self._complete(event)
+            case events.RunRestored():
+                self._begin(event.run)
+                self._trace(event.run, event.samples)
+            case events.RunAccepted():
+                self._judge(event.run, Verdict.ACCEPTED)
+            case events.RunRejected():
+                self._judge(event.run, Verdict.REJECTED)
+            case events.SessionFinished():
+                self.finished = event
+            case events.Fault():
+                self.fault = event
+            case SequenceOpened():
+                self._open(event)
+            case _:
+                pass
+
+    def _open(self, opened: SequenceOpened) -> None:
+        self.tasks, self.session = opened.tasks, opened.session
+        self.marks = [Mark.OPEN if task in opened.open else Mark.ACCEPTED for task in opened.tasks]
+        if self.fault is not None:
+            # What is over does not stay red.
+            past = [replace(message, weight=Weight.NOTE) for message in self.messages]
+            self.messages.clear()
+            self.messages.extend(past)
+            self.messages.append(Message(Weight.NOTE, "connected again; what was recorded before stays"))
+        self.fault = self.finished = self.sample = None
+        self.rate.forget()
+
+    def _enter(self, event: events.StateChanged) -> None:
+        before, self.state, self.allowed = self.state, event.state, event.commands
+        if event.state is State.BETWEEN:
+            self._leave(before)
+        elif event.state in {State.STOPPED, State.FAULTED} and self._announced_mark is not Mark.ACCEPTED:
+            self._mark(Mark.OPEN)
+        elif event.state in _RUN_MARKS:
+            self._mark(_RUN_MARKS[event.state])
+        self.running = self.announced.run.direction if self.announced and event.state is State.TURNING else None
+
+    def _leave(self, before: State | None) -> None:
+        """A run was left: the announcement that follows says whether it is measured again."""
+        if before is not None and before in _RUN_MARKS and self._announced_mark is not Mark.ACCEPTED:
+            self._mark(Mark.PASSED)
+
+    @property
+    def _announced_mark(self) -> Mark | None:
+        number = self.announced.number - 1 if self.announced else -1
+        return self.marks[number] if 0 <= number < len(self.marks) else None
+
+    def _mark(self, mark: Mark) -> None:
+        if self._announced_mark is not None and self.announced is not None:
+            self.marks[self.announced.number - 1] = mark
+
+    def _begin(self, run: events.RunId) -> None:
+        if self.announced is None:
+            return
+        if any(trace.run.test != run.test for trace in self.traces.values()):
+            self.traces = {}
+        # A repeated test at the end of the plan is compared with itself, not with the turn of hours ago.
+        self.traces = {
+            direction: trace
+            for direction, trace in self.traces.items()
+            if direction is not run.direction and trace.run.mounting == run.mounting
+        }
+        self.traces[run.direction] = LiveTrace(run, self.announced.circle)
+        self.lost, self.swept_deg = 0, 0.0
+
+    def _complete(self, completed: events.RunCompleted) -> None:
+        self.completed = completed
+        if completed.figures is not None:
+            self.results.append(completed)
+            trace = self.traces.get(completed.run.direction)
+            if trace is not None:
+                trace.centre()
+
+    def _judge(self, run: events.RunId, verdict: Verdict) -> None:
+        """Note a verdict; on the announced run as its mark, on an earlier one wherever its task stands."""
+        self.verdicts[run.label] = verdict
+        announced = self.announced.run if self.announced else None
+        if announced is not None and announced.label == run.label:
+            if verdict is Verdict.ACCEPTED:
+                self._mark(Mark.ACCEPTED)
+        else:
+            self._mark_earlier(run, verdict)
+        if verdict is Verdict.REJECTED:
+            trace = self.traces.get(run.direction)
+            if trace is not None and trace.run.label == run.label:
+                del self.traces[run.direction]
+
+    def _mark_earlier(self, run: events.RunId, verdict: Verdict) -> None:
+        mine = [k for k, task in enumerate(self.tasks) if (task.test, task.direction) == (run.test, run.direction)]
+        if verdict is Verdict.ACCEPTED:
+            changed = next((k for k in mine if self.marks[k] is not Mark.ACCEPTED), None)
+        else:
+            changed = next((k for k in reversed(mine) if self.marks[k] is Mark.ACCEPTED), None)
+        if changed is not None:
+            self.marks[changed] = Mark.ACCEPTED if verdict is Verdict.ACCEPTED else Mark.OPEN
+
+    def _trace(self, run: events.RunId, samples: Sequence[events.Sample]) -> None:
+        trace = self.traces.get(run.direction)
+        if trace is not None:
+            trace.add(samples)
+
+    def _samples(self, event: events.SamplesRecorded | events.ReadingsSeen) -> None:
+        samples: Sequence[events.Sample] = event.samples
+        if isinstance(event, events.SamplesRecorded):
+            self.lost += sum(sample.lost for sample in samples)
+            self._trace(event.run, samples)
+        self.rate.add(samples)
+        self.sample = samples[-1]

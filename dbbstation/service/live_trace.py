@@ -1,0 +1,159 @@
+"""The traces that are drawn: one per direction of a test, as many points as can be told apart, however many samples come.
+
+As measured, and about their own centre once they are complete.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import TraceError
+from dbbstation.trace.analysis import best_circle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.plan.circle import Circle
+    from dbbstation.station.events import RunId, Sample
+
+_FIRST_ROOM = 4096
+
+_TURN_DEG = 360.0
+
+STEP_DEG = 0.05
+"""Of the samples within such a step of the travel the least and the greatest are kept: a tenth of a dot of the largest
+screen. A turn has at most three points a step then, whatever the sampling rate [deg]."""
+
+
+class LiveTrace:
+    """Angles and deviations of one run, as far as they are known live.
+
+    Only the full turn is kept, not the overshoots; samples that are no length on the circle break the line. Of samples that lie
+    closer than can be drawn, the extremes are kept.
+
+    Args:
+        run: which run.
+        circle: as commanded.
+    """
+
+    def __init__(self, run: RunId, circle: Circle) -> None:
+        self.run = run
+        self.circle = circle
+        self.largest_um = 0.0
+        self.centred: Centred | None = None
+        self._count = 0
+        self._step, self._step_from = -1, 0
+        self._data = np.empty((2, _FIRST_ROOM))
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def theta_deg(self) -> NDArray[np.float64]:
+        """Angles from +X towards +Y, shape (n,) [deg]."""
+        return self._data[0, : self._count]
+
+    @property
+    def deviation_um(self) -> NDArray[np.float64]:
+        """Bar length minus nominal; not a number where the line breaks, shape (n,) [µm]."""
+        return self._data[1, : self._count]
+
+    def centre(self) -> None:
+        """Take the least-squares circle out of what is there, so that the form can be seen on a scale of its own."""
+        known = np.isfinite(self.deviation_um)
+        height_mm = self.circle.bar_mm * np.sin(np.radians(self.circle.elevation_deg))
+        radius_mm = np.sqrt((self.circle.bar_mm + self.deviation_um[known] / 1e3) ** 2 - height_mm**2)
+        left_um = np.full(len(self), np.nan)
+        try:
+            left_um[known] = 1e3 * best_circle(self.theta_deg[known], radius_mm)[2]
+        except TraceError:
+            return
+        self.centred = Centred(self, left_um, float(np.abs(left_um[known]).max()))
+
+    def add(self, samples: Sequence[Sample]) -> None:
+        """Take samples in time order."""
+        # Strictly inside what is travelled: at its very ends stands the bar while it feeds in and out.
+        first, last = -self.circle.overshoot_deg, _TURN_DEG + self.circle.overshoot_deg
+        on_turn = [
+            sample
+            for sample in samples
+            if sample.phi_deg is not None and first < sample.phi_deg < last and 0.0 <= sample.phi_deg < _TURN_DEG
+        ]
+        if not on_turn:
+            return
+        phi = np.array([sample.phi_deg for sample in on_turn], dtype=np.float64)
+        length = np.array([sample.length_mm for sample in on_turn], dtype=np.float64)
+        usable = np.array([sample.status == "ok" for sample in on_turn])
+        deviation = 1e3 * (length - self.circle.bar_mm)
+        # Beyond half the feed-in it is off the circle: a bar that was lifted, or the feed-out.
+        usable &= np.abs(deviation) < 1e3 * self.circle.feed_in_mm / 2.0
+        behind_gap = np.flatnonzero([sample.lost > 0 for sample in on_turn])
+        steps = np.insert(phi // STEP_DEG, behind_gap, phi[behind_gap] // STEP_DEG).astype(np.int64)
+        theta = np.insert(self.circle.theta_deg(phi), behind_gap, np.nan)
+        shown = np.insert(np.where(usable, deviation, np.nan), behind_gap, np.nan)
+        for step in np.unique(steps).tolist():
+            self._take(step, theta[steps == step], shown[steps == step])
+        if usable.any():
+            self.largest_um = max(self.largest_um, float(np.abs(deviation[usable]).max()))
+
+    def _take(self, step: int, theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]) -> None:
+        """Add points of one step of the travel, which may have some already."""
+        if step == self._step:
+            kept = self._data[:, self._step_from : self._count]
+            theta_deg = np.concatenate([kept[0], theta_deg])
+            deviation_um = np.concatenate([kept[1], deviation_um])
+            self._count = self._step_from
+        self._step, self._step_from = step, self._count
+        breaks = np.flatnonzero(np.isnan(deviation_um))
+        telling = {int(breaks[0])} if len(breaks) else set()
+        if len(breaks) < len(deviation_um):
+            telling |= {int(np.nanargmin(deviation_um)), int(np.nanargmax(deviation_um))}
+        chosen = sorted(telling)
+        self._append(theta_deg[chosen], deviation_um[chosen])
+
+    def _append(self, theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]) -> None:
+        end = self._count + len(theta_deg)
+        if end > self._data.shape[1]:
+            wider = np.empty((2, max(2 * self._data.shape[1], end)))
+            wider[:, : self._count] = self._data[:, : self._count]
+            self._data = wider
+        self._data[:, self._count : end] = theta_deg, deviation_um
+        self._count = end
+
+
+@dataclass(frozen=True, eq=False)
+class Centred:
+    """A trace less its least-squares circle, drawn as one that was measured.
+
+    Attributes:
+        measured: the trace.
+        deviation_um: radial deviation from the circle; not a number where the line breaks, shape (n,) [µm].
+        largest_um: greatest of them, without sign [µm].
+    """
+
+    measured: LiveTrace
+    deviation_um: NDArray[np.float64]
+    largest_um: float
+
+    def __len__(self) -> int:
+        return len(self.deviation_um)
+
+    @property
+    def run(self) -> RunId:
+        """Which run."""
+        return self.measured.run
+
+    @property
+    def circle(self) -> Circle:
+        """As commanded."""
+        return self.measured.circle
+
+    @property
+    def theta_deg(self) -> NDArray[np.float64]:
+        """Angles from +X towards +Y, shape (n,) [deg]."""
+        return self.measured.theta_deg[: len(self)]

@@ -1,0 +1,122 @@
+"""Runs the sequence in a thread of its own; the screen looks into the mailbox when it draws, and never makes it wait."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from dbbstation.errors import StationError
+from dbbstation.service.board import SequenceOpened
+from dbbstation.station.commands import Quit
+from dbbstation.station.events import Event, Fault
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
+
+    from dbbstation.station.commands import Command
+    from dbbstation.station.engine import Station
+    from dbbstation.station.schedule import Schedule
+
+_JOIN_S = 10.0
+"""A serial line that hangs in the operating system is waited for so long when the screen closes [s]."""
+
+
+@dataclass(frozen=True)
+class OpenStation:
+    """A station ready to run, its storage subscribed.
+
+    Attributes:
+        station: the engine.
+        schedule: what is left to do.
+        session: where the recordings are.
+    """
+
+    station: Station
+    schedule: Schedule
+    session: str
+
+
+Opener: TypeAlias = "Callable[[], AbstractContextManager[OpenStation]]"
+"""Opens instrument and session; called again when a line that failed is connected again."""
+
+
+class Runner:
+    """One sequence after the other, until the screen closes.
+
+    Args:
+        opener: called in the runner's thread.
+
+    Attributes:
+        crash: what ended the thread and should not have: a mistake in the program.
+    """
+
+    def __init__(self, opener: Opener) -> None:
+        self._opener = opener
+        self._mail: queue.SimpleQueue[Event | SequenceOpened] = queue.SimpleQueue()
+        self._thread: threading.Thread | None = None
+        self._station: Station | None = None
+        self._told = False
+        self._closing = threading.Event()
+        self.crash: Exception | None = None
+
+    @property
+    def alive(self) -> bool:
+        """Whether a sequence is being run."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def start(self) -> None:
+        """Open instrument and session and run; does nothing while a sequence is being run."""
+        if self.alive:
+            return
+        self._told = False
+        self._thread = threading.Thread(target=self._run, name="station", daemon=True)
+        self._thread.start()
+
+    def send(self, command: Command) -> bool:
+        """Pass a command on; return whether anybody is there to take it."""
+        station = self._station
+        if station is None:
+            return False
+        station.send(command)
+        return True
+
+    def mail(self) -> list[Event | SequenceOpened]:
+        """Return what has come since the last call."""
+        came = []
+        with suppress(queue.Empty):
+            while True:
+                came.append(self._mail.get_nowait())
+        return came
+
+    def close(self) -> None:
+        """End the sequence, also one that is only about to begin, and wait for that."""
+        self._closing.set()
+        self.send(Quit())
+        if self._thread is not None:
+            self._thread.join(_JOIN_S)
+
+    def _run(self) -> None:
+        try:
+            with self._opener() as opened:
+                self._mail.put(SequenceOpened(opened.schedule.tasks, opened.schedule.open, opened.session))
+                opened.station.subscribe(self._observe)
+                self._station = opened.station
+                if self._closing.is_set():
+                    opened.station.send(Quit())
+                opened.station.run()
+        except StationError as error:
+            # What the engine ran into it has told already; what kept it from beginning it could not.
+            if not self._told:
+                self._mail.put(Fault(error, None))
+        except Exception as error:  # noqa: BLE001 - raised again where it can be seen, when the screen has closed
+            self.crash = error
+        finally:
+            self._station = None
+
+    def _observe(self, event: Event) -> None:
+        self._told = self._told or isinstance(event, Fault)
+        self._mail.put(event)

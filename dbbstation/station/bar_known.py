@@ -1,0 +1,52 @@
+"""Whether the length of the bar is known well enough for the plan: places on a plate need an absolute length."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, Problem
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from dbbstation.plan.bar import Bar
+    from dbbstation.plan.plan import Plan
+
+USUAL_AGE_H = 24.0
+"""Age of a calibration beyond which it is stale, where the shop sets no other [h]. A bar is put down, carried and warmed by hands every
+day, and a display is switched off over night and preset again: one day has one of each at the most."""
+
+_REMEDY = (
+    "put it on its calibrator: `dbbstation bar`, then --bar FILE; or say with --bar-waiver TEXT why it is done without"
+)
+
+
+def check_bar_known(bar: Bar | None, plan: Plan, now: datetime, largest_age_h: float = USUAL_AGE_H) -> None:
+    """Refuse a plan with balls at known places to a bar of unknown or stale length.
+
+    The size of a circle about a ball is the length of the bar: an error of it is one of the machine's scale. Balls that are put up
+    under the spindle tell nothing of the machine's place, and circularity alone needs no length.
+
+    Args:
+        bar: as the session is to note it; None where nothing is known.
+        plan: what is measured.
+        now: the time of day with its zone.
+        largest_age_h: age of a calibration beyond which it is stale [h].
+
+    Raises:
+        InputError: what is wrong with the bar, and what to do.
+    """
+    if not any(test.ball.place_known for test in plan.tests.values()):
+        return
+    if bar is None or bar.reading_mm is None or bar.calibrated is None:
+        what = (
+            "nobody has read the bar on its calibrator, and the plan has balls at known places, which need its length"
+        )
+    elif bar.calibrated > now + timedelta(minutes=10):
+        what = f"the bar's calibration is of the future, {bar.calibrated:%Y-%m-%d %H:%M %Z}: a clock was wrong"
+    elif (age_h := (now - bar.calibrated) / timedelta(hours=1)) > largest_age_h:
+        what = f"the bar was last on its calibrator {age_h:.0f} h ago, {largest_age_h:g} h are allowed"
+    else:
+        return
+    raise InputError([Problem("bar", 0, 0, what, _REMEDY)])

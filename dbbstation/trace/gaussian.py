@@ -1,0 +1,59 @@
+"""The Gaussian filter of a closed profile, by undulations per revolution [ISO 16610-21:2011, clause 5]."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.plan.circle import FULL_TURN_DEG
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+LEAST_CELLS = 4096
+CELLS_PER_SAMPLE = 4
+"""Cells of the turn into which samples are shared out, per sample: the sharing costs a thousandth of an undulation that the
+samples themselves can just show."""
+
+
+def transmission(undulations: NDArray[np.float64], cut_off_upr: float) -> NDArray[np.float64]:
+    """Share of the amplitude of an undulation that passes, 0.5 at the cut-off.
+
+    exp(-π (α k / k_c)²) with α = sqrt(ln 2 / π), which is 2^-(k / k_c)² [ISO 16610-21:2011, 5.3].
+
+    Args:
+        undulations: per revolution, shape (k,).
+        cut_off_upr: cut-off k_c in undulations per revolution.
+    """
+    return np.asarray(np.exp2(-((undulations / cut_off_upr) ** 2)), dtype=np.float64)
+
+
+def gaussian(theta_deg: NDArray[np.float64], values: NDArray[np.float64], cut_off_upr: float) -> NDArray[np.float64]:
+    """Return a closed profile without its short undulations, at the same angles.
+
+    Samples need not lie equally close: each counts by the arc that it stands for.
+
+    Args:
+        theta_deg: angles of a full turn, shape (n,) [deg].
+        values: at these angles, shape (n,), any unit.
+        cut_off_upr: undulations per revolution of which half the amplitude passes.
+    """
+    cells = max(LEAST_CELLS, 1 << int(np.ceil(np.log2(CELLS_PER_SAMPLE * len(theta_deg)))))
+    place = np.mod(theta_deg, FULL_TURN_DEG) / FULL_TURN_DEG * cells
+    order = np.argsort(place)
+    ordered = place[order]
+    gap = np.diff(ordered, append=ordered[0] + cells)
+    arc = np.empty_like(gap)
+    arc[order] = 0.5 * (gap + np.roll(gap, 1))
+    lower = np.floor(place)
+    share, lower = place - lower, lower.astype(np.int64) % cells
+    upper = (lower + 1) % cells
+
+    def spread(amount: NDArray[np.float64]) -> NDArray[np.float64]:
+        on_cells = np.bincount(lower, amount * (1.0 - share), cells) + np.bincount(upper, amount * share, cells)
+        passed = transmission(np.arange(cells // 2 + 1.0), cut_off_upr)
+        return np.fft.irfft(np.fft.rfft(on_cells) * passed, cells)
+
+    smooth = spread(values * arc) / spread(arc)
+    return np.asarray((1.0 - share) * smooth[lower] + share * smooth[upper], dtype=np.float64)

@@ -1,0 +1,113 @@
+"""The minimum zone of a path: the two concentric circles of least separation with all its points between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import TraceError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FEWEST_POINTS = 4
+"""Three points lie on one circle: the zone of fewer than four has no width and no place."""
+
+SECTORS = 6
+"""Parts of the turn whose highest and lowest points the search begins with: the four that touch lie apart."""
+
+AGREED_MM = 1e-10
+"""Width by which a point may stick out of the zone: far below what any bar resolves [mm]."""
+
+MOST_ROUNDS = 60
+"""Rounds of the search. Traces with noise need five to fifteen."""
+
+PARALLEL = 1e-12
+"""Sine below which two bisectors are parallel: they meet nowhere."""
+
+
+@dataclass(frozen=True)
+class MinimumZone:
+    """Two concentric circles.
+
+    Attributes:
+        centre_mm: their centre (x, y) [mm].
+        inner_mm: radius of the inner one [mm].
+        outer_mm: radius of the outer one [mm].
+    """
+
+    centre_mm: tuple[float, float]
+    inner_mm: float
+    outer_mm: float
+
+    @property
+    def width_mm(self) -> float:
+        """Their radial separation [mm]."""
+        return self.outer_mm - self.inner_mm
+
+
+def minimum_zone(points_mm: NDArray[np.float64]) -> MinimumZone:
+    """Return the minimum zone of a closed path, exactly.
+
+    Two points on the outer and two on the inner circle determine it: at a least width the chord of two points that touch
+    outside crosses that of two that touch inside [Rivlin, Approximation by circles, Computing 21 (1979)]. Its centre is
+    therefore where the bisectors of two pairs meet. All pairs of a few points are tried; the zone that is found for them is
+    no wider than that of all points. Whichever points stick out join the few, until none does: then it is that of all.
+
+    Args:
+        points_mm: of a path round the origin, shape (n, 2) [mm].
+
+    Raises:
+        TraceError: fewer than four different points.
+    """
+    points_mm = np.asarray(points_mm, dtype=np.float64)
+    chosen = _extremes(points_mm)
+    for _ in range(MOST_ROUNDS):
+        centre = _best_centre(points_mm[chosen])
+        distance = np.hypot(*(points_mm - centre).T)
+        near, far = int(np.argmin(distance)), int(np.argmax(distance))
+        within = distance[chosen]
+        if distance[far] - distance[near] <= np.ptp(within) + AGREED_MM:
+            return MinimumZone((float(centre[0]), float(centre[1])), float(distance[near]), float(distance[far]))
+        chosen = np.unique([*chosen, near, far])
+    raise TraceError("its minimum zone was not found", remedy="report this recording: it should always be found")
+
+
+def _extremes(points_mm: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Indices of the farthest and nearest point of each sector."""
+    if len(np.unique(points_mm, axis=0)) < FEWEST_POINTS:
+        raise TraceError("it has fewer than four points", remedy="record more of the turn")
+    middle = points_mm.mean(axis=0)
+    x, y = (points_mm - middle).T
+    radius = np.hypot(x, y)
+    sector = ((np.arctan2(y, x) / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64)
+    found = [np.arange(min(FEWEST_POINTS, len(points_mm)))]
+    for one in range(SECTORS):
+        inside = np.flatnonzero(sector == one)
+        if len(inside):
+            found.append(inside[[np.argmax(radius[inside]), np.argmin(radius[inside])]])
+    return np.unique(np.concatenate(found))
+
+
+def _best_centre(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Centre of the minimum zone of a few points, by all crossings of the bisectors of two pairs, shape (2,) [mm]."""
+    pairs = np.array(list(combinations(range(len(points_mm)), 2)))
+    first, second = points_mm[pairs[:, 0]], points_mm[pairs[:, 1]]
+    along = second - first
+    length = np.hypot(along[:, 0], along[:, 1])
+    apart = length > 0.0
+    along, middle = along[apart] / length[apart, None], (0.5 * (first + second))[apart]
+    offset = np.sum(along * middle, axis=1)
+    one, other = np.triu_indices(len(along), 1)
+    sine = along[one, 0] * along[other, 1] - along[one, 1] * along[other, 0]
+    meet = np.abs(sine) > PARALLEL
+    one, other, sine = one[meet], other[meet], sine[meet]
+    x = (offset[one] * along[other, 1] - offset[other] * along[one, 1]) / sine
+    y = (along[one, 0] * offset[other] - along[other, 0] * offset[one]) / sine
+    # Circles about several points have their widths at once: (crossings, points).
+    distance = np.hypot(points_mm[:, 0] - x[:, None], points_mm[:, 1] - y[:, None])
+    best = int(np.argmin(np.ptp(distance, axis=1)))
+    return np.array([x[best], y[best]])

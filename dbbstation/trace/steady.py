@@ -1,0 +1,68 @@
+"""A length that does not change, from many readings of it: mean and standard uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+BATCHES = 10
+"""Readings that follow each other closely see the same vibration and the same draught; their batches hardly do."""
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Mean of readings of one length.
+
+    Attributes:
+        mean_mm: mean [mm].
+        uncertainty_mm: its standard uncertainty, resolution included [mm].
+        scatter_mm: standard deviation of single readings [mm].
+        drift_mm: mean of the last batch minus that of the first [mm].
+        resolution_mm: step of the readings [mm].
+        count: readings.
+    """
+
+    mean_mm: float
+    uncertainty_mm: float
+    scatter_mm: float
+    drift_mm: float
+    resolution_mm: float
+    count: int
+
+
+def steady(readings_mm: NDArray[np.float64], resolution_mm: float | None = None) -> Steady:
+    """Return mean and standard uncertainty of readings of one length.
+
+    The type A part is the standard deviation of the mean of ten batches, since readings that follow each other are not
+    independent [GUM 4.2.3, 4.2.7]. The resolution adds its rectangular distribution, d / sqrt(12) [GUM F.2.2.1], which averaging does
+    not take away where the length does not move.
+
+    Args:
+        readings_mm: in time order, shape (n,), at least twenty [mm].
+        resolution_mm: step of the readings; None: the smallest difference between two of them [mm].
+
+    Raises:
+        ValueError: fewer readings, or all are alike and no resolution is given.
+    """
+    if len(readings_mm) < 2 * BATCHES:
+        raise ValueError(f"{len(readings_mm)} readings, at least {2 * BATCHES} are needed")
+    if resolution_mm is None:
+        steps = np.diff(np.unique(readings_mm))
+        if not len(steps):
+            raise ValueError("all readings are alike: the resolution has to be given")
+        resolution_mm = float(steps.min())
+    means = np.array([batch.mean() for batch in np.array_split(readings_mm, BATCHES)])
+    of_mean = float(means.std(ddof=1)) / np.sqrt(BATCHES)
+    return Steady(
+        mean_mm=float(readings_mm.mean()),
+        uncertainty_mm=float(np.hypot(of_mean, resolution_mm / np.sqrt(12.0))),
+        scatter_mm=float(readings_mm.std(ddof=1)),
+        drift_mm=float(means[-1] - means[0]),
+        resolution_mm=resolution_mm,
+        count=len(readings_mm),
+    )

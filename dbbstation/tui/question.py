@@ -1,0 +1,53 @@
+"""Asked before a running circle is given up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+if TYPE_CHECKING:
+    from textual.app import ComposeResult
+    from textual.binding import BindingType
+
+
+class GiveUpQuestion(ModalScreen[bool]):
+    """Returns whether to do what ends the run.
+
+    Args:
+        run: name of the run that goes on.
+        act: what was asked for, as a verb with a capital letter.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("y", "answer(True)", "Yes"),
+        ("n,escape,ctrl+c,q", "answer(False)", "Go on"),
+    ]
+
+    DEFAULT_CSS = """
+    GiveUpQuestion {
+        align: center middle;
+        & > Vertical { width: 60; max-width: 90%; height: auto; padding: 1 2; background: $panel; border: thick $warning; }
+    }
+    """
+
+    def __init__(self, run: str, act: str) -> None:
+        super().__init__()
+        self.run = run
+        self._act = act
+
+    def compose(self) -> ComposeResult:
+        """Ask."""
+        text = (
+            f"The circle {self.run} is being recorded. {self._act} all the same?\n\n"
+            "What was recorded so far is kept, but the run has to be measured again. The machine is not stopped.\n\n"
+            f"Y  {self._act.lower()}      N or Esc  go on"
+        )
+        with Vertical():
+            yield Static(text, markup=False)
+
+    def action_answer(self, answer: bool) -> None:  # noqa: FBT001 - called by a key's action string
+        """Close with the answer."""
+        self.dismiss(answer)

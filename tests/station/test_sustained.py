@@ -1,0 +1,169 @@
+"""Capture keeps up: the full rate of a line of 921,600 baud over a pseudo-terminal, into the journal of a session.
+
+`pytest -m nightly tests/station/test_sustained.py -s` does it for ten minutes and prints what it took.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import threading
+import time
+import tty
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.recordings import journal
+from dbbstation.files.recordings.run_csv import read_run
+from dbbstation.instrument.driver import Instrument, Tally
+from dbbstation.instrument.library import load_instrument
+from dbbstation.station import events
+from dbbstation.station.assembly import Job, assemble
+from dbbstation.station.commands import Quit, Start
+from dbbstation.station.detector import Patience
+from tests.station.bench import MACHINE_FILE
+
+BAUD = 921_600
+SENDER = Path(__file__).with_name("line_sender.py")
+PROMISED_S = 1.0
+"""On the disk, from the moment that a reading was taken."""
+
+MEMORY_BYTES = 8_000_000
+"""What a process may grow by from its first tenth on; a second of samples in lists has 0.4 MB, ten minutes 200 MB."""
+
+
+class Watched:
+    """An instrument whose readings are followed until they are on the disk."""
+
+    def __init__(self, instrument: Instrument) -> None:
+        self._instrument = instrument
+        self._batch_s: float | None = None
+        self._waiting_s: float | None = None
+        self.behind_s = 0.0
+        self.count = 0
+
+    def drain(self):
+        readings = self._instrument.drain()
+        if readings:
+            self.count += len(readings)
+            self._batch_s = readings[0].t_s
+            if self._waiting_s is None:
+                self._waiting_s = self._batch_s
+        return readings
+
+    def synced(self) -> None:
+        """Everything up to somewhere in this batch is on the disk now."""
+        if self._waiting_s is not None:
+            self.behind_s = max(self.behind_s, time.monotonic() - self._waiting_s)
+        self._waiting_s = self._batch_s
+
+
+def resident_bytes() -> int:
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize()
+
+
+@dataclass
+class Captured:
+    """What came of a capture.
+
+    Attributes:
+        sent: what the sender says of the line.
+        tally: what the driver says of it.
+        behind_s: longest time from a reading to the disk [s].
+        lost: samples lost, as the sequence was told.
+        memory: bytes in use, every half second.
+        cpu: share of one core.
+    """
+
+    sent: dict[str, float]
+    tally: Tally
+    behind_s: float
+    lost: int
+    memory: list[int]
+    cpu: float
+
+
+def capture(job: Job, port: str, line: int, seconds: float, monkeypatch: pytest.MonkeyPatch) -> Captured:
+    """Record one run from a line at its full rate."""
+    lost, memory = [0], list[int]()
+    with Instrument(load_instrument("streaming-encoder"), port, baud=BAUD, timeout_s=5.0) as instrument:
+        source = Watched(instrument)
+        fsync = os.fsync
+
+        def told_fsync(handle: int) -> None:
+            fsync(handle)
+            source.synced()
+
+        monkeypatch.setattr(journal.os, "fsync", told_fsync)
+        workplace = assemble(job, source)
+        station = workplace.station
+
+        def answer(event: events.Event) -> None:
+            if isinstance(event, events.RunAnnounced):
+                station.send(Start())
+            elif isinstance(event, events.SamplesRecorded):
+                lost[0] += sum(sample.lost for sample in event.samples)
+
+        station.subscribe(answer)
+        words = [sys.executable, str(SENDER), str(line), str(BAUD), str(seconds)]
+        with subprocess.Popen(words, pass_fds=[line], stdout=subprocess.PIPE) as sender:
+
+            def watch() -> None:
+                while sender.poll() is None:
+                    memory.append(resident_bytes())
+                    time.sleep(0.5)
+                time.sleep(0.5)  # for what is still under way
+                station.send(Quit())
+
+            watcher = threading.Thread(target=watch)
+            begun_s, cpu_s = time.monotonic(), time.process_time()
+            watcher.start()
+            station.run()
+            cpu = (time.process_time() - cpu_s) / (time.monotonic() - begun_s)
+            watcher.join()
+            sent = json.loads(sender.stdout.read())
+        workplace.close()
+        return Captured(sent, instrument.tally, source.behind_s, lost[0], memory, cpu)
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory and pseudo-terminals of Linux")
+@pytest.mark.parametrize(
+    "seconds", [pytest.param(20.0, marks=pytest.mark.slow), pytest.param(600.0, marks=pytest.mark.nightly)]
+)
+def test_a_line_at_its_full_rate_loses_nothing(plan_file: Path, tmp_path: Path, monkeypatch, seconds: float) -> None:
+    line, port = os.openpty()
+    tty.setraw(port)
+    machine, plan = read_machine(MACHINE_FILE), read_inline_plan(plan_file)
+    job = Job(machine, plan, tmp_path / "session", patience=Patience(turn_factor=1e6))
+    found = capture(job, os.ttyname(port), line, seconds, monkeypatch)
+    os.close(line)
+    os.close(port)
+    (part,) = (tmp_path / "session" / "runs").glob("*.part")
+    rows = part.read_bytes().count(b"\n") - 4
+    grown = found.memory[-1] - found.memory[len(found.memory) // 10]
+    sent, tally = found.sent, found.tally
+    sys.stdout.write(
+        f"\n{seconds:g} s at {BAUD} baud: {sent['frames']} frames sent, {tally.readings} read, {rows} in the journal, "
+        f"{tally.lost} lost, {sent['dropped_bytes']} bytes dropped by the line, {tally.garbage_bytes} not understood; "
+        f"{tally.readings / sent['seconds']:.0f} readings/s; CPU {100 * found.cpu:.0f} % of one core; "
+        f"disk at most {found.behind_s:.2f} s behind; memory grew by {grown / 1e6:.1f} MB; "
+        f"the sender was late by {sent['latest_s']:.3f} s at most\n"
+    )
+    assert sent["dropped_bytes"] == 0
+    # Who joins a stream cannot know that the first frame is whole.
+    assert (tally.readings, tally.lost, tally.garbage_bytes) == (sent["frames"] - 1, 0, 0)
+    assert found.lost == 0
+    # The run begins with the third reading that agrees.
+    assert rows == tally.readings - 2
+    assert found.behind_s < PROMISED_S
+    assert grown < MEMORY_BYTES
+    if seconds < 60.0:
+        assert len(read_run(part).recording) == rows

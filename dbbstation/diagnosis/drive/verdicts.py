@@ -176,18 +176,14 @@ class Verdicts:
 
     def _absent(self, source: DriveSource, own: Sequence[Finding]) -> tuple[Verdict, str]:
         """Verdict on what is not in the model, and why."""
-        scale = self._drive.scale
-        if faint := [f for f in own if self._is_member(f)]:
-            return Verdict.NOT_TESTABLE, (
-                f"What it would explain, {faint[0].rms:.2g} N rms, is less than filters and differences leave of a perfect drive."
-            )
         looked_for = {COGGING: lambda: self._no_cogging(own), TRANSIENT: self._no_transient}
+        if why := self._hidden(source, own):
+            return Verdict.NOT_TESTABLE, why
         if source.name in looked_for:
             return looked_for[source.name]()
-        if not own and not scale.reverses and not source.forms(scale):
-            return Verdict.NOT_TESTABLE, "The drive never reverses here, and only a reversal would show it."
         for finding in own:
-            if finding.verdict is Verdict.NOT_TESTABLE:
+            # What nothing tells from something else, were it only a force without a name, would not have been seen.
+            if finding.verdict in {Verdict.NOT_TESTABLE, Verdict.AMBIGUOUS}:
                 return Verdict.NOT_TESTABLE, finding.text
         refused = [f.text for f in own if f.text and f.probability == 0.0 and not f.values]
         refused += [why for name, why in self._explained.refused.items() if name.split(" ")[0] == source.name]
@@ -195,6 +191,17 @@ class Verdicts:
             return Verdict.NOT_TESTABLE, "This recording leaves it open: it neither shows nor excludes it."
         not_needed = "It would have been seen at its plausible size and was not needed."
         return Verdict.RULED_OUT, refused[0] if refused else not_needed
+
+    def _hidden(self, source: DriveSource, own: Sequence[Finding]) -> str:
+        """Why a cause could not have been seen, whatever was compared; empty where it could."""
+        scale = self._drive.scale
+        if faint := [f for f in own if self._is_member(f)]:
+            return f"What it would explain, {faint[0].rms:.2g} N rms, is less than filters and differences leave of a perfect drive."
+        if source.name == COULOMB and not self._several:
+            return "One speed tells the sum of Coulomb and viscous friction, and no more."
+        if not own and source.name not in {COGGING, TRANSIENT} and not scale.reverses and not source.forms(scale):
+            return "The drive never reverses here, and only a reversal would show it."
+        return ""
 
     def _no_cogging(self, own: Sequence[Finding]) -> tuple[Verdict, str]:
         """No wave was found: within the band there is none, and beyond it there may be."""

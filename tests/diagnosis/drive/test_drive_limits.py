@@ -49,9 +49,6 @@ def test_without_reversals_friction_and_load_are_one_sum():
         assert abs(number["value"] - true) < 3.0 * number["uncertainty"]
 
 
-@pytest.mark.xfail(
-    strict=True, reason="Coulomb friction is ruled out as negative, where one speed cannot tell it at all"
-)
 def test_one_constant_speed_gives_one_force_and_no_mass():
     summary = answered(*record(DRY, at_constant_speed(0.02, 10.0)))
     assert not summary["parameters"]["mass_kg"]["identifiable"]

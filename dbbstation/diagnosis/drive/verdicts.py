@@ -49,11 +49,31 @@ class Verdicts:
 
     @property
     def named(self) -> list[str]:
-        """Members of the best hypothesis that belong to a source, largest first."""
+        """Members of the best hypothesis that belong to a source, of the source first that moves the force most.
+
+        Not the Bayes factor orders them: noise has less power at some frequencies than at others, so that a newton of ripple is
+        surer than five newtons that change slowly, and yet explains less of the force.
+        """
         best = self._explained.settled.best
         faint = {f.name for f in self._raw if f.rms < self._least_n}
         names = [m.cause.name for m in best.members if self._source_of.get(m.cause.name) and m.cause.name not in faint]
-        return sorted(names, key=lambda name: -best.log_factor(name))
+        squares = {f.name: f.rms**2 for f in self._raw}
+        moved = {
+            source: sum(squares[name] for name in names if self._source_of[name] == source)
+            for source in {self._source_of[name] for name in names}
+        }
+        return sorted(names, key=lambda name: (-moved[self._source_of[name]], -squares[name]))
+
+    @property
+    def predicting(self) -> list[str]:
+        """Those of `named` that a model is to predict with, largest first.
+
+        Of named causes that nothing tells apart one is there, and any of them predicts alike. A cause that is ambiguous by itself,
+        since its size differs between parts of the recording or nothing decides on it, is fitted beside the others as forces without
+        a name are, and does not predict.
+        """
+        sure = {f.name for f in self.findings() if f.verdict is Verdict.IDENTIFIED or f.ambiguous_with}
+        return [name for name in self.named if self.source_of(name) in sure]
 
     def source_of(self, name: str) -> str:
         """Source that a member belongs to; empty where it has no name."""

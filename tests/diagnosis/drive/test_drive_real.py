@@ -34,9 +34,6 @@ def test_mass_and_viscous_friction_are_not_enough(summary):
     assert 0.15 < before["relative_force_error"] < 0.20
 
 
-@pytest.mark.xfail(
-    strict=True, reason="cogging and delay have greater Bayes factors in noise that grows with the acceleration"
-)
 def test_coulomb_friction_is_named_first_and_its_asymmetry_next(summary):
     steps = summary["held_back"]["steps"]
     assert [step["added"] for step in steps[1:3]] == ["coulomb-friction", "friction-asymmetry"]

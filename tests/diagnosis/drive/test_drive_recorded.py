@@ -105,8 +105,15 @@ def test_friction_at_32_speeds(recorded):
 
 def test_a_motor_to_and_fro(recorded):
     summary = answered(recorded("drives/motor-to-and-fro.csv"), force_per_ampere=10.0)
-    coulomb = sources(summary)["coulomb-friction"]
+    found = sources(summary)
+    coulomb = found["coulomb-friction"]
     assert coulomb["verdict"] != "ruled-out"
+    # What is ambiguous by itself is told and is not predicted with.
+    steps = [step["added"] for step in summary["held_back"]["steps"][1:]]
+    assert all(found[name]["verdict"] == "identified" or found[name]["ambiguous_with"] for name in steps)
+    assert not set(steps) & set(summary["held_back"]["not_in_model"])
+    error = summary["held_back"]["relative_force_error"]
+    assert error["after"] < error["before"]
     viscous = summary["parameters"]["viscous_n_s_m"]
     assert not viscous["identifiable"] or abs(viscous["value"] - 1.2) < 3.0 * viscous["uncertainty"]
     if coulomb["verdict"] == "identified":

@@ -191,7 +191,7 @@ def opener(
             if helper is not None:
                 workplace.station.subscribe(helper)
             try:
-                yield OpenStation(workplace.station, workplace.schedule, str(job.folder))
+                yield OpenStation(workplace.station, workplace.schedule, str(job.folder), workplace.judge.known())
             finally:
                 workplace.close()
 

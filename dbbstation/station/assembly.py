@@ -84,11 +84,13 @@ class Workplace:
         station: subscribe to it, send it commands, run it.
         schedule: what is done and left.
         writer: of the session folder.
+        judge: knows the figures and findings of every run that counts.
     """
 
     station: Station
     schedule: Schedule
     writer: SessionWriter
+    judge: RunJudge
     _storage: Storage
 
     def close(self) -> None:
@@ -132,4 +134,4 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     station.subscribe(storage)
     station.subscribe(judge)
     station.regularly(storage.sync_if_due)
-    return Workplace(station, schedule, writer, storage)
+    return Workplace(station, schedule, writer, judge, storage)

@@ -101,8 +101,13 @@ class Workplace:
             self.writer.close()
 
 
-def assemble(job: Job, source: ReadingSource) -> Workplace:
+def assemble(job: Job, source: ReadingSource, unreadable: Callable[[], Mapping[str, int]] = dict) -> Workplace:
     """Open the session and build the station; storage is its first observer.
+
+    Args:
+        job: what is measured.
+        source: started instrument.
+        unreadable: what its driver rejected so far, by what was wrong with it.
 
     Raises:
         InputError: the folder holds another session, or one with faults.
@@ -118,7 +123,7 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     names = {key: program.name for key, program in job.programs.items()}
     # Real runs bear the computer's time, so that they fit what thermometers log.
     now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
-    storage = Storage(writer, now, kept)
+    storage = Storage(writer, now, kept, unreadable)
     judge = RunJudge(writer, kept)
     sequencer = Sequencer(
         plan,

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.recordings.entries import RunEntry, RunState
-from dbbstation.files.recordings.judged import JUDGED, runs_of
+from dbbstation.files.recordings.judged import runs_of
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
 from dbbstation.station import events
+from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,7 +38,7 @@ class RunJudge:
         self._counting: dict[tuple[str, Direction, int], Seen] = {}
         self._waiting: dict[tuple[str, Direction, int], Seen] = {}
         for entry in writer.runs:
-            if entry.state in JUDGED:
+            if entry.state is RunState.ACCEPTED:
                 self._read(entry)
 
     def __call__(self, event: Event) -> None:
@@ -49,6 +50,19 @@ class RunJudge:
         elif isinstance(event, events.RunRejected):
             for known in (self._counting, self._waiting):
                 known.pop(_key(event.run), None)
+
+    def known(self) -> tuple[events.RunCompleted, ...]:
+        """Return what accepted runs say, from disk: figures and findings of each beside the others."""
+        together = SessionRuns(list(self._counting.values()))
+        mountings = {_key(entry): entry.mounting or 0 for entry in self._writer.runs}
+        found = []
+        for key, one in self._counting.items():
+            shown = None if one.analysis is None else figures(one.analysis.raw)
+            run = events.RunId(*key, mountings[key])
+            samples = len(one.run.recording)
+            findings = () if shown is None else together.judge(one).findings
+            found.append(events.RunCompleted(run, samples, one.lost[0], shown, one.problem, findings))
+        return tuple(found)
 
     def judge(self, run: RunId, recording: Recording) -> tuple[Finding, ...]:
         """Return all findings of a run that has just been recorded.

@@ -34,6 +34,7 @@ class Storage:
         writer: of the session folder.
         now: the time of day with its zone.
         programs: NC program, kept in the session already, by test and direction.
+        unreadable: what the driver rejected so far, by what was wrong with it.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class Storage:
         writer: SessionWriter,
         now: Callable[[], datetime] | None = None,
         programs: Mapping[tuple[str, Direction], Program] | None = None,
+        unreadable: Callable[[], Mapping[str, int]] = dict,
     ) -> None:
         self._writer = writer
         self._now = now or (lambda: datetime.now(UTC))
@@ -48,6 +50,8 @@ class Storage:
         self._journal: RunWriter | None = None
         self._received = self._lost = 0
         self._rejected: Counter[str] = Counter()
+        self._unreadable = unreadable
+        self._unreadable_before: Counter[str] = Counter()
 
     def __call__(self, event: events.Event) -> None:
         """Keep what the event says.
@@ -61,7 +65,9 @@ class Storage:
             case events.SamplesRecorded():
                 self._append(event.samples)
             case events.RunCompleted() if self._journal is not None:
-                counts = Counts(self._received, self._lost, dict(sorted(self._rejected.items())))
+                garbled = Counter(self._unreadable()) - self._unreadable_before
+                rejected = self._rejected + Counter({f"unreadable {why}": count for why, count in garbled.items()})
+                counts = Counts(self._received, self._lost, dict(sorted(rejected.items())))
                 self._writer.finish_run(self._journal, counts)
                 self._journal = None
             case events.RunAccepted():
@@ -119,6 +125,7 @@ class Storage:
     def _start(self, run: events.RunId) -> None:
         self._received = self._lost = 0
         self._rejected.clear()
+        self._unreadable_before = Counter(self._unreadable())
         self._journal = self._writer.start_run(
             run.test,
             run.direction,

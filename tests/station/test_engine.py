@@ -155,7 +155,8 @@ def test_what_came_over_the_line_is_counted_in_run_file_and_session(plan_file: P
     readings[9] = replace(readings[9], status="overrange", said="beyond its range")
     readings[10] = replace(readings[10], status="overrange", said="beyond its range")
     source = Script(readings)
-    workplace = assemble(Job(read_machine(MACHINE_FILE), plan, tmp_path / "session"), source)
+    garbled = iter([{"checksum": 2}, {"checksum": 5, "bytes": 1}])
+    workplace = assemble(Job(read_machine(MACHINE_FILE), plan, tmp_path / "session"), source, lambda: next(garbled))
     station = workplace.station
     told: list[events.Event] = []
 
@@ -173,10 +174,15 @@ def test_what_came_over_the_line_is_counted_in_run_file_and_session(plan_file: P
     (run,) = read_session(tmp_path / "session").runs
     completed = next(event for event in told if isinstance(event, events.RunCompleted))
     text = run.path.read_text(encoding="utf-8")
+    garbled_lines = "# rejected unreadable bytes: 1\n# rejected unreadable checksum: 3\n"
     rows = [line for line in text.splitlines() if line[0].isdigit()]
-    assert run.counts == Counts(len(rows), 2, {"fault": 1, "overrange": 2})
+    assert run.counts == Counts(
+        len(rows), 2, {"fault": 1, "overrange": 2, "unreadable bytes": 1, "unreadable checksum": 3}
+    )
     assert completed.samples == len(rows)
-    assert text.endswith(f"# received: {len(rows)}\n# lost: 2\n# rejected fault: 1\n# rejected overrange: 2\n")
+    assert text.endswith(
+        f"# received: {len(rows)}\n# lost: 2\n# rejected fault: 1\n# rejected overrange: 2\n{garbled_lines}"
+    )
     assert read_run(run.path).header["lost"] == "2"
 
 

@@ -22,6 +22,7 @@ from dbbstation.station import events
 from dbbstation.station.assembly import Job, Workplace, assemble
 from dbbstation.station.commands import Accept, Judge, Quit, Reject, Repeat, Start
 from dbbstation.station.states import State
+from dbbstation.trace.analysis import CircleFigures
 from dbbstation.virtual.machine import VirtualMachine
 from dbbstation.virtual.truth import random_kinematics
 from tests.station.bench import MACHINE_FILE
@@ -66,6 +67,7 @@ class Shop:
         self.pull_at: str = ""
         self.leave_at: str = ""
         self.found: dict[str, list[str]] = {}
+        self.figures: dict[str, CircleFigures | None] = {}
         self.revoke: list[str] = []
         self.offered: list[str] = []
         self._now_s = 0.0
@@ -101,6 +103,7 @@ class Shop:
             case events.RunRestored():
                 self.offered.append(event.run.label)
             case events.RunCompleted():
+                self.figures[event.run.label] = event.figures
                 self.found[event.run.label] = [str(finding.name) for finding in event.wrong]
             case events.StateChanged(state=State.ANNOUNCED):
                 if self.revoke:
@@ -159,6 +162,14 @@ def test_fifteen_tests_with_every_mishap(tmp_path: Path, seed: int) -> None:
     assert "other direction" in found.pop("i-cw-1")
     # Sound circles: one false alarm in a thousand runs.
     assert found == {}
+    again = assemble(shop.job, shop)
+    again.close()
+    from_disk = {one.run.label: one for one in again.judge.known()}
+    assert len(from_disk) == 30
+    # Figures and findings are those that were told when the runs were measured.
+    assert {label: [str(f.name) for f in one.wrong] for label, one in from_disk.items() if one.wrong} == {}
+    for label, one in from_disk.items():
+        assert one.figures.centre_mm == pytest.approx(shop.figures[label].centre_mm, abs=2e-6)
     session = read_session(shop.job.folder)
     rejected = {run.label for run in session.in_state(RunState.REJECTED)}
     assert rejected == {"b ccw 1", "d cw 1", "e ccw 1", "g cw 1", "h ccw 1", "i cw 1"}

@@ -50,7 +50,8 @@ class Counts:
     Attributes:
         received: samples in the run file.
         lost: samples that the line lost between them.
-        rejected: samples of the file that no calculation uses, by what the instrument said of them.
+        rejected: samples of the file that no calculation uses, by what the instrument said of them; and bytes that were no sample,
+            by what was wrong with them (`unreadable checksum`).
     """
 
     received: int

@@ -150,6 +150,8 @@ def _measured(
     session: SessionFolder, run: RunEntry, recording: Recording, chosen: Filter, judgement: Judgement | None
 ) -> MeasuredCircle:
     known = _known(session, run, recording)
+    if judgement is not None and judgement.analysis is not None and not chosen:
+        return MeasuredCircle(session.name, run, judgement.analysis, "", known, judgement)  # without a filter already
     try:
         named = replace(recording, name=run.label)
         analysis = analyse(cut(named, session.circle(run)), named, chosen)

@@ -32,7 +32,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
         ("serial number", session.serial_number or _NOT_NOTED),
         ("operator", session.operator or _NOT_NOTED),
         ("job", job or _NOT_NOTED),
-        ("measured", _when(session)),
+        ("measured", when_measured(session)),
         ("plan", session.plan.name),
         ("runs", _runs(session)),
         ("programs", f"{compensated} of {accepted} accepted runs under NC programs that the session keeps"),
@@ -44,7 +44,8 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
     )
 
 
-def _when(session: SessionFolder) -> str:
+def when_measured(session: SessionFolder) -> str:
+    """Return the starts of the first and the last run of a session, in words."""
     moments = [run.started for run in session.runs if run.started is not None]
     return f"{min(moments):%Y-%m-%d %H:%M} to {max(moments):%Y-%m-%d %H:%M %Z}" if moments else _NOT_NOTED
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from dbbstation.circled import circled_summary
 from dbbstation.plan.tolerance import CircleFigure
-from dbbstation.report.conditions import conditions
+from dbbstation.report.conditions import conditions, when_measured
 from dbbstation.report.model_part import not_visible, parameters
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
@@ -103,14 +103,18 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
     return {
         **numbers,
         "machine": found.sessions[0].machine.name,
+        "job": reported.job,
         "sessions": [
             {
                 "name": session.name,
-                "conditions": conditions(session, [c for c in found.circles if c.session == session.name], job),
+                "measured": when_measured(session),
+                "conditions": conditions(
+                    session, [c for c in found.circles if c.session == session.name], reported.job
+                ),
                 "places": plate_map({name: session.plan.tests[name] for name in _tests_of(found, session.name)}, bad),
                 "known": all(session.plan.tests[name].ball.place_known for name in _tests_of(found, session.name)),
             }
-            for session, job in ((session, reported.job) for session in found.sessions)
+            for session in found.sessions
             if any(c.session == session.name for c in found.circles)
         ],
         "map_width": WIDTH,

@@ -67,12 +67,11 @@ class Reported:
 
 def numbers_of(reported: Reported) -> dict[str, Any]:
     """Return the numbers of a report: what its command prints as JSON, and its template shows."""
-    held = held_against(
-        reported.settings.tolerances, tolerated_circles(reported.found.circles), reported.coverage_factor
-    )
+    now = tolerated_circles(reported.found.circles)
+    held = held_against(reported.settings.tolerances, now, reported.coverage_factor)
     verdict = verdict_of(held, reported.found, reported.coverage_factor)
     before = () if reported.before is None else tolerated_circles(reported.before.circles)
-    rows = list(_side_by_side(tolerated_circles(reported.found.circles), before))
+    rows = list(_side_by_side(now, before))
     return {
         "verdict": {
             "kind": verdict.kind,

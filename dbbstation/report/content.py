@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.circled import circled_summary
+from dbbstation.machine.difference import differences, in_words
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.report.conditions import conditions, when_measured
 from dbbstation.report.model_part import not_visible, parameters
@@ -52,7 +53,6 @@ class Reported:
         before: circles measured before; None where none are given.
         modelled: a model beside them; None where none is given.
         job: what was measured for; empty where not said.
-        notes: what was found beside.
     """
 
     found: Circled
@@ -62,7 +62,6 @@ class Reported:
     before: Circled | None = None
     modelled: Modelled | None = None
     job: str = ""
-    notes: tuple[str, ...] = field(default=())
 
 
 def numbers_of(reported: Reported) -> dict[str, Any]:
@@ -132,10 +131,20 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
             "parameters": parameters(modelled.identified, reported.coverage_factor),
             "not_visible": not_visible(modelled.identified),
         },
-        "notes": [*found.warnings, *(() if reported.before is None else reported.before.warnings), *reported.notes],
+        "notes": [*found.warnings, *_notes_before(reported)],
         "files": list(_files(reported, provenance)),
         "provenance": provenance,
     }
+
+
+def _notes_before(reported: Reported) -> list[str]:
+    """Return what is to be said of the circles before: where they are of another machine, first of all."""
+    if reported.before is None:
+        return []
+    one, other = reported.before.sessions[0].machine, reported.found.sessions[0].machine
+    unlike = differences(one, other)
+    told = f"The session before is of another nominal machine; before and now: {in_words(unlike)}."
+    return [*([told] if unlike else []), *reported.before.warnings]
 
 
 def _tests_of(found: Circled, session: str) -> list[str]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
 import pytest
 
-from dbbstation.report.polar import BINS, CIRCLE, REACH, SIZE, _points, step_of
+from dbbstation.circled import load_circles
+from dbbstation.circles.path import Filter
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.report.polar import BINS, CIRCLE, MOST_DRAWN, REACH, SIZE, _points, polar, step_of
 from dbbstation.tolerated import Conformity, Size, conformity
 
 STYLE = (resources.files("dbbstation.report") / "templates" / "style.css").read_text("utf-8")
@@ -72,6 +76,17 @@ def test_a_long_recording_is_drawn_small_and_its_peak_stays():
     assert np.sort(radius)[-2] == pytest.approx(CIRCLE, abs=0.1)
     peak = points[np.argmax(radius)] - SIZE / 2
     assert np.degrees(np.arctan2(-peak[1], peak[0])) == pytest.approx(theta[12_345], abs=0.1)
+
+
+def test_of_a_hundred_repeats_the_last_are_drawn():
+    found = load_circles([shipped_folder("fixtures") / "sessions" / "small"], Filter.NONE, ["g"])
+    runs = [replace(one, entry=replace(one.entry, repeat=k)) for k in range(1, 101) for one in found.circles]
+    drawn = polar("g", runs)
+    assert len(drawn.traces) == 2 * MOST_DRAWN
+    assert drawn.not_drawn == 200 - 2 * MOST_DRAWN
+    assert [trace.thin for trace in drawn.traces].count(False) == 2
+    assert sum(len(trace.points) for trace in drawn.traces) < 2 * MOST_DRAWN * 2 * BINS * len("123.4,123.4 ")
+    assert drawn.traces[-1].title.startswith("g cw 100: G ")
 
 
 def test_a_limit_within_the_uncertainty_decides_nothing():

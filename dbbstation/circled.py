@@ -212,7 +212,7 @@ def circled_summary(found: Circled, chosen: Filter) -> dict[str, Any]:
         if circle.analysis is not None:
             run |= circle_summary(circle.analysis, budgets(circle.analysis, circle.known))
         if circle.judgement is not None:
-            run["findings"] = findings_summary(circle.judgement)
+            run["findings"] = findings_summary(circle.judgement.findings)
         runs.append(run)
     pairs = [
         {

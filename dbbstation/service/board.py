@@ -51,11 +51,13 @@ class SequenceOpened:
         tasks: runs that the plan asks for, in their order.
         open: those without an accepted recording.
         session: where the recordings are.
+        known: what accepted runs of the session say.
     """
 
     tasks: tuple[Task, ...]
     open: tuple[Task, ...]
     session: str
+    known: tuple[events.RunCompleted, ...] = ()
 
 
 _RUN_MARKS = {

@@ -189,6 +189,19 @@ def test_before_and_now_stand_side_by_side_as_measured(session, better, tmp_path
         assert row[when]["largest_um"] == pytest.approx(max(sizes), abs=1e-6)
         assert f"{np.mean(sizes):.1f}" in Page(out.read_text("utf-8")).text
     assert out.read_text("utf-8").count('former" points') == 4
+    assert "another nominal machine" not in out.read_text("utf-8")
+
+
+def test_before_of_another_machine_is_said(session, tmp_path):
+    machine = tmp_path / "copy" / "machine.yaml"
+    folder = copy_of(session, tmp_path)
+    text = machine.read_text("utf-8")
+    joint = re.search(r"base_joints_mm:\D*(-?\d+\.\d+)", text)
+    machine.write_text(text[: joint.start(1)] + f"{float(joint[1]) + 1.0:.6f}" + text[joint.end(1) :], "utf-8")
+    out = tmp_path / "other.html"
+    outcome = call("report", session, "--before", folder, "--out", out)
+    assert outcome.code == DONE, outcome.err
+    assert "The session before is of another nominal machine" in out.read_text("utf-8")
 
 
 def test_a_model_stands_beside(tmp_path):

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.circled import MeasuredCircle
+    from dbbstation.files.recordings.entries import Note
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.plan.bar import Bar
 
@@ -39,6 +40,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
         *_bar(session.bar, session.bar_waiver),
         ("temperature of the shop", _degc(session.ambient_temp_c)),
         ("logged temperatures", _logged(circles)),
+        *(("noted", _noted(note)) for note in session.notes),
         ("seal", _seal(session)),
         *(("changed since", amendment.text) for amendment in session.amendments),
     )
@@ -69,6 +71,11 @@ def _bar(bar: Bar | None, waiver: str) -> tuple[tuple[str, str], ...]:
         ("thermal expansion of the bar", grows),
         *without,
     )
+
+
+def _noted(note: Note) -> str:
+    shop = "" if note.ambient_temp_c is None else f"shop at {_degc(note.ambient_temp_c)}"
+    return f"{note.made:%Y-%m-%d %H:%M %Z}: {'; '.join(part for part in (note.text, shop) if part)}"
 
 
 def _degc(value: float | None) -> str:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis, analyse, analyse_pair
-from dbbstation.circles.budget import SetUpKnowledge
+from dbbstation.circles.analysis import EDITION, CircleAnalysis, PairAnalysis, analyse, analyse_pair
+from dbbstation.circles.budget import SetUpKnowledge, budgets, pair_budgets
+from dbbstation.circles.summary import circle_summary, pair_summary
 from dbbstation.errors import InputError, Problem, TraceError
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.judged import judge_session
 from dbbstation.files.recordings.session import SessionFolder, read_session
+from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
+from dbbstation.quality.summary import findings_summary
 from dbbstation.recorded import check_named
 from dbbstation.trace.cut import cut
 
@@ -69,11 +72,13 @@ class Circled:
         circles: in the order in which they were measured.
         pairs: both directions of one test, repeat and mounting.
         warnings: what was found beside.
+        sessions: that were read.
     """
 
     circles: tuple[MeasuredCircle, ...]
     pairs: tuple[MeasuredPair, ...]
     warnings: tuple[str, ...]
+    sessions: tuple[SessionFolder, ...]
 
 
 def load_circles(
@@ -128,7 +133,7 @@ def load_circles(
     if not circles:
         places = ", ".join(str(session.folder) for session in sessions)
         raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
-    return Circled(tuple(circles), tuple(pairs), tuple(warnings))
+    return Circled(tuple(circles), tuple(pairs), tuple(warnings), tuple(sessions))
 
 
 def _judged(
@@ -145,6 +150,8 @@ def _measured(
     session: SessionFolder, run: RunEntry, recording: Recording, chosen: Filter, judgement: Judgement | None
 ) -> MeasuredCircle:
     known = _known(session, run, recording)
+    if judgement is not None and judgement.analysis is not None and not chosen:
+        return MeasuredCircle(session.name, run, judgement.analysis, "", known, judgement)  # without a filter already
     try:
         named = replace(recording, name=run.label)
         analysis = analyse(cut(named, session.circle(run)), named, chosen)
@@ -183,3 +190,44 @@ def _pairs(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[Me
         if before is not circle and before.analysis is not None:
             pairs.append(MeasuredPair(before, analyse_pair(before.analysis, circle.analysis)))
     return pairs
+
+
+def circled_summary(found: Circled, chosen: Filter) -> dict[str, Any]:
+    """All figures of circles and pairs, with their budgets, as plain numbers: what `circles --json` prints.
+
+    Args:
+        found: the circles.
+        chosen: filter that they were worked out with.
+    """
+    runs = []
+    for circle in found.circles:
+        entry = circle.entry
+        run: dict[str, Any] = {
+            "session": circle.session,
+            "test": entry.test,
+            "direction": str(entry.direction),
+            "repeat": entry.repeat,
+            "problem": circle.problem or None,
+        }
+        if circle.analysis is not None:
+            run |= circle_summary(circle.analysis, budgets(circle.analysis, circle.known))
+        if circle.judgement is not None:
+            run["findings"] = findings_summary(circle.judgement.findings)
+        runs.append(run)
+    pairs = [
+        {
+            "session": pair.one.session,
+            "test": pair.one.entry.test,
+            "repeat": pair.one.entry.repeat,
+            **pair_summary(pair.analysis, pair_budgets(pair.analysis, pair.one.known)),
+        }
+        for pair in found.pairs
+    ]
+    return {
+        "edition": EDITION,
+        "filter": chosen.words,
+        "reference_circle": {"g_um": "minimum zone", "g_least_squares_um": "least squares", "f_um": "least squares"},
+        "false_alarms_per_run": FALSE_ALARMS_PER_RUN,
+        "runs": runs,
+        "pairs": pairs,
+    }

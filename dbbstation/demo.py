@@ -86,6 +86,7 @@ def run_demo(folder: Path, seed: int, tell: Callable[[str], None], progress: Cal
         job.measure(place, "verified", ["--programs", "programs"])
     before = job.answer(["evaluate", "measured", "--model", "joint.yaml"])
     after = job.answer(["evaluate", "verified", "--model", "joint.yaml"])
+    job.answer(["report", "verified", "--before", "measured", "--out", "report.html"])
     return DemoResult(folder, _side_by_side(before, after), diagnosis, calibration)
 
 

@@ -30,7 +30,7 @@ def test_the_whole_job(tmp_path):
     # What remains is where the balls came to stand, 0.6 to 1.9 µm per axis, and the noise of the bar.
     assert max(run["centre_deviation_um"] for run in after) < 10
     assert max(run["circularity_um"] for run in after) < 4
-    for name in ("measured", "verified", "programs", "kinematic.yaml", "joint.yaml"):
+    for name in ("measured", "verified", "programs", "kinematic.yaml", "joint.yaml", "report.html"):
         assert (tmp_path / "job" / name).exists()
 
 

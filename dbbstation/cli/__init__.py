@@ -41,6 +41,7 @@ COMMANDS = {
     "predict": "Actual poses for commanded ones, under a model.",
     "program": "NC programs of a plan's circles, nominal or compensated.",
     "replay": "Send a byte log through an instrument's driver.",
+    "report": "A session as one HTML file: verdict, figures with U.",
     "settings": "What the shop has set, and where each value comes from.",
     "session": "Runs of a session afterwards: list, accept, reject, seal.",
     "simulate": "Noise-free recordings of a plan, as a model predicts them.",

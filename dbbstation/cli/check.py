@@ -131,7 +131,7 @@ def _file(result: Checked) -> dict[str, object]:
         "summary": result.summary,
     }
     if result.judgements:
-        told["runs"] = [{"run": one.run.label, "findings": findings_summary(one)} for one in result.judgements]
+        told["runs"] = [{"run": one.run.label, "findings": findings_summary(one.findings)} for one in result.judgements]
     return told
 
 

@@ -12,8 +12,6 @@ from dbbstation.cli.chosen_tests import chosen_tests_options
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from dbbstation.circled import Circled
-    from dbbstation.circles.path import Filter
 
 FILTERS = {"none": 0, "15": 15, "50": 50, "150": 150}
 
@@ -63,7 +61,7 @@ def circles(
       dbbstation circles session --findings --model model.yaml
       dbbstation circles session --test a --budget --json
     """
-    from dbbstation.circled import load_circles
+    from dbbstation.circled import circled_summary, load_circles
     from dbbstation.circles.path import Filter
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
@@ -90,7 +88,7 @@ def circles(
         )
     for warning in found.warnings:
         say(f"note: {warning}")
-    summary = _summary(found, Filter(FILTERS[cut_off]))
+    summary = circled_summary(found, Filter(FILTERS[cut_off]))
     if out is not None:
         names, rows = _flat(summary["runs"])
         write_table(out, table_csv(names, list(zip(*rows, strict=True))), provenance(), force=force)
@@ -103,47 +101,6 @@ def circles(
         _print_budgets(summary)
     if findings:
         _print_findings(summary["runs"])
-
-
-def _summary(found: Circled, chosen: Filter) -> dict[str, Any]:
-    from dbbstation.circles.analysis import EDITION
-    from dbbstation.circles.budget import budgets, pair_budgets
-    from dbbstation.circles.summary import circle_summary, pair_summary
-    from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
-    from dbbstation.quality.summary import findings_summary
-
-    runs = []
-    for circle in found.circles:
-        entry = circle.entry
-        run: dict[str, Any] = {
-            "session": circle.session,
-            "test": entry.test,
-            "direction": str(entry.direction),
-            "repeat": entry.repeat,
-            "problem": circle.problem or None,
-        }
-        if circle.analysis is not None:
-            run |= circle_summary(circle.analysis, budgets(circle.analysis, circle.known))
-        if circle.judgement is not None:
-            run["findings"] = findings_summary(circle.judgement)
-        runs.append(run)
-    pairs = [
-        {
-            "session": pair.one.session,
-            "test": pair.one.entry.test,
-            "repeat": pair.one.entry.repeat,
-            **pair_summary(pair.analysis, pair_budgets(pair.analysis, pair.one.known)),
-        }
-        for pair in found.pairs
-    ]
-    return {
-        "edition": EDITION,
-        "filter": chosen.words,
-        "reference_circle": {"g_um": "minimum zone", "g_least_squares_um": "least squares", "f_um": "least squares"},
-        "false_alarms_per_run": FALSE_ALARMS_PER_RUN,
-        "runs": runs,
-        "pairs": pairs,
-    }
 
 
 def _print(summary: Mapping[str, Any], *, several: bool) -> None:

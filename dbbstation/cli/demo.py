@@ -103,6 +103,7 @@ _CONTENTS = (
     ("joint.yaml", "model with what the diagnosis found"),
     ("programs/", "compensated NC programs of the fifteen circles"),
     ("verified/", "session with the compensated programs"),
+    ("report.html", "all of it to read and print: open it in a browser"),
 )
 
 

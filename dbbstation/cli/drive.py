@@ -116,9 +116,15 @@ def _print(summary: Mapping[str, Any]) -> None:
     held_back = summary["held_back"]
     first, last = held_back["t_s"]
     click.echo(f"\nrelative force error on {first:.2f} to {last:.2f} s, fitted without it:")
+    before = float("inf")
     for step in held_back["steps"]:
         name = f"+ {step['added']}" if step["added"] else "mass and viscous friction"
-        click.echo(f"  {name:<26} {100 * step['relative_force_error']:6.2f} %")
+        error = step["relative_force_error"]
+        worse = "  worse than without it: it does not carry over to this stretch" if error > before else ""
+        click.echo(f"  {name:<26} {100 * error:6.2f} %{worse}")
+        before = error
+    if left_out := held_back["not_in_model"]:
+        click.echo(f"  not in the model, since nothing decides on it: {', '.join(left_out)}")
     if summary["locations"]:
         click.echo("\nwhere the misfit of mass and viscous friction is largest:")
         _print_locations(summary["locations"])

@@ -42,15 +42,12 @@ def evaluate(
       dbbstation evaluate check-session --model model.yaml
       dbbstation evaluate check-session --model model.yaml --json
     """
-    from dbbstation.calibration.reporting.evaluation import evaluate as compare
-    from dbbstation.calibration.reporting.evaluation import plane_figures
-    from dbbstation.calibration.reporting.prediction import predicted_circles
-    from dbbstation.calibration.reporting.summary import evaluation_summary
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.shop import shop_settings
     from dbbstation.cli.tolerances import held_against, print_tolerances
+    from dbbstation.evaluated import evaluated
     from dbbstation.files.formats.model import read_model
     from dbbstation.files.own_sources import every_source
     from dbbstation.machine.difference import check_model_is_of
@@ -63,21 +60,8 @@ def evaluate(
     check_model_is_of(recorded.machine, identified.model.machine)
     for warning in recorded.warnings:
         say(f"note: {warning}")
-    summary = evaluation_summary(compare(identified.model, recorded.observations))
     with count_bar("predicting runs") as predicting:
-        circles = predicted_circles(identified.model, recorded.observations, predicting)
-    for run, circle in zip(summary["runs"], circles, strict=True):
-        run["circularity_30_upr_um"] = {
-            "measured": circle.measured_um,
-            "predicted": circle.predicted_um,
-            "before": circle.before_um,
-            "after": circle.after_um,
-        }
-    height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
-    plane = plane_figures(identified.model, height_mm)
-    summary |= {"flatness_um": plane.flatness_um, "parallelism_um": plane.parallelism_um, "plane_z_mm": height_mm}
-    own, placed = identified.model.of_the_machine().sources, identified.model.anywhere().sources
-    summary["plane_without"] = [f.source.name for f in own if f not in placed and not f.source.of_currents]
+        summary = evaluated(identified, recorded, predicting)
     summary["tolerances"] = held_against(settings, summary)
     if as_json:
         print_json(summary)
@@ -88,7 +72,7 @@ def evaluate(
     click.echo()
     click.echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
     click.echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
-    click.echo(f"uncompensated at Z {height_mm:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
+    click.echo(f"uncompensated at Z {summary['plane_z_mm']:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
     if summary["plane_without"]:
         click.echo(f"(without {', '.join(summary['plane_without'])}: no pose alone says what they do)")
     click.echo(f"flatness               {summary['flatness_um']:8.1f} µm")

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from dbbstation.cli.output import log_said
+from dbbstation.quality.summary import findings_summary
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, GoTo, Pause, Quit, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import Accept, GoTo, Note, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import State
 
 if TYPE_CHECKING:
@@ -45,11 +46,13 @@ _WORDS: dict[str, Command] = {
     "q": Quit(),
 }
 _ASKED = {
-    State.ANNOUNCED: "Enter: ready, start the circle   m: ready, the holder was touched   s: skip   g TEST: go to   p: pause   q: quit",
+    State.ANNOUNCED: "Enter: ready, start the circle   m: ready, the holder was touched   s: skip   g TEST: go to   n TEXT: note   t 20.5: temperature   p: pause   q: quit",
     State.COMPLETE: "Enter: accept   r: repeat   x: reject   q: quit",
     State.FLAWED: "Enter: repeat   x: reject   q: quit",
     State.PAUSED: "Enter: go on   q: quit",
 }
+
+_ASKED_OF_WRONG = "Enter: repeat   a: accept all the same   x: reject   q: quit"
 
 
 class Talk:
@@ -65,6 +68,7 @@ class Talk:
         self._terminal = terminal
         self._quarter = 0
         self._drawn = False
+        self._wrong = False
         self._centre = _OF_MACHINE
 
     def __call__(self, event: events.Event) -> None:
@@ -76,8 +80,11 @@ class Talk:
             return
         for line in _lines(event, self._centre):
             self._say(line)
+        if isinstance(event, events.RunCompleted):
+            self._wrong = bool(event.wrong)
         if self._asking and isinstance(event, events.StateChanged) and event.state in _ASKED:
-            self._say(f"  {_ASKED[event.state]}")
+            doubtful = self._wrong and event.state is State.COMPLETE
+            self._say(f"  {_ASKED_OF_WRONG if doubtful else _ASKED[event.state]}")
 
     def _progress(self, event: events.Progress) -> None:
         share = min(event.swept_deg / event.of_deg, 1.0)
@@ -150,6 +157,7 @@ class Summary:
         if completed is None:
             return told
         told |= {"samples": completed.samples, "lost": completed.lost, "problem": completed.problem or None}
+        told["findings"] = findings_summary(completed.findings)
         if completed.figures is not None:
             told |= {
                 "centre_deviation_um": completed.figures.centre_deviation_um,
@@ -171,6 +179,7 @@ class Keyboard:
         self._send = send
         self._lines = lines or sys.stdin
         self._state = State.BETWEEN
+        self._wrong = False
         # A thread that waits for a line cannot be woken; as a daemon it ends with the program.
         self._thread = threading.Thread(target=self._listen, name="keyboard", daemon=True)
 
@@ -182,11 +191,17 @@ class Keyboard:
         """Remember the state."""
         if isinstance(event, events.StateChanged):
             self._state = event.state
+        elif isinstance(event, events.RunCompleted):
+            self._wrong = bool(event.wrong)
+
+    def _on_enter(self) -> Command | None:
+        doubtful = self._state is State.COMPLETE and self._wrong
+        return Repeat() if doubtful else _ON_ENTER.get(self._state)
 
     def _listen(self) -> None:
         for line in self._lines:
             word = line.strip()
-            command = _command_of(word) if word else _ON_ENTER.get(self._state)
+            command = _command_of(word) if word else self._on_enter()
             if command is not None:
                 self._send(command)
             elif word:
@@ -200,16 +215,36 @@ def _command_of(line: str) -> Command | None:
     word, _, rest = line.partition(" ")
     if word.lower() == "g" and rest.strip():
         return GoTo(rest.strip())
+    if word.lower() == "n" and rest.strip():
+        return Note(rest.strip())
+    if word.lower() == "t" and rest.strip():
+        return _temperature(rest.strip())
     return _WORDS.get(word[:1].lower())
 
 
-def _lines(event: events.Event, centre: str) -> list[str]:
+def _temperature(text: str) -> Note | None:
+    """Temperature of the shop as a note; None where it is no number or no shop has it."""
+    try:
+        degc = float(text.replace(",", "."))
+    except ValueError:
+        return None
+    return Note(ambient_temp_c=degc) if abs(degc) <= HOTTEST_DEGC else None
+
+
+HOTTEST_DEGC = 60.0
+"""No shop in which people measure is hotter, nor as far below zero [degC]."""
+
+
+def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a line per event, nothing nested
     """Return what there is to say of an event; `centre` is whose error the centre of a circle is."""
     match event:
         case events.RunAnnounced():
             head = f"{event.number} of {event.count}: test {event.run.test} {event.run.direction}"
             head += f" (repeat {event.run.repeat})" if event.run.repeat > 1 else ""
             return [head, *(f"  - {step}" for step in event.instructions)]
+        case events.Noted():
+            degc = "" if event.ambient_temp_c is None else f"{event.ambient_temp_c:g} °C"
+            return [f"  noted: {event.text or degc}"]
         case events.SessionFinished() if event.missing:
             return [f"left out, measure them another time: {', '.join(event.missing)}"]
         case events.SessionStopped() | events.Fault():
@@ -226,7 +261,9 @@ def _lines(event: events.Event, centre: str) -> list[str]:
             | events.FeedInMissed()
             | events.RunRestored()
         ):
-            return [f"  {event.run.label}: {_of_run(event, centre)}"]
+            wrong = event.wrong if isinstance(event, events.RunCompleted) else ()
+            texts = [_of_run(event, centre), *(f"{finding.name} wrong: {finding.text}" for finding in wrong)]
+            return [f"  {event.run.label}: {text}" for text in texts]
     return []
 
 

@@ -186,12 +186,12 @@ def opener(
         with Instrument(
             protocol, port, baud=baud, clock=job.clock, log=log, reconnect_s=RECONNECT_S, **patience
         ) as source:
-            workplace = assemble(job, source)
+            workplace = assemble(job, source, source.unreadable)
             workplace.station.subscribe(Log())
             if helper is not None:
                 workplace.station.subscribe(helper)
             try:
-                yield OpenStation(workplace.station, workplace.schedule, str(job.folder))
+                yield OpenStation(workplace.station, workplace.schedule, str(job.folder), workplace.judge.known())
             finally:
                 workplace.close()
 

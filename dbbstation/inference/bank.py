@@ -11,6 +11,8 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import diags_array
+from scipy.stats import chi2
 
 from dbbstation.inference.coloured import Bands, Coloured, bands_of, coloured_noise
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
@@ -42,7 +44,7 @@ is a shadow of the effect, not of the noise."""
 QUIETEST = 1e-9
 """Share of the residual below which nothing is noise: digits run out there."""
 
-LOOKED_FOR = frozenset({Family.WAVE, Family.BUMP, Family.STEP, Family.PULSES})
+LOOKED_FOR = frozenset({Family.WAVE, Family.BUMP, Family.STEP, Family.PULSES, Family.PULSES_BY_DIRECTION})
 """Families whose members were picked from many by the residual itself."""
 
 
@@ -56,7 +58,8 @@ class Bank:
         patterns: by the name of the cause.
         laws: by name.
         noise: that columns are whitened for.
-        whitening: that does it, over the kept rows; None where the noise is white.
+        whitening: that does it, over the kept rows; None where the noise is white and the same in all rows.
+        spread: of the noise in each kept row, over that of all, shape (m,).
     """
 
     def __init__(self, channel: Channel) -> None:
@@ -65,6 +68,7 @@ class Bank:
         self.laws: dict[str, Law] = {law.name: law for law in channel.laws}
         self.noise = Coloured(channel.size)
         self.whitening: csr_array | None = None
+        self.spread = np.ones(len(channel.target))
         self._columns = CauseColumns(channel.base.samples[channel.kept])
         self._everywhere: list[NDArray[np.float64]] = []
         self._of_patterns: dict[str, Cause] = {}
@@ -97,6 +101,11 @@ class Bank:
         causes = [self._cause(p, np.arange(a, b), size) for p, a, b in zip(found, ends[:-1], ends[1:], strict=True)]
         scan = comparison.scan((), causes)
         return [p for p, c, worth in zip(found, causes, scan.log_factor, strict=True) if worth + c.log_prior_odds > 0.0]
+
+    @property
+    def looked_for(self) -> set[str]:
+        """Names of patterns that were picked by a look."""
+        return {name for name, pattern in self.patterns.items() if pattern.family in LOOKED_FOR}
 
     def drop(self, names: Iterable[str]) -> None:
         """Leave out patterns that were looked for and are of no use; their columns stay where they are."""
@@ -157,12 +166,17 @@ class Bank:
             draws = rng.standard_normal((len(target), DRAWS))
             left = beside.left(np.column_stack([target, draws]), self._taking_part(beside))
             used = len(target) - float(np.mean(np.sum(left[:, 1:] ** 2, axis=0)))
-            innovation = float(np.sqrt(np.sum(left[:, 0] ** 2) / max(len(target) - used, 1.0)))
+            free = max(len(target) - used, 1.0)
+            # What few rows are left to measure it by may be small by chance, and then lets in what makes it smaller still.
+            possible = free if self.channel.surely is None else float(chi2.ppf(1.0 - self.channel.surely, free))
+            innovation = float(np.sqrt(np.sum(left[:, 0] ** 2) / possible))
             before, found = self.noise, self.noise.with_innovation(max(innovation, least))
+            spread = self._spread_of(left[:, 0])
+            uneven = float(np.abs(spread / self.spread - 1.0).max(initial=0.0)) > SETTLED
             if self.channel.time is not None and not white and innovation > least:
                 found = self._colour_of(left, draws, stretches, found)
-            self._take(found)
-            if _alike(found, before):
+            self._take(found, spread)
+            if _alike(found, before) and not uneven:
                 break
         return self.noise
 
@@ -172,9 +186,23 @@ class Bank:
         rest = target - self.base @ self.base_values(np.zeros(len(self.channel.residual)))
         seen = np.linalg.svd(self.base / innovation, compute_uv=False)
         seen = seen[seen > RANK * seen[:1]]
-        spent = 0.0 if self.noise.is_white else float(np.log(len(target)))  # two parameters [Schwarz 1978]
+        uneven = float(np.log(self.spread).sum())
         squares = 0.5 * float(rest @ rest) / innovation**2
-        return -len(target) * float(np.log(innovation)) - squares - float(np.log(seen).sum()) - spent
+        return -len(target) * float(np.log(innovation)) - uneven - squares - float(np.log(seen).sum())
+
+    def _spread_of(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Spread of each kept row that makes whitened rows most probable: a constant part, and one that grows as the channel says."""
+        channel = self.channel
+        if channel.grows is None:
+            return self.spread
+        size = channel.grows[channel.kept]
+        size = size / max(float(np.sqrt(np.mean(size**2))), 1e-300)
+        powers = np.square(left * self.spread)
+        tried = 1.0 + np.square(GROWN)[:, None] * size**2
+        costs = 0.5 * np.sum(np.log(tried), axis=1) + 0.5 * len(left) * np.log(np.mean(powers / tried, axis=1))
+        costs[1:] += 0.5 * np.log(len(left))  # one parameter [Schwarz 1978]
+        best = tried[int(costs.argmin())]
+        return np.asarray(np.sqrt(best / np.mean(best)))
 
     def _colour_of(
         self, left: NDArray[np.float64], draws: NDArray[np.float64], stretches: Sequence[slice], level: Coloured
@@ -208,13 +236,18 @@ class Bank:
                 sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
         return sd
 
-    def _take(self, noise: Coloured) -> None:
+    def _take(self, noise: Coloured, spread: NDArray[np.float64]) -> None:
         """Whiten all columns for a noise."""
-        same = (noise.share, noise.decay) == (self.noise.share, self.noise.decay)
-        self.noise = noise
+        same = (noise.share, noise.decay) == (self.noise.share, self.noise.decay) and np.array_equal(
+            spread, self.spread
+        )
+        self.noise, self.spread = noise, spread
         if same:
             return
         self.whitening = noise.whitening(self.channel.stretches)
+        if np.ptp(spread) > 0.0:
+            even = diags_array(1.0 / spread).tocsr()
+            self.whitening = even if self.whitening is None else self.whitening @ even
         self._columns = CauseColumns(self.whitened(self.channel.base.samples))
         if self._everywhere:
             self._columns.add(self.whitened(np.hstack(self._everywhere)))
@@ -353,6 +386,9 @@ def _alike(one: Coloured, other: Coloured) -> bool:
     pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
     return all(abs(a - b) < SETTLED * max(a, b) for a, b in pairs)
 
+
+GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0])
+"""Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
 
 NOISE_ROUNDS = 5
 """Times that the noise is measured, each time beside what the last level lets in."""

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.inference.curves import Clock
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.square_root import Solution
     from dbbstation.inference.variables import Variable
@@ -124,6 +125,12 @@ class Channel:
             variables.
         least_noise: standard deviation of one row that is always there, whatever the rows seem to say: what the way they were made
             leaves of a perfect object, in the unit of the residual.
+        surely: probability that the noise is not more than it is taken for [interval of a variance by chi-square; JCGM 101:2008,
+            sec. 6.4.9.4]; None: its estimate is taken, for which half of that is as good.
+        grows: size of what a part of the noise may be in proportion to, beside a constant part, shape (n,); None: noise is the same
+            in all rows.
+        clock: of all rows, where some were left out or where they show a step by and by; None: they show it at once.
+        direction: of travel as the rows show it, shape (n,); None: nothing is looked for in time that turns with it.
     """
 
     residual: NDArray[np.float64]
@@ -140,6 +147,10 @@ class Channel:
     apart: int = 1
     static: tuple[Pattern, ...] | None = None
     least_noise: float = 0.0
+    surely: float | None = None
+    grows: NDArray[np.float64] | None = None
+    clock: Clock | None = None
+    direction: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         if not len(self.kept):

@@ -11,6 +11,8 @@ from scipy.interpolate import BSpline
 from dbbstation.inference.forms import Form
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
 CUBIC = 3
@@ -64,11 +66,36 @@ class Power(Form):
 
 
 @dataclass(frozen=True, eq=False)
-class Stretches(Form):
-    """One value over each of several stretches of rows, nothing elsewhere; the variable is the number of the row."""
+class Clock:
+    """When rows were, and what they show of something that begins at once.
 
-    first: tuple[int, ...]
-    last: tuple[int, ...]
+    Attributes:
+        rows: of each row, its time in rows from one to the next, rising, shape (n,); rows that were left out count too.
+        response: what is seen of a step from zero to one, by rows since it, 0 long before and 1 long after.
+    """
+
+    rows: NDArray[np.float64]
+    response: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+    @classmethod
+    def plain(cls, count: int) -> Clock:
+        """Rows without a gap that show a step at once."""
+        return cls(np.arange(count, dtype=np.float64), lambda since: (since >= 0.0).astype(np.float64))
+
+
+@dataclass(frozen=True, eq=False)
+class Stretches(Form):
+    """One value over each of several stretches of time, nothing elsewhere; the variable is the time in rows of a clock.
+
+    Attributes:
+        first: beginning of each.
+        last: its end; infinite where it does not end.
+        response: of a `Clock`.
+    """
+
+    first: tuple[float, ...]
+    last: tuple[float, ...]
+    response: Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
     @property
     def count(self) -> int:
@@ -76,11 +103,11 @@ class Stretches(Form):
         return len(self.first)
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """One from the first row of each stretch to its last, shape (n, p)."""
-        inside = (values[..., None] >= np.array(self.first)) & (values[..., None] <= np.array(self.last))
-        return inside.astype(np.float64)
+        """What is seen of one in each stretch, shape (n, p)."""
+        begun, ended = (self.response(values[..., None] - np.array(edges)) for edges in (self.first, self.last))
+        return np.asarray(begun - ended, dtype=np.float64)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         """Both sides of every edge."""
-        edges = np.array([[a - 1, a, b, b + 1] for a, b in zip(self.first, self.last, strict=True)]).ravel()
-        return np.unique(np.clip(np.concatenate([[low], edges, [high]]), low, high).astype(np.float64))
+        edges = np.array([[a - 0.5, a + 0.5, b - 0.5, b + 0.5] for a, b in zip(self.first, self.last, strict=True)])
+        return np.unique(np.clip(np.concatenate([[low], edges.ravel(), [high]]), low, high))

@@ -56,6 +56,7 @@ class Family(StrEnum):
     BUMP = "bump"
     STEP = "step"
     PULSES = "pulses"
+    PULSES_BY_DIRECTION = "pulses by direction"
     BLOCKS = "offset by block"
 
 

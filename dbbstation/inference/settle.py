@@ -9,11 +9,8 @@ import numpy as np
 
 from dbbstation.inference.bank import Bank, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
-from dbbstation.inference.looks import looked_for
 from dbbstation.inference.patterns import patterns
-from dbbstation.inference.pieces import Left
-from dbbstation.inference.square_root import free_directions
-from dbbstation.inference.stretches import stretches
+from dbbstation.inference.seen import IN_TIME, edges_anew, seen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -80,11 +77,6 @@ class Settled:
         """That were compared."""
         return tuple(cause for cause in self.bank.causes if cause.name not in self.refused)
 
-    @property
-    def log_probability(self) -> float:
-        """Log probability of noise and best hypothesis together, but for what is the same for all of this channel."""
-        return self.bank.log_likelihood() + self.best.log_posterior
-
     def effect(self, names: Sequence[str] | None = None) -> NDArray[np.float64]:
         """What members of the best hypothesis do, over all rows, in the unit of the residual, shape (n,).
 
@@ -119,7 +111,6 @@ def settle(
     look: bool = True,
     static: bool = True,
     most_expanded: int = MOST_EXPANDED,
-    colours: bool = True,
     most_looks: int = MOST_LOOKS,
     in_time: bool = True,
     progress: Callable[[str], None] = lambda _: None,
@@ -131,28 +122,12 @@ def settle(
         look: look for waves, bumps, steps, and pulses in time that nobody named.
         static: compare with the patterns that need no look, too.
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
-        colours: where noise is not white, begin a second time as if it were; see below.
         most_looks: looks at what is left, one beside what the other brought, at the most.
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
         progress: told what is being done.
     """
     options = _Options(look=look, static=static, most_expanded=most_expanded, most_looks=most_looks, in_time=in_time)
-    found = _settled(_begun(channel, options), (), options, progress)
-    if found.noise.is_white or not (look and colours):
-        return found
-    # What lasts for a while and is not yet known looks like noise whose neighbours resemble each other, and that noise then
-    # hides it: the other way round, first everything that stands out of white noise, may end at something more probable.
-    bank = _begun(channel, options)
-    bank.measure_noise(white=True)
-    members = _looked(bank, (), {}, progress, options.most_looks, white=True, in_time=options.in_time)
-    bank.measure_noise()
-    comparison = bank.beside().comparison(bank.target)
-    members = grown(comparison, bank.causes, members)
-    odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
-    if bank.log_likelihood() + comparison.log_evidence(members) + odds < found.log_probability:
-        return found
-    other = _settled(bank, members, options, progress)
-    return max((found, other), key=lambda settled: settled.log_probability)
+    return _settled(_begun(channel, options), options, progress)
 
 
 @dataclass(frozen=True)
@@ -177,16 +152,16 @@ def _begun(channel: Channel, options: _Options) -> Bank:
     return bank
 
 
-def _settled(bank: Bank, best: tuple[Member, ...], options: _Options, progress: Callable[[str], None]) -> Settled:
+def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> Settled:
     """Look, compare, lay out anew, until nothing changes.
 
     Args:
         bank: of columns; they become more.
-        best: members to begin with.
         options: of `settle`.
         progress: told what is being done.
     """
     channel, look = bank.channel, options.look
+    best: tuple[Member, ...] = ()
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     laid_out: set[str] = set()
     refused: dict[str, str] = {}
@@ -195,18 +170,22 @@ def _settled(bank: Bank, best: tuple[Member, ...], options: _Options, progress: 
     looking = look and not channel.laws
     for number in range(MOST_ROUNDS):
         bank.measure_noise()
-        lasting: tuple[Member, ...] = ()
+        starts: list[tuple[Member, ...]] = []
         if looking and options.in_time and not looked:
-            # Stretches of time can stand for whatever has a history. So effects that follow variables have a start of their own.
-            lasting = _looked(bank, _grown_in(bank), refused, progress, options.most_looks, in_time=False)
+            # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
+            # follow variables have a start of their own, and what comes at once has one beside the laws alone.
+            begun = _grown_in(bank)
+            starts.append(_looked(bank, begun, refused, progress, options.most_looks, in_time=False))
+            laws = tuple(member for member in begun if member.cause.name in bank.laws)
+            starts.append(_looked(bank, laws, refused, progress, options.most_looks) if laws else ())
         if looking:
             best = _looked(bank, best, refused, progress, options.most_looks, in_time=options.in_time)
         progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
         causes = bank.but_for(refused)
-        start = [grown(comparison, causes, members) for members in (lasting, best)]
-        posterior = search(comparison, causes, [*start, *seeds.values()], options.most_expanded)
+        starts = [grown(comparison, causes, members) for members in (*starts, best)]
+        posterior = search(comparison, causes, [*starts, *seeds.values()], options.most_expanded)
         seeds |= {h.names: h.members for h in posterior.hypotheses[:SEEDS]}
         settled = Settled(channel, bank, bank.noise, comparison, posterior, dict(refused))
         best = posterior.best.members
@@ -217,6 +196,14 @@ def _settled(bank: Bank, best: tuple[Member, ...], options: _Options, progress: 
             continue
         if impossible := _negative(settled):
             refused |= impossible
+            continue
+        if (
+            stretched := {n for n in posterior.best.names & bank.looked_for if bank.patterns[n].family in IN_TIME}
+            - laid_out
+        ):
+            # Their ends were found in more noise than there is now.
+            best = edges_anew(bank, best, stretched)
+            laid_out |= stretched | {member.cause.name for member in best}
             continue
         if not look or (looking and posterior.best.names in looked):
             break
@@ -233,7 +220,6 @@ def _looked(
     progress: Callable[[str], None],
     most_looks: int,
     *,
-    white: bool = False,
     in_time: bool = True,
 ) -> tuple[Member, ...]:
     """Look at what is left, take in what is worth it, and look again beside that, until nothing more stands out.
@@ -244,20 +230,33 @@ def _looked(
         refused: laws that cannot be what they would have to be.
         progress: told what is being done.
         most_looks: looks at the most.
-        white: take noise for white.
         in_time: look for steps and pulses in time, too.
     """
+    before = _log_probability(bank, members)
     for number in range(most_looks):
-        new = bank.add(_seen(bank, members, in_time=in_time))
-        noise = bank.measure_noise(white=white)
+        known = set(bank.patterns)
+        new = bank.add(seen(bank, members, in_time=in_time))
+        noise = bank.measure_noise()
         progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
         comparison = bank.beside().comparison(bank.target)
-        members = grown(comparison, bank.but_for(refused), members)
-        taken = {member.cause.name for member in members}
-        bank.drop(set(new) - taken)
-        if not taken & set(new):
+        more = edges_anew(bank, grown(comparison, bank.but_for(refused), members), set(new))
+        fresh = set(bank.patterns) - known
+        taken = {member.cause.name for member in more}
+        # What is taken in makes the noise less, and less noise lets in more: together they must be more probable than before.
+        after = _log_probability(bank, more)
+        if not taken & fresh or after <= before:
+            bank.drop(fresh)
+            bank.measure_noise()
             break
+        bank.drop(fresh - taken)
+        members, before = more, after
     return members
+
+
+def _log_probability(bank: Bank, members: Sequence[Member]) -> float:
+    """Of the noise that there is and members together, but for what is the same for all of a channel."""
+    odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
+    return bank.log_likelihood() + bank.beside().comparison(bank.target).log_evidence(members) + odds
 
 
 def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[Member] = ()) -> tuple[Member, ...]:
@@ -299,27 +298,6 @@ def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[
 def _grown_in(bank: Bank) -> tuple[Member, ...]:
     """Members that are worth it of what is in a bank."""
     return grown(bank.beside().comparison(bank.target), bank.causes)
-
-
-def _seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Pattern]:
-    """Patterns that stand out of what base and members leave."""
-    channel = bank.channel
-    known, held = channel.known, channel.held
-    fixed = np.flatnonzero(~known.random)
-    random = np.flatnonzero(known.random)
-    base = bank.base
-    columns = [base[:, fixed] @ free_directions(known, fixed, held), base[:, random]]
-    sd = [np.full(columns[0].shape[1], np.inf), known.prior[random]]
-    for member in members:
-        columns.append(bank.fitted(member.columns))
-        sd.append(member.sd)
-    left = Left.of(bank.target, np.hstack(columns), np.concatenate(sd), bank.noise, bank.whitening)
-    size = channel.size / left.noise
-    found = looked_for(left, channel.variables, channel.kept, size)
-    if in_time and channel.time is not None:
-        stretch = stretches(left, channel.blocks, channel.kept, size)
-        found += [stretch] if stretch is not None else []
-    return bank.worthy(left, found)
 
 
 def _laws_of(settled: Settled) -> list[Member]:

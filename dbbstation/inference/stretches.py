@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import gammaln
 
-from dbbstation.inference.curves import Stretches
+from dbbstation.inference.curves import Clock, Stretches
 from dbbstation.inference.patterns import Family, Pattern
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.inference.coloured import Coloured
     from dbbstation.inference.pieces import Left
+    from dbbstation.inference.variables import Variable
 
 PIECES = 4096
 """Pieces of rows that a stretch may begin and end at, at the most, in the first look."""
@@ -37,7 +38,9 @@ SHORTEST = 3
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class _Window:
+    """Rows of a stretch, first and one behind the last, and the log Bayes factor of one value there."""
+
     first: int
     last: int
     worth: float
@@ -48,61 +51,160 @@ def stretches(
     blocks: Sequence[slice],
     kept: NDArray[np.bool_],
     size: float,
-    shortest: int = SHORTEST,
-) -> Pattern | None:
-    """Stretches of rows that stand out, as one pattern of one, two and more of them; None where none does.
+    *,
+    clock: Clock | None = None,
+    by: tuple[Variable, NDArray[np.float64]] | None = None,
+) -> list[Pattern]:
+    """Stretches of rows that stand out, as patterns of one, two and more of them; none where none does.
 
     Args:
         left: what a fit leaves of the rows that were kept.
         blocks: rows of each block, in time order.
         kept: which rows were fitted, shape (n,).
         size: of an effect, one standard deviation, in units of noise.
-        shortest: rows of the shortest stretch.
+        clock: of all rows; they follow each other without a gap and show a step at once if None.
+        by: time, and the direction of travel of all rows, shape (n,), where effects are looked for that turn with it, too.
     """
-    look = _Look(left, blocks, kept, size, shortest)
-    found: list[_Stretch] = []
-    while len(found) < MOST:
+    clock = Clock.plain(len(kept)) if clock is None else clock
+    kinds: list[tuple[Family, tuple[Variable, ...], NDArray[np.float64]]] = [(Family.PULSES, (), np.ones(len(kept)))]
+    if by is not None:
+        kinds.append((Family.PULSES_BY_DIRECTION, (by[0],), by[1]))
+    patterns = []
+    for family, over, factor in kinds:
+        look = _Look(left, blocks, kept, size, clock, factor[kept])
+        found: list[tuple[float, float]] = []
+        while len(found) < MOST:
+            best = look.best()
+            if best is None or best.worth <= 0.0:
+                break
+            found.append(look.take(best))
+        if over:
+            # Without a reversal within it, it is the same as one that does not turn.
+            ways = np.sign(factor)
+            found = [(a, b) for a, b in found if {-1.0, 1.0} <= set(ways[(clock.rows > a) & (clock.rows < b)].tolist())]
+        if found:
+            patterns.append(_pattern(family, over, found, clock, factor, look.tried))
+    return patterns
+
+
+def refined(
+    pattern: Pattern,
+    count: int,
+    lefts: Callable[[int, NDArray[np.float64]], Left],
+    blocks: Sequence[slice],
+    kept: NDArray[np.bool_],
+    size: float,
+    *,
+    clock: Clock | None = None,
+    direction: NDArray[np.float64] | None = None,
+) -> Pattern:
+    """The first stretches of a pattern with their ends where they explain most beside everything else, one after the other.
+
+    Args:
+        pattern: that `stretches` made.
+        count: of its stretches.
+        lefts: what is left beside everything but one of them, given its number and the columns of all, shape (n, count).
+        blocks: as of `stretches`.
+        kept: as of `stretches`.
+        size: as of `stretches`.
+        clock: as of `stretches`.
+        direction: of travel, shape (n,), where the pattern turns with it.
+    """
+    clock = Clock.plain(len(kept)) if clock is None else clock
+    factor = np.ones(len(kept)) if direction is None else direction
+    form = pattern.form
+    if not isinstance(form, Stretches):
+        return pattern
+    found = list(zip(form.first, form.last, strict=True))[:count]
+    columns = pattern.samples[:, :count].copy()
+    # Two that share an edge may be one with a wrong edge and another one that makes up for it: the shorter one comes back only if
+    # it is still worth it beside the others at their best places.
+    doubtful = [k for k in range(len(found)) if _shares_an_edge(found, k)]
+    columns[:, doubtful] = 0.0
+    for k in sorted(range(len(found)), key=lambda one: one in doubtful):
+        window = np.searchsorted(clock.rows[kept], [found[k]])
+        window[0, 1] = max(window[0, 1], min(window[0, 0] + SHORTEST, int(kept.sum())))
+        look = _Look(lefts(k, columns), blocks, kept, size, clock, factor[kept], window)
+        look.tried = pattern.tried
         best = look.best()
-        if best is None or best.worth <= 0.0:
-            break
-        found.append(best)
-        look.take(best)
-    if not found:
-        return None
-    first, last = tuple(s.first for s in found), tuple(s.last for s in found)
-    form = Stretches(first, last)
+        if best is not None and (k not in doubtful or best.worth > 0.0):
+            found[k] = look.take(best)
+            columns[:, k] = Stretches(found[k][:1], found[k][1:], clock.response).columns(clock.rows)[:, 0] * factor
+    found = [edges for edges, column in zip(found, columns.T, strict=True) if column.any()]
+    return _pattern(pattern.family, pattern.variables, found, clock, factor, pattern.tried)
+
+
+def _shares_an_edge(found: Sequence[tuple[float, float]], k: int) -> bool:
+    """Whether a stretch begins or ends where a longer one does."""
+    own = np.array(found[k])
+    return any(
+        np.ptp(own) < np.ptp(other) and np.abs(own[:, None] - np.array(other)).min() <= 1.0
+        for j, other in enumerate(found)
+        if j != k
+    )
+
+
+def _pattern(
+    family: Family,
+    over: tuple[Variable, ...],
+    found: Sequence[tuple[float, float]],
+    clock: Clock,
+    factor: NDArray[np.float64],
+    tried: float,
+) -> Pattern:
+    """Stretches of one kind: one, two and more of them, the best first."""
+    form = Stretches(tuple(a for a, _ in found), tuple(b for _, b in found), clock.response)
     width = len(found)
     # A pattern of k stretches is one of tried**k / k! [k places, in whatever order].
     sizes = sorted({1, 2, 3, 4, 6, 9, 13, 19, 28, width} & set(range(1, width + 1)))
     choices = tuple(
-        (tuple(range(k)), float(gammaln(k + 1) - (k - 1) * np.log(look.tried) - np.log(len(sizes))), f"{k} of them")
+        (tuple(range(k)), float(gammaln(k + 1) - (k - 1) * np.log(tried) - np.log(len(sizes))), f"{k} of them")
         for k in sizes
     )
-    label = f"rows {first[0]} to {last[0]}" + (f" and {width - 1} more" if width > 1 else "")
-    samples = form.columns(np.arange(len(kept), dtype=np.float64))
     return Pattern(
-        Family.PULSES, (), samples, form, ("",) * width, (1.0,) * width, label, look.tried, choices if width > 1 else ()
+        family,
+        over,
+        form.columns(clock.rows) * factor[:, None],
+        form,
+        ("",) * width,
+        (1.0,) * width,
+        _label(found),
+        tried,
+        choices if width > 1 else (),
     )
+
+
+def _label(found: Sequence[tuple[float, float]]) -> str:
+    first, last = found[0]
+    begins, ends = (f"{edge:.6g}" if np.isfinite(edge) else "the end" for edge in (np.ceil(first), np.ceil(last) - 1.0))
+    begins = "0" if np.isneginf(first) else begins
+    return f"rows {begins} to {ends}" + (f" and {len(found) - 1} more" if len(found) > 1 else "")
 
 
 class _Look:
     """Sums over windows of rows: first over pieces, then every row of the best one's ends by itself."""
 
     def __init__(
-        self, left: Left, blocks: Sequence[slice], kept: NDArray[np.bool_], size: float, shortest: int
+        self,
+        left: Left,
+        blocks: Sequence[slice],
+        kept: NDArray[np.bool_],
+        size: float,
+        clock: Clock,
+        factor: NDArray[np.float64],
+        windows: NDArray[np.int64] | None = None,
     ) -> None:
-        self._left, self._size, self._shortest = left, size, shortest
-        self._rows = np.flatnonzero(kept)
+        self._left, self._size, self._clock, self._factor = left, size, clock, factor
+        self._rows, self._at = np.flatnonzero(kept), clock.rows[kept]
         ends = np.searchsorted(self._rows, [[b.start, b.stop] for b in blocks])
-        self._blocks = [(int(a), int(b)) for a, b in ends if b - a >= 2 * shortest]
+        self._blocks = [(int(a), int(b)) for a, b in ends if b - a >= 2 * SHORTEST]
         self._axes, self._rest = left.axes, left.rest
-        self._total = _cumulative(left.towards)
-        self._windows = self._all_windows()
-        self._squares = _squares_of_stretches(left.coloured, len(self._rows))
-        self._own = self._squares[self._windows[:, 1] - self._windows[:, 0]]
-        self._along_axes: list[NDArray[np.float64]] = []
-        for part in range(left.beside.shape[1]):
-            self._beside(left.beside[:, part])
+        self._whole = _cumulative(left.whitened(factor) ** 2)
+        self._edges = _squares_of_edges(left.coloured, len(self._rows))
+        self._along_axes = _cumulative(factor[:, None] * left.beside)
+        self._total = _cumulative(factor * left.towards)
+        self._windows = self._all_windows() if windows is None else windows
+        self._own = self._information(self._windows[:, 0], self._windows[:, 1])
         self.tried = max(float(len(self._windows)) / INDEPENDENT, 1.0)
 
     def _all_windows(self) -> NDArray[np.int64]:
@@ -113,22 +215,24 @@ class _Look:
             many = (last - first) // per
             octaves = int(np.log2(max(many, 1)) * LENGTHS_PER_OCTAVE) + 1
             lengths = np.unique(np.round(2.0 ** (np.arange(octaves) / LENGTHS_PER_OCTAVE)).astype(np.int64))
-            for length in lengths[(lengths * per >= self._shortest) & (lengths < many)]:
+            for length in lengths[(lengths * per >= SHORTEST) & (lengths < many)]:
                 begin = np.arange(0, many - length + 1, max(1, int(length) // 8)) * per + first
                 found.append(np.column_stack([begin, begin + length * per]))
             # To the end of the block, and to the end of all: a step.
-            begin = np.arange(first, last - self._shortest + 1, per)
+            begin = np.arange(first, last - SHORTEST + 1, per)
             found += [np.column_stack([begin, np.full(len(begin), end)]) for end in (last, len(self._rows))]
         every = np.unique(np.vstack(found), axis=0)
         return every[every[:, 1] - every[:, 0] < len(self._rows)]
 
-    def _beside(self, axis: NDArray[np.float64]) -> None:
-        """Take what an axis that was fitted has of every window out of the window's own information."""
-        total = _cumulative(axis)
-        self._along_axes.append(total)
-        self._own = self._own - (total[self._windows[:, 1]] - total[self._windows[:, 0]]) ** 2
+    def _information(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Sums of squares of whitened windows beside what was fitted."""
+        own = self._whole[ends] - self._whole[starts] + self._edges[ends - starts]
+        for many in range(0, len(starts), AT_ONCE):
+            rows = slice(many, many + AT_ONCE)
+            own[rows] -= np.sum((self._along_axes[ends[rows]] - self._along_axes[starts[rows]]) ** 2, axis=1)
+        return np.asarray(own)
 
-    def best(self) -> _Stretch | None:
+    def best(self) -> _Window | None:
         """The window that stands out most, its ends moved to where it stands out more."""
         if not len(self._windows):
             return None
@@ -136,12 +240,11 @@ class _Look:
         first, last = (int(edge) for edge in self._windows[int(self._worth(along, self._own).argmax())])
         for _ in range(ENDS_MOVED):
             low, high = self._within(first, last)
-            ends = np.arange(first + self._shortest, high + 1)
+            ends = np.arange(first + SHORTEST, high + 1)
             last = int(ends[int(self._worth_of(np.full(len(ends), first), ends).argmax())])
-            starts = np.arange(low, last - self._shortest + 1)
+            starts = np.arange(low, last - SHORTEST + 1)
             first = int(starts[int(self._worth_of(starts, np.full(len(starts), last)).argmax())])
-        worth = float(self._worth_of(np.array([first]), np.array([last]))[0])
-        return _Stretch(int(self._rows[first]), int(self._rows[last - 1]), worth)
+        return _Window(first, last, float(self._worth_of(np.array([first]), np.array([last]))[0]))
 
     def _within(self, first: int, last: int) -> tuple[int, int]:
         """Rows that a stretch may have: those of its block, or of all where it goes on into another one."""
@@ -151,10 +254,7 @@ class _Look:
         return 0, len(self._rows)
 
     def _worth_of(self, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.float64]:
-        own = self._squares[ends - starts]
-        for total in self._along_axes:
-            own = own - (total[ends] - total[starts]) ** 2
-        return self._worth(self._total[ends] - self._total[starts], own)
+        return self._worth(self._total[ends] - self._total[starts], self._information(starts, ends))
 
     def _worth(self, along: NDArray[np.float64], own: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log Bayes factor of each window, less what it costs to be picked from all of them."""
@@ -162,16 +262,42 @@ class _Look:
         occam = 0.5 * np.log(information * self._size**2)
         return np.asarray(0.5 * along**2 / information - occam - np.log(self.tried))
 
-    def take(self, stretch: _Stretch) -> None:
-        """Go on beside a stretch."""
-        column = ((self._rows >= stretch.first) & (self._rows <= stretch.last)).astype(np.float64)
-        column = self._left.whitened(column)
-        column = column - self._axes @ (self._axes.T @ column)
-        axis = column / max(float(np.linalg.norm(column)), 1e-300)
+    def take(self, window: _Window) -> tuple[float, float]:
+        """Go on beside a stretch, and return the times in rows between which it explains most."""
+        first, last = window.first, window.last
+        begins = float(0.5 * (self._at[first - 1] + self._at[first])) if first > 0 else -np.inf
+        ends = float(0.5 * (self._at[last - 1] + self._at[last])) if last < len(self._at) else np.inf
+        for finer in FINER:
+            moves = np.arange(-4.0, 5.0) * finer
+            begins, _ = self._best_edges(begins + moves, np.full(len(moves), ends))
+            _, ends = self._best_edges(np.full(len(moves), begins), ends + moves)
+        column = self._whitened(np.array([begins]), np.array([ends]))[:, 0]
+        beside = column - self._axes @ (self._axes.T @ column)
+        # Of what it explains its prior leaves a little; then all of it is as if it had been fitted with the rest [Woodbury].
+        information = max(float(column @ beside), 0.0) + 1.0 / self._size**2
+        self._rest = self._rest - beside * (float(column @ self._rest) / information)
+        axis = beside / np.sqrt(information)
         self._axes = np.column_stack([self._axes, axis])
-        self._rest = self._rest - axis * float(axis @ self._rest)
-        self._total = _cumulative(self._left.transposed(self._rest))
-        self._beside(self._left.transposed(axis))
+        self._total = _cumulative(self._factor * self._left.transposed(self._rest))
+        total = _cumulative(self._factor * self._left.transposed(axis))
+        self._along_axes = np.column_stack([self._along_axes, total])
+        self._own = self._own - (total[self._windows[:, 1]] - total[self._windows[:, 0]]) ** 2
+        return begins, ends
+
+    def _best_edges(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[float, float]:
+        """Those edges of some between which one value explains most; the middle ones where they are alike."""
+        columns = self._whitened(begins, ends)
+        along, taken = columns.T @ self._rest, self._axes.T @ columns
+        own = np.sum(columns**2, axis=0) - np.sum(taken**2, axis=0)
+        explained = along**2 / (np.maximum(own, 0.0) + 1.0 / self._size**2)
+        order = np.argsort(np.abs(np.arange(len(begins)) - len(begins) // 2), kind="stable")
+        k = int(order[int(np.argmax(explained[order] * (1.0 - ALIKE * np.arange(len(order)))))])
+        return float(begins[k]), float(ends[k])
+
+    def _whitened(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Whitened columns of stretches, shape (m, p)."""
+        form = Stretches(tuple(begins.tolist()), tuple(ends.tolist()), self._clock.response)
+        return self._left.whitened(form.columns(self._at) * self._factor[:, None])
 
 
 INDEPENDENT = 4.0
@@ -180,19 +306,28 @@ INDEPENDENT = 4.0
 ENDS_MOVED = 3
 """Times that either end of the best window is moved to where it is best."""
 
+FINER = (0.25, 0.25, 0.06, 0.06, 0.015)
+"""Steps in which either edge is moved to where it is best, in rows: an edge of a hundred times the noise shows to a hundredth of one."""
+
+AT_ONCE = 4096
+"""Windows whose columns are held in memory at once."""
+
+ALIKE = 1e-12
+"""Relative difference that is none."""
+
 
 def _cumulative(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sums of all rows before each, and of all of them, shape (n + 1,)."""
-    return np.concatenate([[0.0], np.cumsum(rows)])
+    """Sums of all rows before each, and of all of them, shape (n + 1, ...)."""
+    return np.concatenate([np.zeros((1, *rows.shape[1:])), np.cumsum(rows, axis=0)])
 
 
-def _squares_of_stretches(noise: Coloured, longest: int) -> NDArray[np.float64]:
-    """Sum of squares of a whitened stretch of ones by its length, 0 to `longest`, away from the ends of a block.
+def _squares_of_edges(noise: Coloured, longest: int) -> NDArray[np.float64]:
+    """What two edges of a stretch of ones add to its sum of squares once whitened, by its length, 0 to `longest`.
 
-    It goes on behind its end until the filter has forgotten it.
+    The filter has not yet seen its beginning, and goes on behind its end until it has forgotten it.
     """
     taps = noise.filter
     step = np.concatenate([np.cumsum(taps), np.full(longest, taps.sum())])
-    inside = np.concatenate([[0.0], np.cumsum(step[:longest] ** 2)])
+    inside = np.concatenate([[0.0], np.cumsum(step[:longest] ** 2 - taps.sum() ** 2)])
     behind = [np.sum((step[k : k + len(taps)] - step[: len(taps)]) ** 2) for k in range(longest + 1)]
     return np.asarray(inside + behind, dtype=np.float64)

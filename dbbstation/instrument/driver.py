@@ -168,6 +168,10 @@ class Instrument:
                 self._arrived.wait(0.1)
             return self._queue.popleft()
 
+    def unreadable(self) -> dict[str, int]:
+        """Return how often bytes were no reading since `start`, by what was wrong with them."""
+        return {str(reason): count for reason, count in self.tally.rejected.items()}
+
     def drain(self) -> list[Reading]:
         """Return every reading that has come and was not fetched yet, without waiting.
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dbbstation.quality.judge import Judgement
+    from collections.abc import Iterable
+
+    from dbbstation.quality.finding import Finding
 
 
-def findings_summary(judgement: Judgement) -> list[dict[str, Any]]:
+def findings_summary(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Every finding of a run: name, value, limit, unit, verdict (`good`, `wrong`, `cannot tell`) and text."""
     return [
         {
@@ -19,5 +21,5 @@ def findings_summary(judgement: Judgement) -> list[dict[str, Any]]:
             "verdict": str(finding.verdict),
             "text": finding.text,
         }
-        for finding in judgement.findings
+        for finding in findings
     ]

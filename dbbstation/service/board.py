@@ -51,11 +51,13 @@ class SequenceOpened:
         tasks: runs that the plan asks for, in their order.
         open: those without an accepted recording.
         session: where the recordings are.
+        known: what accepted runs of the session say.
     """
 
     tasks: tuple[Task, ...]
     open: tuple[Task, ...]
     session: str
+    known: tuple[events.RunCompleted, ...] = ()
 
 
 _RUN_MARKS = {
@@ -88,7 +90,7 @@ class Board:
         traces: of the test that was started last, by direction.
         running: direction of the run that is on its circle; None where none is.
         results: what completed runs say, the last ones.
-        latest: the last run of this sitting that showed its circle, by test and direction.
+        latest: the last run that showed its circle, by test and direction, also of earlier sittings.
         verdicts: on runs that were judged here, by their names.
         completed: the run that waits for a verdict, or waited last.
         fault: what ended the sequence.
@@ -169,6 +171,10 @@ class Board:
     def _open(self, opened: SequenceOpened) -> None:
         self.tasks, self.session = opened.tasks, opened.session
         self.marks = [Mark.OPEN if task in opened.open else Mark.ACCEPTED for task in opened.tasks]
+        for known in opened.known:
+            self.verdicts[known.run.label] = Verdict.ACCEPTED
+            if known.figures is not None:
+                self.latest[known.run.test, known.run.direction] = known
         if self.fault is not None:
             # What is over does not stay red.
             past = [replace(message, weight=Weight.NOTE) for message in self.messages]

@@ -29,13 +29,17 @@ class Message:
     text: str
 
 
-def message_of(event: object) -> Message | None:  # noqa: PLR0911 - a line per event, nothing nested
+def message_of(event: object) -> Message | None:  # noqa: C901, PLR0911 - a line per event, nothing nested
     """Return what an event has to say; None where the screen shows it in other ways."""
     match event:
         case events.RunAccepted():
             return Message(Weight.NOTE, f"{event.run.label} accepted")
         case events.RunRejected():
             return Message(Weight.NOTE, f"{event.run.label} does not count, its recording is kept: {event.reason}")
+        case events.RunCompleted() if event.wrong:
+            return Message(
+                Weight.WARNING, f"{event.run.label}: " + "; ".join(f"{f.name}: {f.text}" for f in event.wrong)
+            )
         case events.RunCompleted(problem=problem) if problem:
             return Message(Weight.WARNING, f"{event.run.label}: {problem_alone(event)}")
         case events.RunRestored():
@@ -44,6 +48,9 @@ def message_of(event: object) -> Message | None:  # noqa: PLR0911 - a line per e
             return Message(Weight.WARNING, f"{event.run.label}: {event.problem}")
         case events.CommandRefused():
             return Message(Weight.WARNING, event.why)
+        case events.Noted():
+            degc = "" if event.ambient_temp_c is None else f"{event.ambient_temp_c:g} °C"
+            return Message(Weight.NOTE, f"noted: {event.text or degc}")
         case events.SessionStopped():
             return Message(Weight.NOTE, f"stopped; {event.left_to_do} runs are left to do")
         case events.Fault():

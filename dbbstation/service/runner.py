@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from dbbstation.station.commands import Command
     from dbbstation.station.engine import Station
+    from dbbstation.station.events import RunCompleted
     from dbbstation.station.schedule import Schedule
 
 _JOIN_S = 10.0
@@ -33,11 +34,13 @@ class OpenStation:
         station: the engine.
         schedule: what is left to do.
         session: where the recordings are.
+        known: what accepted runs of the session say, from disk.
     """
 
     station: Station
     schedule: Schedule
     session: str
+    known: tuple[RunCompleted, ...] = ()
 
 
 Opener: TypeAlias = "Callable[[], AbstractContextManager[OpenStation]]"
@@ -102,7 +105,9 @@ class Runner:
     def _run(self) -> None:
         try:
             with self._opener() as opened:
-                self._mail.put(SequenceOpened(opened.schedule.tasks, opened.schedule.open, opened.session))
+                self._mail.put(
+                    SequenceOpened(opened.schedule.tasks, opened.schedule.open, opened.session, opened.known)
+                )
                 opened.station.subscribe(self._observe)
                 self._station = opened.station
                 if self._closing.is_set():

@@ -11,6 +11,7 @@ from dbbstation.files.recordings.bar_reach import unlike_bar
 from dbbstation.files.recordings.session_text import SessionDetails
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
+from dbbstation.station.judging import RunJudge
 from dbbstation.station.opening import last_end, open_session
 from dbbstation.station.preflight import check_plan, check_range
 from dbbstation.station.schedule import Schedule
@@ -83,11 +84,13 @@ class Workplace:
         station: subscribe to it, send it commands, run it.
         schedule: what is done and left.
         writer: of the session folder.
+        judge: knows the figures and findings of every run that counts.
     """
 
     station: Station
     schedule: Schedule
     writer: SessionWriter
+    judge: RunJudge
     _storage: Storage
 
     def close(self) -> None:
@@ -98,8 +101,13 @@ class Workplace:
             self.writer.close()
 
 
-def assemble(job: Job, source: ReadingSource) -> Workplace:
+def assemble(job: Job, source: ReadingSource, unreadable: Callable[[], Mapping[str, int]] = dict) -> Workplace:
     """Open the session and build the station; storage is its first observer.
+
+    Args:
+        job: what is measured.
+        source: started instrument.
+        unreadable: what its driver rejected so far, by what was wrong with it.
 
     Raises:
         InputError: the folder holds another session, or one with faults.
@@ -115,17 +123,20 @@ def assemble(job: Job, source: ReadingSource) -> Workplace:
     names = {key: program.name for key, program in job.programs.items()}
     # Real runs bear the computer's time, so that they fit what thermometers log.
     now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
-    storage = Storage(writer, now, kept)
+    storage = Storage(writer, now, kept, unreadable)
+    judge = RunJudge(writer, kept)
     sequencer = Sequencer(
         plan,
         schedule,
         storage.recorded,
         programs=names,
         patience=job.patience,
-        waiting=unjudged(writer.session),
+        judge=judge.judge,
+        waiting=unjudged(writer.session, judge.judge),
         rate_hz=job.rate_hz,
     )
     station = Station(sequencer, source)
     station.subscribe(storage)
+    station.subscribe(judge)
     station.regularly(storage.sync_if_due)
-    return Workplace(station, schedule, writer, storage)
+    return Workplace(station, schedule, writer, judge, storage)

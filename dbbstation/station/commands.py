@@ -90,6 +90,19 @@ class Judge:
 
 
 @dataclass(frozen=True)
+class Note:
+    """Keep a remark or the temperature of the shop with the session; at any time.
+
+    Attributes:
+        text: the remark; empty for a temperature alone.
+        ambient_temp_c: temperature of the shop now [degC]; None where it was not read.
+    """
+
+    text: str = ""
+    ambient_temp_c: float | None = None
+
+
+@dataclass(frozen=True)
 class Pause:
     """Leave the machine alone for a while: nothing is waited for."""
 
@@ -99,4 +112,4 @@ class Resume:
     """Go on after a pause."""
 
 
-Command: TypeAlias = Start | Accept | Repeat | Reject | Skip | Quit | GoTo | Judge | Pause | Resume
+Command: TypeAlias = Start | Accept | Repeat | Reject | Skip | Quit | GoTo | Judge | Note | Pause | Resume

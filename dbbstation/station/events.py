@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Ball
     from dbbstation.plan.sampling import Sampling
+    from dbbstation.quality.finding import Finding
     from dbbstation.station.commands import Command
     from dbbstation.station.states import State
     from dbbstation.trace.analysis import CircleFigures
@@ -177,6 +178,7 @@ class RunCompleted:
         lost: samples that the line lost during it.
         figures: of its circle; None where there is none.
         problem: why it cannot be used; empty where it can.
+        findings: all that was looked for in its circle; empty where it has none.
     """
 
     run: RunId
@@ -184,6 +186,12 @@ class RunCompleted:
     lost: int
     figures: CircleFigures | None
     problem: str
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def wrong(self) -> tuple[Finding, ...]:
+        """Findings that pass their limit: reasons to measure the run again."""
+        return tuple(finding for finding in self.findings if finding.wrong)
 
 
 @dataclass(frozen=True)
@@ -210,6 +218,19 @@ class FeedInMissed:
 
     run: RunId
     problem: str
+
+
+@dataclass(frozen=True)
+class Noted:
+    """Somebody noted something.
+
+    Attributes:
+        text: the remark; empty for a temperature alone.
+        ambient_temp_c: temperature of the shop now [degC]; None where it was not read.
+    """
+
+    text: str
+    ambient_temp_c: float | None
 
 
 @dataclass(frozen=True)
@@ -312,6 +333,7 @@ Event: TypeAlias = (
     | RunCompleted
     | RunRestored
     | FeedInMissed
+    | Noted
     | RunAccepted
     | RunRejected
     | RunLate

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.plan.sampling import sampling
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, Command, GoTo, Judge, Pause, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import Accept, Command, GoTo, Judge, Note, Pause, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.detector import CircleWatch, EdgeDetector, Patience
 from dbbstation.station.instructions import instructions
 from dbbstation.station.run_record import RunRecord, unrecorded
@@ -24,15 +24,18 @@ from dbbstation.station.states import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from dbbstation.errors import StationError
     from dbbstation.instrument.reading import Reading
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Plan
+    from dbbstation.quality.finding import Finding
     from dbbstation.station.events import Event, RunId, Sample
     from dbbstation.station.run_record import Recorded
     from dbbstation.station.schedule import Schedule
+    from dbbstation.trace.analysis import CircleFigures
+    from dbbstation.trace.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,7 @@ class Sequencer:
         programs: name of the NC program that commands a test and direction; the plan's nominal circle where absent.
         patience: how long is waited for the machine.
         waiting: runs that were recorded before and have no verdict, oldest first; they are judged before anything is measured.
+        judge: finds out what is wrong with a run that holds a circle; None: nothing is looked for.
         rate_hz: readings per second that the instrument brings; None: not known.
     """
 
@@ -73,12 +77,14 @@ class Sequencer:
         programs: Mapping[tuple[str, Direction], str] | None = None,
         patience: Patience | None = None,
         waiting: Sequence[Waiting] = (),
+        judge: Callable[[RunId, Recording], tuple[Finding, ...]] | None = None,
         rate_hz: float | None = None,
     ) -> None:
         self.state = State.BETWEEN
         self.plan = plan
         self.schedule = schedule
         self._recorded = recorded
+        self._judge_run = judge
         self._programs = programs or {}
         self._patience = patience or Patience()
         self._rate_hz = rate_hz
@@ -117,6 +123,9 @@ class Sequencer:
                 self._to_next(cause)
             case GoTo() | Judge():
                 self._reorder(command)
+            case Note():
+                self._flush()
+                self._out.append(events.Noted(command.text, command.ambient_temp_c))
             case Pause():
                 self._edges = self._watch = None
                 self._move(cause)
@@ -340,11 +349,14 @@ class Sequencer:
         record = self._record
         if record is None:
             raise RuntimeError(f"no run is recorded while {self.state}")
-        found = None
+        found: CircleFigures | None = None
+        findings: tuple[Finding, ...] = ()
         if not problem:
             recording = self._recorded(record.run, self._untold(record.run))
             found, problem = record.circle_figures(recording, self.plan.largest_loss_percent)
-        self._out.append(events.RunCompleted(record.run, len(record), record.lost, found, problem))
+            if found is not None and self._judge_run is not None:
+                findings = self._judge_run(record.run, recording)
+        self._out.append(events.RunCompleted(record.run, len(record), record.lost, found, problem, findings))
         self.schedule.recorded(record.run)
         self._edges = None
         return found is not None

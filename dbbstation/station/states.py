@@ -6,7 +6,20 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from dbbstation.station.commands import Accept, Command, GoTo, Judge, Pause, Quit, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import (
+    Accept,
+    Command,
+    GoTo,
+    Judge,
+    Note,
+    Pause,
+    Quit,
+    Reject,
+    Repeat,
+    Resume,
+    Skip,
+    Start,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -40,6 +53,7 @@ class Cause(StrEnum):
     QUIT = "quit"
     GO_TO = "go to"
     JUDGE = "judge"
+    NOTE = "note"
     PAUSE = "pause"
     RESUME = "resume"
 
@@ -59,7 +73,7 @@ _ALWAYS = {Cause.QUIT: State.STOPPED, Cause.FAILED: State.FAULTED}
 _GIVEN_UP = {Cause.REPEAT: State.BETWEEN, Cause.REJECT: State.BETWEEN}
 _OTHER_RUN = {Cause.GO_TO: State.BETWEEN, Cause.JUDGE: State.BETWEEN, Cause.PAUSE: State.PAUSED}
 
-TRANSITIONS: Mapping[State, Mapping[Cause, State]] = MappingProxyType(
+_WAYS: Mapping[State, Mapping[Cause, State]] = MappingProxyType(
     {
         State.BETWEEN: {
             Cause.RUN_LEFT: State.ANNOUNCED,
@@ -91,7 +105,12 @@ TRANSITIONS: Mapping[State, Mapping[Cause, State]] = MappingProxyType(
         State.FAULTED: {},
     }
 )
-"""To which state a cause leads from each state; what does not stand here does not happen."""
+"""Where causes lead that change the state."""
+
+TRANSITIONS: Mapping[State, Mapping[Cause, State]] = MappingProxyType(
+    {state: {**ways, Cause.NOTE: state} if ways else ways for state, ways in _WAYS.items()}
+)
+"""To which state a cause leads from each state; what does not stand here does not happen. A note changes nothing."""
 
 RECORDING = frozenset({State.DWELLING, State.TURNING, State.LEAVING})
 """States in which every reading is written down."""
@@ -109,6 +128,7 @@ COMMAND_CAUSES: Mapping[type[Command], Cause] = MappingProxyType(
         Quit: Cause.QUIT,
         GoTo: Cause.GO_TO,
         Judge: Cause.JUDGE,
+        Note: Cause.NOTE,
         Pause: Cause.PAUSE,
         Resume: Cause.RESUME,
     }

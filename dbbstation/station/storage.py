@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import OutputError
-from dbbstation.files.recordings.entries import Counts
+from dbbstation.files.recordings.entries import Counts, Note
 from dbbstation.station import events
 from dbbstation.station.run_record import recording_of
 from dbbstation.trace.columns import STATUS_GOOD
@@ -34,6 +34,7 @@ class Storage:
         writer: of the session folder.
         now: the time of day with its zone.
         programs: NC program, kept in the session already, by test and direction.
+        unreadable: what the driver rejected so far, by what was wrong with it.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class Storage:
         writer: SessionWriter,
         now: Callable[[], datetime] | None = None,
         programs: Mapping[tuple[str, Direction], Program] | None = None,
+        unreadable: Callable[[], Mapping[str, int]] = dict,
     ) -> None:
         self._writer = writer
         self._now = now or (lambda: datetime.now(UTC))
@@ -48,6 +50,8 @@ class Storage:
         self._journal: RunWriter | None = None
         self._received = self._lost = 0
         self._rejected: Counter[str] = Counter()
+        self._unreadable = unreadable
+        self._unreadable_before: Counter[str] = Counter()
 
     def __call__(self, event: events.Event) -> None:
         """Keep what the event says.
@@ -61,13 +65,17 @@ class Storage:
             case events.SamplesRecorded():
                 self._append(event.samples)
             case events.RunCompleted() if self._journal is not None:
-                counts = Counts(self._received, self._lost, dict(sorted(self._rejected.items())))
+                garbled = Counter(self._unreadable()) - self._unreadable_before
+                rejected = self._rejected + Counter({f"unreadable {why}": count for why, count in garbled.items()})
+                counts = Counts(self._received, self._lost, dict(sorted(rejected.items())))
                 self._writer.finish_run(self._journal, counts)
                 self._journal = None
             case events.RunAccepted():
                 self._writer.judge(self._entry(event.run), accepted=True)
             case events.RunRejected():
                 self._writer.judge(self._entry(event.run), accepted=False, reason=event.reason)
+            case events.Noted():
+                self._writer.note(Note(self._now(), event.text, event.ambient_temp_c))
             case events.SessionStopped() | events.Fault():
                 self.close()
             case _:
@@ -117,6 +125,7 @@ class Storage:
     def _start(self, run: events.RunId) -> None:
         self._received = self._lost = 0
         self._rejected.clear()
+        self._unreadable_before = Counter(self._unreadable())
         self._journal = self._writer.start_run(
             run.test,
             run.direction,

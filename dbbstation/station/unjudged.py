@@ -12,17 +12,30 @@ from dbbstation.station.sequencer import Waiting
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.quality.finding import Finding
     from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import Recording
 
 
-def unjudged(session: SessionFolder) -> list[Waiting]:
-    """Return what waits for a verdict, in the order it was recorded."""
-    return [_waiting(session, entry) for entry in session.runs if entry.state is RunState.COMPLETE]
+def unjudged(
+    session: SessionFolder, judge: Callable[[RunId, Recording], tuple[Finding, ...]] = lambda _run, _recording: ()
+) -> list[Waiting]:
+    """Return what waits for a verdict, in the order it was recorded.
+
+    Args:
+        session: whose runs.
+        judge: finds out what is wrong with a run that holds a circle.
+    """
+    return [_waiting(session, entry, judge) for entry in session.runs if entry.state is RunState.COMPLETE]
 
 
-def _waiting(session: SessionFolder, entry: RunEntry) -> Waiting:
+def _waiting(
+    session: SessionFolder, entry: RunEntry, judge: Callable[[RunId, Recording], tuple[Finding, ...]]
+) -> Waiting:
     run = RunId(entry.test, entry.direction, entry.repeat, entry.mounting or 0)
     try:
         recording = session.load(entry).recording
@@ -32,7 +45,8 @@ def _waiting(session: SessionFolder, entry: RunEntry) -> Waiting:
     lost = entry.counts.lost if entry.counts is not None else 0
     found, problem = circle_figures(recording, circle, lost, lost, session.plan.largest_loss_percent)
     samples = () if found is None else _on_turn(cut(recording, circle))
-    return Waiting(RunCompleted(run, len(recording), lost, found, problem), samples)
+    findings = () if found is None else judge(run, recording)
+    return Waiting(RunCompleted(run, len(recording), lost, found, problem, findings), samples)
 
 
 def _on_turn(raw: RawCircle) -> tuple[Sample, ...]:

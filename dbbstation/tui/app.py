@@ -141,7 +141,7 @@ class StationApp(App[None]):
 
     def _drop_stale_question(self) -> None:
         """Take a question back whose circle has ended meanwhile: an answer to it would hit something else."""
-        question = self.screen_stack[-1] if self.screen_stack else None
+        question = self.screen_stack[-1] if self.screen_stack else None  # none: the last look may come while it closes
         if isinstance(question, GiveUpQuestion):
             running = self.board.state in RECORDING and self.board.announced is not None
             if not running or self.board.announced is None or self.board.announced.run.label != question.run:

@@ -39,6 +39,7 @@ class NowLine(Panel):
     def show(self, board: Board) -> None:
         """Show the sentence, and whether it asks for something, in colour as well."""
         super().show(board)
-        self.set_class(board.fault is not None or board.state is State.FLAWED, "-fault")
-        self.set_class(board.fault is None and board.state in _ASKING, "-asking")
+        wrong = board.state is State.COMPLETE and board.completed is not None and bool(board.completed.wrong)
+        self.set_class(board.fault is not None or board.state is State.FLAWED or wrong, "-fault")
+        self.set_class(board.fault is None and board.state in _ASKING and not wrong, "-asking")
         self.set_class(board.state in RECORDING, "-running")

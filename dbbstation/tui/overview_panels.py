@@ -153,7 +153,8 @@ class TestList(Panel):
         wide = width >= _SHORTEST_NAME + 2 * (_WORD + _FIGURE)
         each = _WORD + (_FIGURE if wide else 0)
         room = max(width - 2 * (each + 1), _SHORTEST_NAME)
-        rows, at = [], 0
+        rows: list[Content] = []
+        at = 0
         for (name, occurrence), group in grouped.items():
             chosen = name == self._choice.test and occurrence == 1
             at = len(rows) if chosen else at

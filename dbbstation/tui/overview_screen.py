@@ -8,7 +8,6 @@ from textual.binding import Binding
 from textual.containers import Horizontal
 from textual.widgets import Footer
 
-from dbbstation.plan.circle import Direction
 from dbbstation.service.board import Verdict
 from dbbstation.station.commands import GoTo, Judge
 from dbbstation.tui.board_screen import BoardScreen
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
     from textual.binding import BindingType
 
+    from dbbstation.plan.circle import Direction
     from dbbstation.station.events import RunCompleted
     from dbbstation.tui.board_screen import Desk
     from dbbstation.tui.shown import Shown

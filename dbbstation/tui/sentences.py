@@ -53,6 +53,10 @@ def _leaving(_board: Board) -> str:
 
 def _verdict(board: Board) -> str:
     name = board.completed.run.label if board.completed else "The run"
+    wrong = board.completed.wrong if board.completed else ()
+    if wrong:
+        more = f" ({len(wrong) - 1} more)" if len(wrong) > 1 else ""
+        return f"{name}, {wrong[0].name} wrong{more}: {_ended(wrong[0].text)} R measures it again, A accepts it all the same."
     return f"{name} is complete: A accepts it, R measures it again, X rejects it and goes on."
 
 

@@ -41,10 +41,14 @@ HELP = {
         "Measure",
         (
             "The top line names plan, run and state. The sentence below it says what to do now.",
-            "The circle shows the deviation of the bar from its nominal length, magnified. The dotted circle is the nominal one. "
-            "Counter-clockwise is drawn thick, clockwise thin. A mark shows where the machine is.",
-            "On the right: the live reading, the set-up with a map of the plate, the figures of the last two runs, all runs of "
-            "the plan with a sign and a word each. At the bottom: progress, messages, keys.",
+            (
+                "The circle shows the deviation of the bar from its nominal length, magnified. The dotted circle is the nominal one. "
+                "Counter-clockwise is drawn thick, clockwise thin. A mark shows where the machine is."
+            ),
+            (
+                "On the right: the live reading, the set-up with a map of the plate, the figures of the last two runs, all runs of "
+                "the plan with a sign and a word each. At the bottom: progress, messages, keys."
+            ),
         ),
         {
             **_RUN_KEYS,
@@ -55,18 +59,23 @@ HELP = {
         "Large figures",
         (
             "To be read from two metres: the length of the bar [mm], the state of the sequence, what to do next.",
-            "Dashes stand instead of the length where no bar is in or no reading has come for a while. The bell rings when a "
-            "run waits for its verdict.",
+            (
+                "Dashes stand instead of the length where no bar is in or no reading has come for a while. The bell rings when a "
+                "run waits for its verdict."
+            ),
         ),
         {**_RUN_KEYS, "escape": "Back to the screen with the circle."},
     ),
     "overview": Help(
         "Overview",
         (
-            "The map shows the plate from above, X to the right and Y up. Under each bore stand its tests with a sign for each "
-            "direction. The list has the same signs with a word.",
-            "Below the list stands the last run of the chosen test and direction, as far as it was measured since the station "
-            "was started: centre, mean, circularity, verdict.",
+            (
+                "The map shows the plate from above, X to the right and Y up. Under each bore stand its tests with a sign for each "
+                "direction. The list has the same signs with a word."
+            ),
+            (
+                "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict."
+            ),
             "The time left is that of the circles at their planned feeds. Putting up balls comes on top.",
         ),
         {
@@ -146,7 +155,7 @@ TIME_LEFT = (
 )
 NOTHING_LEFT = "All {count} runs of the plan are accepted."
 NOT_NOW = "While the station is {state}, tests are looked at here; going to another and other verdicts have to wait."
-NO_RUN = "{test} {direction}: no run with a circle since the station was started."
+NO_RUN = "{test} {direction}: no run with a circle yet."
 LAST_RUN = "{run}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularity {circularity:.1f} µm; {verdict}."
 NO_VERDICT = "waits for its verdict"
 NO_BORE = "in no bore"

@@ -132,7 +132,18 @@ def test_a_feed_in_beyond_the_range_of_the_instrument_is_refused(run, tmp_path: 
     """A Millimar in µm shows 999.99 µm at most; the plan feeds in by 1.5 mm."""
     machine = shipped_folder("fixtures") / "machines" / "reference.yaml"
     words = ("--plan", PLAN, "--machine", machine, "--out", tmp_path / "session", "--port", "/dev/ttyNONE9")
-    outcome = run("measure", *words, "--instrument", "mahr-c1202", "--profile", profile, "--zero-mm", "150.0")
+    outcome = run(
+        "measure",
+        *words,
+        "--instrument",
+        "mahr-c1202",
+        "--profile",
+        profile,
+        "--zero-mm",
+        "150.0",
+        "--bar-waiver",
+        "no port is there",
+    )
     assert outcome.code == FAILED
     said = "test a: the bar goes from 150 to 151.5 mm with its feed-in, and the instrument reads 149 to 151 mm"
     assert (said in outcome.err) != reaches

@@ -3,7 +3,7 @@ from __future__ import annotations
 import errno
 import threading
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
 import pytest
@@ -18,7 +18,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import Direction
 from dbbstation.station import events, storage
 from dbbstation.station.assembly import Job, assemble
-from dbbstation.station.commands import Accept, Quit, Repeat, Skip, Start
+from dbbstation.station.commands import Accept, Note, Quit, Repeat, Skip, Start
 from dbbstation.station.engine import Station
 from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
@@ -155,7 +155,8 @@ def test_what_came_over_the_line_is_counted_in_run_file_and_session(plan_file: P
     readings[9] = replace(readings[9], status="overrange", said="beyond its range")
     readings[10] = replace(readings[10], status="overrange", said="beyond its range")
     source = Script(readings)
-    workplace = assemble(Job(read_machine(MACHINE_FILE), plan, tmp_path / "session"), source)
+    garbled = iter([{"checksum": 2}, {"checksum": 5, "bytes": 1}])
+    workplace = assemble(Job(read_machine(MACHINE_FILE), plan, tmp_path / "session"), source, lambda: next(garbled))
     station = workplace.station
     told: list[events.Event] = []
 
@@ -173,10 +174,15 @@ def test_what_came_over_the_line_is_counted_in_run_file_and_session(plan_file: P
     (run,) = read_session(tmp_path / "session").runs
     completed = next(event for event in told if isinstance(event, events.RunCompleted))
     text = run.path.read_text(encoding="utf-8")
+    garbled_lines = "# rejected unreadable bytes: 1\n# rejected unreadable checksum: 3\n"
     rows = [line for line in text.splitlines() if line[0].isdigit()]
-    assert run.counts == Counts(len(rows), 2, {"fault": 1, "overrange": 2})
+    assert run.counts == Counts(
+        len(rows), 2, {"fault": 1, "overrange": 2, "unreadable bytes": 1, "unreadable checksum": 3}
+    )
     assert completed.samples == len(rows)
-    assert text.endswith(f"# received: {len(rows)}\n# lost: 2\n# rejected fault: 1\n# rejected overrange: 2\n")
+    assert text.endswith(
+        f"# received: {len(rows)}\n# lost: 2\n# rejected fault: 1\n# rejected overrange: 2\n{garbled_lines}"
+    )
     assert read_run(run.path).header["lost"] == "2"
 
 
@@ -244,3 +250,17 @@ def test_a_clock_that_was_stepped_back_does_not_turn_the_order_of_runs(monkeypat
     seconds[0] += 60.0
     assert now() - first == timedelta(seconds=60)
     assert time_of_day(lambda: seconds[0], last=first)() >= first
+
+
+def test_what_is_noted_is_kept_with_its_time(plan_file: Path, tmp_path: Path) -> None:
+    workplace = assemble(Job(read_machine(MACHINE_FILE), read_inline_plan(plan_file), tmp_path / "session"), Script())
+    before = datetime.now(UTC)
+    for command in (Note("a draught from the gate"), Note(ambient_temp_c=21.5), Quit()):
+        workplace.station.send(command)
+    workplace.station.run()
+    workplace.close()
+    notes = read_session(tmp_path / "session").notes
+    assert [(note.text, note.ambient_temp_c) for note in notes] == [("a draught from the gate", None), ("", 21.5)]
+    assert all(before - timedelta(seconds=1) <= note.made <= datetime.now(UTC) for note in notes)
+    text = (tmp_path / "session" / "session.yaml").read_text(encoding="utf-8")
+    assert text.startswith("format: dbb-session/3")

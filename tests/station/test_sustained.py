@@ -94,7 +94,7 @@ class Captured:
 def capture(job: Job, port: str, line: int, seconds: float, monkeypatch: pytest.MonkeyPatch) -> Captured:
     """Record one run from a line at its full rate."""
     lost, memory = [0], list[int]()
-    with Instrument(load_instrument("streaming-encoder"), port, baud=BAUD, timeout_s=5.0) as instrument:
+    with Instrument(load_instrument("streaming-encoder", "no-checksum"), port, baud=BAUD, timeout_s=5.0) as instrument:
         source = Watched(instrument)
         fsync = os.fsync
 

@@ -11,7 +11,7 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.instrument.reading import Reading
 from dbbstation.plan.circle import Direction
 from dbbstation.station import events
-from dbbstation.station.commands import Accept, GoTo, Judge, Pause, Quit, Reject, Repeat, Resume, Skip, Start
+from dbbstation.station.commands import Accept, GoTo, Judge, Note, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
 from dbbstation.station.states import COMMAND_CAUSES, FINAL, TRANSITIONS, Cause, State, commands_allowed
@@ -32,6 +32,8 @@ COMMANDS = [
     GoTo("a", Direction.CW),
     Judge("a", Direction.CCW, 1, accepted=False),
     Judge("a", Direction.CCW, 1, accepted=True),
+    Note("a draught"),
+    Note(ambient_temp_c=20.5),
     Pause(),
     Resume(),
 ]

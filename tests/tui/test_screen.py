@@ -25,7 +25,11 @@ from dbbstation.station.assembly import Job
 from dbbstation.station.events import Event, FeedInSeen, Observer
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
+from dbbstation.tui.help_screen import HelpScreen
+from dbbstation.tui.large_screen import LargeScreen
+from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import GiveUpQuestion
+from dbbstation.tui.reason_question import ReasonQuestion
 from dbbstation.tui.shown import Shown
 from dbbstation.tui.trace_view import TraceView
 
@@ -352,3 +356,34 @@ def test_nothing_is_waited_for_in_a_pause(short_plan: InlinePlan, tmp_path: Path
 
     with switched_on(short_plan, tmp_path / "session") as bench:
         bench.press_all(play)
+
+
+def test_the_overview_leads_to_another_test_and_takes_verdicts_back(short_plan: InlinePlan, tmp_path: Path) -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        board = app.board
+        await circle(pilot, app)
+        await press(app, "a")
+        await until(pilot, lambda: board.accepted == 1 and board.state is State.ANNOUNCED)
+        await press(app, "z", "f1")  # a wrong key is harmless
+        await until(pilot, lambda: isinstance(app.screen, HelpScreen))
+        await press(app, "escape")
+        await until(pilot, lambda: len(app.screen_stack) == 1)
+        await press(app, "f")
+        await until(pilot, lambda: isinstance(app.screen, LargeScreen))
+        await press(app, "f")
+        await until(pilot, lambda: len(app.screen_stack) == 1)
+        await press(app, "o")
+        await until(pilot, lambda: isinstance(app.screen, OverviewScreen))
+        await press(app, "left", "x")
+        await until(pilot, lambda: isinstance(app.screen, ReasonQuestion))
+        await press(app, "1")
+        await until(pilot, lambda: board.accepted == 0)
+        await until(pilot, lambda: isinstance(app.screen, OverviewScreen))
+        await press(app, "a")
+        await until(pilot, lambda: board.accepted == 1)
+        await press(app, "right", "enter")
+        await until(pilot, lambda: len(app.screen_stack) == 1 and board.announced.run.direction is Direction.CW)
+
+    with switched_on(short_plan, tmp_path / "session") as bench:
+        bench.press_all(play)
+        assert bench.states()[-1][1] is RunState.ACCEPTED

@@ -93,6 +93,22 @@ def test_the_screen_looks_as_it_did(state: Callable[[], Happening], size: tuple[
     assert text.splitlines() == kept.read_text(encoding="utf-8").splitlines()
 
 
+OTHERS = {"overview": ("o",), "help": ("f1",), "large": ("f",), "reason": ("o", "left", "x")}
+"""Keys that lead to further screens, from a session with a circle accepted."""
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40), (200, 60)], ids=["80x24", "120x40", "200x60"])
+@pytest.mark.parametrize("screen", OTHERS)
+def test_other_screens_look_as_they_did(screen: str, size: tuple[int, int]) -> None:
+    happening = Happening().circle("t0", Direction.CCW).command(Accept())
+    pressed = asyncio.run(still_svg(happening.shown(), happening.events, size=size, press=OTHERS[screen]))
+    text, _ = drawn(pressed)
+    kept = KEPT / f"{screen}-{size[0]}x{size[1]}.txt"
+    if KEEP:
+        kept.write_text(text, encoding="utf-8")
+    assert text.splitlines() == kept.read_text(encoding="utf-8").splitlines()
+
+
 @pytest.mark.parametrize("theme", [DARK, LIGHT])
 def test_the_colours_are_as_they_were(theme: str) -> None:
     happening = second_circle()

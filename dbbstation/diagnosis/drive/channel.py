@@ -10,9 +10,10 @@ import numpy as np
 
 from dbbstation.diagnosis.drive.recordings import with_waves
 from dbbstation.inference.channel import Base, Channel, Law
-from dbbstation.inference.curves import Spline
+from dbbstation.inference.curves import Clock, Spline
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import CURVES, Family, Pattern
+from dbbstation.inference.read_off import SURE
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
@@ -116,18 +117,34 @@ def drive_channel(
         time=recordings.time_s,
         least_noise=METHOD_SHARE * scale.force_n,
         static=curves,
+        surely=SURE,
+        grows=np.abs(recordings.motion[:, 0]),
+        clock=Clock(recordings.time_s / recordings.samples_apart_s, recordings.step_response),
+        direction=recordings.compared(lambda s: s.direction),
     )
     return DriveChannel(recordings, channel, scale, {s.name: s for s in sources}, of_law, shortest)
 
 
 def _beyond(straight: NDArray[np.float64], patterns: Iterator[Pattern]) -> Iterator[Pattern]:
-    """Curves less what base and causes of one number do: these are not displaced by a curve that contains them."""
+    """Curves less what base and causes of one number do: these are not displaced by a curve that contains them.
+
+    A spot on the travel is another matter: it is no sum of a load, a spring and the rest of a curve. Over the position the whole
+    curve, without a name, is therefore a hypothesis beside a name with the rest of it.
+    """
     axes = _axes(straight)
     for pattern in patterns:
         samples = pattern.samples - axes @ (axes.T @ pattern.samples)
         norms = np.linalg.norm(samples, axis=0)
-        if norms.max(initial=0.0) > SAME * np.linalg.norm(pattern.samples):
-            yield replace(pattern, samples=samples[:, norms > SAME * norms.max()])
+        if norms.max(initial=0.0) <= SAME * np.linalg.norm(pattern.samples):
+            continue
+        rest = samples[:, norms > SAME * norms.max()]
+        if pattern.family is not Family.CURVE or pattern.variables[0].name != "position":
+            yield replace(pattern, samples=rest)
+            continue
+        every = rest.shape[1] + pattern.samples.shape[1]
+        parts = ((range(rest.shape[1]), "beside what has a name"), (range(rest.shape[1], every), "whole"))
+        choices = tuple((tuple(columns), float(np.log(1.0 / len(parts))), label) for columns, label in parts)
+        yield replace(pattern, samples=np.hstack([rest, pattern.samples]), choices=choices)
 
 
 def _axes(columns: NDArray[np.float64]) -> NDArray[np.float64]:

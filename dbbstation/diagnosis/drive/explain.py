@@ -111,12 +111,20 @@ def _possible_first(drive: DriveChannel, settled: Settled) -> Settled:
 
 
 def _impossible(drive: DriveChannel, fitted: DriveFit) -> dict[str, str]:
-    """Laws of a fit whose values cannot be, by what their sources say."""
+    """Laws of a fit whose values cannot be, by what their sources say.
+
+    An amplitude that cannot be negative and fits best below zero is most probably zero: the evidence was that of the wrong sign.
+    """
     values = fitted.all_values()
     found = {}
     for member in fitted.members:
         name = member.cause.name
-        if name in drive.of_law and not drive.of_law[name][0].possible(values, drive.scale):
-            shown = ", ".join(f"{k} {v.value:.3g} {v.unit}" for k, v in fitted.parameters(name).items())
+        if name not in drive.of_law:
+            continue
+        source, form = drive.of_law[name]
+        parameters = fitted.parameters(name)
+        below = any(p.positive and parameters[p.name].value < 0.0 for p in form.amplitudes)
+        if below or not source.possible(values, drive.scale):
+            shown = ", ".join(f"{k} {v.value:.3g} {v.unit}" for k, v in parameters.items())
             found[name] = f"It would have to be {shown}, which it cannot be beside the rest: something else is at work."
     return found

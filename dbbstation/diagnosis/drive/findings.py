@@ -179,7 +179,8 @@ class DriveDiagnosis:
         before: parameters of the base model.
         after: of the last model, base parameters first.
         friction: Coulomb and viscous friction per direction, `forwards` and `backwards`; empty where not identifiable.
-        chosen: causes in the last model, those first that explain most beside the others.
+        chosen: causes in the last model, those first that move the force most beside mass and viscous friction.
+        vague: causes that were fitted beside it and are not in it, since they are ambiguous and no named cause stands for them.
         base_n: force of the base model at the samples compared, shape (m,) [N].
         model_n: of the last model [N].
         whole_n: of the last model with the forces that have no name [N].
@@ -201,6 +202,7 @@ class DriveDiagnosis:
     after: dict[str, Number]
     friction: dict[str, dict[str, Value]]
     chosen: tuple[str, ...]
+    vague: tuple[str, ...]
     base_n: NDArray[np.float64]
     model_n: NDArray[np.float64]
     whole_n: NDArray[np.float64]

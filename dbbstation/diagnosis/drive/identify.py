@@ -72,14 +72,15 @@ def identify(
         and VISCOUS in values
         and _is_known(values[VISCOUS], put_together.scale.speed_m_s, put_together.scale.force_n),
     }
-    named = verdicts.named
-    model, whole = after.force_n(named), after.force_n()
+    named, predicting = verdicts.named, verdicts.predicting
+    whole = after.force_n()
     misfit = _left_of_base(explained)
     progress("held-back stretch")
     time = put_together.time_s
     held_back = time > np.quantile(time, 1.0 - HELD_BACK)
     ends = time[held_back][[0, -1]]
     mismatch = not misfit.is_noise or bool(named)
+    model = after.force_n(named)
     rest = _rest(explained, verdicts, model)
     noise = explained.settled.noise
     return DriveDiagnosis(
@@ -92,9 +93,10 @@ def identify(
         friction=_per_direction(after, values)
         if limits.several_speeds and limits.reverses and VISCOUS in values
         else {},
-        chosen=tuple(dict.fromkeys(verdicts.source_of(name) for name in named)),
+        chosen=tuple(dict.fromkeys(verdicts.source_of(name) for name in predicting)),
+        vague=tuple(dict.fromkeys(verdicts.source_of(name) for name in named if name not in predicting)),
         base_n=before.force_n(),
-        model_n=model,
+        model_n=after.force_n(predicting),
         whole_n=whole,
         held_back_s=(float(ends[0]), float(ends[1])),
         steps=tuple(_steps(explained, verdicts, held_back)),
@@ -197,10 +199,11 @@ def _steps(explained: Explained, verdicts: Verdicts, held_back: NDArray[np.bool_
     """Base and one source after another, each fitted without the held-back stretch and judged on it."""
     drive, settled = explained.drive, explained.settled
     by_name = {member.cause.name: member for member in settled.best.members}
-    groups = list(dict.fromkeys(verdicts.source_of(name) for name in verdicts.named))
+    predicting = verdicts.predicting
+    groups = list(dict.fromkeys(verdicts.source_of(name) for name in predicting))
     members, steps = [], []
     for added in ["", *groups]:
-        members += [by_name[name] for name in verdicts.named if added and verdicts.source_of(name) == added]
+        members += [by_name[name] for name in predicting if added and verdicts.source_of(name) == added]
         fitted = fit(drive, settled, members, ~held_back)
         force = drive.recordings.force_n
         left = force - fitted.force_n()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.contract import Scale
-from dbbstation.diagnosis.drive.signals import derivatives, signals_of
+from dbbstation.diagnosis.drive.signals import EDGE_PERIODS, derivatives, signals_of
 from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
@@ -100,6 +100,18 @@ class Recordings:
         """Time from one sample that is compared to the next [s]."""
         one = self.signals[0]
         return float(np.median(np.diff(one.kept))) / one.rate_hz
+
+    def step_response(self, since: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the band shows of a force that begins at zero, by samples of the comparison since it."""
+        return np.interp(since * self.samples_apart_s, *self._response)
+
+    @cached_property
+    def _response(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        one = self.signals[0]
+        reach = int(np.ceil(EDGE_PERIODS * one.rate_hz / one.cutoff_hz))
+        at = np.arange(-2 * reach, 2 * reach + 1)
+        seen = replace(one, kept=np.arange(reach, 3 * reach + 1)).compared((at >= 0).astype(np.float64))
+        return at[reach : 3 * reach + 1] / one.rate_hz, seen
 
     @property
     def notes(self) -> list[str]:

@@ -44,6 +44,7 @@ def drive_summary(diagnosis: DriveDiagnosis) -> dict[str, Any]:
                 "after": diagnosis.steps[-1].relative_force_error,
             },
             "steps": [_step(step) for step in diagnosis.steps],
+            "not_in_model": list(diagnosis.vague),
         },
         "parameters": {name: _number(number) for name, number in diagnosis.after.items()},
         "parameter_shift": [

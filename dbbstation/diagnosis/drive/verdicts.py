@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.diagnosis.drive.channel import METHOD_SHARE
 from dbbstation.diagnosis.drive.findings import DriveFinding, Effect, Part
+from dbbstation.diagnosis.drive.pulses import pulse_parts
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.read_off import OUT, read_off
 from dbbstation.inference.verdict import Value, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import Explained
@@ -50,11 +49,31 @@ class Verdicts:
 
     @property
     def named(self) -> list[str]:
-        """Members of the best hypothesis that belong to a source, largest first."""
+        """Members of the best hypothesis that belong to a source, of the source first that moves the force most.
+
+        Not the Bayes factor orders them: noise has less power at some frequencies than at others, so that a newton of ripple is
+        surer than five newtons that change slowly, and yet explains less of the force.
+        """
         best = self._explained.settled.best
         faint = {f.name for f in self._raw if f.rms < self._least_n}
         names = [m.cause.name for m in best.members if self._source_of.get(m.cause.name) and m.cause.name not in faint]
-        return sorted(names, key=lambda name: -best.log_factor(name))
+        squares = {f.name: f.rms**2 for f in self._raw}
+        moved = {
+            source: sum(squares[name] for name in names if self._source_of[name] == source)
+            for source in {self._source_of[name] for name in names}
+        }
+        return sorted(names, key=lambda name: (-moved[self._source_of[name]], -squares[name]))
+
+    @property
+    def predicting(self) -> list[str]:
+        """Those of `named` that a model is to predict with, largest first.
+
+        Of named causes that nothing tells apart one is there, and any of them predicts alike. A cause that is ambiguous by itself,
+        since its size differs between parts of the recording or nothing decides on it, is fitted beside the others as forces without
+        a name are, and does not predict.
+        """
+        sure = {f.name for f in self.findings() if f.verdict is Verdict.IDENTIFIED or f.ambiguous_with}
+        return [name for name in self.named if self.source_of(name) in sure]
 
     def source_of(self, name: str) -> str:
         """Source that a member belongs to; empty where it has no name."""
@@ -67,7 +86,8 @@ class Verdicts:
             if self._source_of[one.name] or one.verdict is not Verdict.IDENTIFIED or not one.spans:
                 continue
             span = one.spans[0]
-            variable = f"{span.variable} by direction" if one.family is Family.BY_DIRECTION else span.variable
+            turns = one.family in {Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION}
+            variable = f"{span.variable} by direction" if turns else span.variable
             found.append(Effect(one.name, variable, one.probability, one.rms, span.low, span.high, span.unit))
         return tuple(sorted(found, key=lambda e: -e.rms_n))
 
@@ -83,7 +103,7 @@ class Verdicts:
 
     def _finding(self, source: DriveSource) -> DriveFinding:
         own = self._of[source.name]
-        there = [f for f in own if f.verdict in CLAIMS and f.name in self.named]
+        there = [self._as_sure_as_it_is(f) for f in own if f.verdict in CLAIMS and f.name in self.named]
         alike = self._alike(source, there or own)
         if there and source.name == COULOMB and not self._several:
             alike = (*alike, "viscous friction")
@@ -102,7 +122,7 @@ class Verdicts:
         best = max(there or own, key=lambda f: f.log_factor, default=None)
         pulses = [f for f in there if f.family is Family.PULSES]
         parts = tuple(part for f in there if f not in pulses for part in self._parts(f))
-        parts += tuple(self._pulses(pulses)) if pulses else ()
+        parts += tuple(pulse_parts(self._explained, [f.name for f in pulses])) if pulses else ()
         parameters = self._values(best) if best is not None else {}
         if len(there) > 1 and best is not None and best.family is None:
             parameters = {k: v for f in reversed(there) for k, v in self._values(f).items()}
@@ -119,6 +139,22 @@ class Verdicts:
             parts=parts,
             text=text,
         )
+
+    def _as_sure_as_it_is(self, finding: Finding) -> Finding:
+        """A finding whose values are known as well as stretches and bands agree on them: noise alone would call them surer."""
+        if finding.verdict is not Verdict.IDENTIFIED or finding.name not in self._drive.of_law:
+            return finding
+        after = self._explained.after
+        own = after.columns_of(finding.name)
+        values, covariance = after.values[own], after.covariance[own, own]
+        sigmas = float(np.sqrt(values @ np.linalg.solve(covariance, values)))
+        if sigmas >= OUT:
+            return finding
+        why = (
+            f"Its size differs between parts of the recording, or between bands, so that it is only {sigmas:.2g} standard "
+            "uncertainties out: something that is not in the model changes it, or stands behind it."
+        )
+        return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
 
     def _is_member(self, finding: Finding) -> bool:
         return finding.name in self._explained.settled.best.names
@@ -160,18 +196,14 @@ class Verdicts:
 
     def _absent(self, source: DriveSource, own: Sequence[Finding]) -> tuple[Verdict, str]:
         """Verdict on what is not in the model, and why."""
-        scale = self._drive.scale
-        if faint := [f for f in own if self._is_member(f)]:
-            return Verdict.NOT_TESTABLE, (
-                f"What it would explain, {faint[0].rms:.2g} N rms, is less than filters and differences leave of a perfect drive."
-            )
         looked_for = {COGGING: lambda: self._no_cogging(own), TRANSIENT: self._no_transient}
+        if why := self._hidden(source, own):
+            return Verdict.NOT_TESTABLE, why
         if source.name in looked_for:
             return looked_for[source.name]()
-        if not own and not scale.reverses and not source.forms(scale):
-            return Verdict.NOT_TESTABLE, "The drive never reverses here, and only a reversal would show it."
         for finding in own:
-            if finding.verdict is Verdict.NOT_TESTABLE:
+            # What nothing tells from something else, were it only a force without a name, would not have been seen.
+            if finding.verdict in {Verdict.NOT_TESTABLE, Verdict.AMBIGUOUS}:
                 return Verdict.NOT_TESTABLE, finding.text
         refused = [f.text for f in own if f.text and f.probability == 0.0 and not f.values]
         refused += [why for name, why in self._explained.refused.items() if name.split(" ")[0] == source.name]
@@ -179,6 +211,17 @@ class Verdicts:
             return Verdict.NOT_TESTABLE, "This recording leaves it open: it neither shows nor excludes it."
         not_needed = "It would have been seen at its plausible size and was not needed."
         return Verdict.RULED_OUT, refused[0] if refused else not_needed
+
+    def _hidden(self, source: DriveSource, own: Sequence[Finding]) -> str:
+        """Why a cause could not have been seen, whatever was compared; empty where it could."""
+        scale = self._drive.scale
+        if faint := [f for f in own if self._is_member(f)]:
+            return f"What it would explain, {faint[0].rms:.2g} N rms, is less than filters and differences leave of a perfect drive."
+        if source.name == COULOMB and not self._several:
+            return "One speed tells the sum of Coulomb and viscous friction, and no more."
+        if not own and source.name not in {COGGING, TRANSIENT} and not scale.reverses and not source.forms(scale):
+            return "The drive never reverses here, and only a reversal would show it."
+        return ""
 
     def _no_cogging(self, own: Sequence[Finding]) -> tuple[Verdict, str]:
         """No wave was found: within the band there is none, and beyond it there may be."""
@@ -230,71 +273,3 @@ class Verdicts:
         if finding.name in self._drive.of_law:
             return [Part(self._drive.of_law[finding.name][1].label, self._values(finding))]
         return [Part(finding.name, dict(finding.values))]
-
-    def _pulses(self, findings: Sequence[Finding]) -> list[Part]:
-        """Stretches of time in which the force differs from the level that it has most of the time.
-
-        Stretches that were found may overlap; what they are together has levels, of which neighbours that do not differ by
-        `APART` standard uncertainties are one.
-        """
-        after, recordings = self._explained.after, self._drive.recordings
-        columns = np.concatenate([np.arange(o.start, o.stop) for o in (after.columns_of(f.name) for f in findings)])
-        inside = after.samples[:, columns]
-        values, covariance = after.values[columns], after.covariance[np.ix_(columns, columns)]
-        edges = np.concatenate([[0], np.flatnonzero(np.any(np.diff(inside, axis=0) != 0.0, axis=1)) + 1, [len(inside)]])
-        levels = [(int(a), int(b), inside[a]) for a, b in pairwise(edges)]
-
-        def differ(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
-            less = one - other
-            return abs(float(less @ values)) > APART * float(np.sqrt(max(less @ covariance @ less, 1e-300)))
-
-        joined: list[tuple[int, int, NDArray[np.float64]]] = []
-        for first, last, level in levels:
-            if joined and not differ(level, joined[-1][2]):
-                before = joined.pop()
-                share = (last - first) / (last - before[0])
-                first, level = before[0], share * level + (1.0 - share) * before[2]  # noqa: PLW2901 - one level of both
-            joined.append((first, last, level))
-        joined = _without_edges(joined, values)
-        order = sorted(joined, key=lambda one: float(one[2] @ values))
-        counts = np.cumsum([last - first for first, last, _ in order])
-        usual = order[int(np.searchsorted(counts, 0.5 * counts[-1]))][2]
-        times, apart = recordings.time_s, recordings.samples_apart_s
-        found = []
-        for first, last, level in joined:
-            if not differ(level, usual):
-                continue
-            less = level - usual
-            size = Value(float(less @ values), float(np.sqrt(less @ covariance @ less)), "N")
-            ends = (float(times[first]), float(times[last - 1]))
-            found.append(Part("", {"force_n": size, "duration_s": Value(ends[1] - ends[0] + apart, apart, "s")}, ends))
-        return found
-
-
-def _without_edges(
-    levels: Sequence[tuple[int, int, NDArray[np.float64]]], values: NDArray[np.float64]
-) -> list[tuple[int, int, NDArray[np.float64]]]:
-    """Levels in time without those of one sample between two others: the edge of a pulse within the band, which is round.
-
-    An edge goes to the level beside it that it is nearer to; a single sample with the same level on both sides is a pulse.
-    """
-    sizes = [float(level @ values) for *_, level in levels]
-    found: list[tuple[int, int, NDArray[np.float64]]] = []
-    waiting = None
-    for k, (first, last, level) in enumerate(levels):
-        begin = first if waiting is None else waiting
-        waiting = None
-        between = 0 < k < len(levels) - 1 and min(sizes[k - 1], sizes[k + 1]) < sizes[k] < max(
-            sizes[k - 1], sizes[k + 1]
-        )
-        if last - first > 1 or not between:
-            found.append((begin, last, level))
-        elif abs(sizes[k] - sizes[k - 1]) < abs(sizes[k + 1] - sizes[k]):
-            found[-1] = (found[-1][0], last, found[-1][2])
-        else:
-            waiting = first
-    return found
-
-
-APART = 4.0
-"""Standard uncertainties by which levels of a force in time must differ to be two: one in 15,000 by chance."""

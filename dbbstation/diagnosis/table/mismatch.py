@@ -163,7 +163,7 @@ def find_mismatch(
     if hold_out:
 
         def choose(part: Channel) -> Settled:
-            return settle(part.thinned(FOLD_ROWS), most_expanded=FOLD_EXPANDED, colours=False)
+            return settle(part.thinned(FOLD_ROWS), most_expanded=FOLD_EXPANDED)
 
         held_out = held_out_error(channel, choose, progress)
     return Mismatch(

@@ -176,6 +176,17 @@ class AmendmentSchema(Schema):
     """When."""
 
 
+class NoteSchema(Schema):
+    """What somebody noted while it was measured."""
+
+    made: Moment
+    """When."""
+    text: str = ""
+    """In their words."""
+    ambient_temp_c: TemperatureDegc | None = None
+    """Temperature of the shop then [degC]."""
+
+
 class SessionFile(Schema):
     """What was done: where the machine and plan stand, the bar, one entry per run."""
 
@@ -201,5 +212,7 @@ class SessionFile(Schema):
     """What was sealed; absent in sessions of older programs and in those that were written by hand."""
     amendments: tuple[AmendmentSchema, ...] = ()
     """What was changed on purpose after it was sealed, oldest first."""
+    notes: tuple[NoteSchema, ...] = ()
+    """What was noted while it was measured, oldest first."""
     runs: tuple[RunSchema, ...] = ()
     """Runs in the order they were started."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from dbbstation.files.formats.session import BarSchema, ProgramSchema, RunSchema
+    from dbbstation.files.formats.session import BarSchema, NoteSchema, ProgramSchema, RunSchema
 
 
 class RunState(StrEnum):
@@ -50,7 +50,8 @@ class Counts:
     Attributes:
         received: samples in the run file.
         lost: samples that the line lost between them.
-        rejected: samples of the file that no calculation uses, by what the instrument said of them.
+        rejected: samples of the file that no calculation uses, by what the instrument said of them; and bytes that were no sample,
+            by what was wrong with them (`unreadable checksum`).
     """
 
     received: int
@@ -67,6 +68,26 @@ class Counts:
     def data(self) -> dict[str, object]:
         """The counts as plain values."""
         return {"received": self.received, "lost": self.lost, "rejected": dict(self.rejected)}
+
+
+@dataclass(frozen=True)
+class Note:
+    """What somebody noted while a session was measured.
+
+    Attributes:
+        made: when.
+        text: in their words; empty for a temperature alone.
+        ambient_temp_c: temperature of the shop then [degC]; None where it was not read.
+    """
+
+    made: datetime
+    text: str = ""
+    ambient_temp_c: float | None = None
+
+
+def note_entry(note: NoteSchema) -> Note:
+    """Return a note as the rest of the program takes it."""
+    return Note(datetime.fromisoformat(note.made), note.text, note.ambient_temp_c)
 
 
 @dataclass(frozen=True)

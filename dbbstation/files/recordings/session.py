@@ -14,7 +14,16 @@ from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.formats.session import SessionFile
-from dbbstation.files.recordings.entries import RunEntry, RunState, bar_entry, count_in, counts_in, run_entry
+from dbbstation.files.recordings.entries import (
+    Note,
+    RunEntry,
+    RunState,
+    bar_entry,
+    count_in,
+    counts_in,
+    note_entry,
+    run_entry,
+)
 from dbbstation.files.recordings.run_csv import PART, RunFile, read_run
 from dbbstation.files.recordings.run_lines import split_file
 from dbbstation.files.recordings.seal import amendment_entry, seal_entry, seal_faults
@@ -69,6 +78,7 @@ class SessionFolder:
         set_up_errors: micrometer readings of balls that were put up under the spindle, at most one per mounting.
         seal: what machine, plan and list of runs were when they were sealed; None where nobody sealed them.
         amendments: what was changed on purpose after that, oldest first.
+        notes: what was noted while it was measured, oldest first.
     """
 
     name: str
@@ -87,6 +97,7 @@ class SessionFolder:
     set_up_errors: tuple[SetUpReadings, ...] = ()
     seal: Seal | None = None
     amendments: tuple[Amendment, ...] = ()
+    notes: tuple[Note, ...] = ()
 
     @property
     def names(self) -> tuple[str, str]:
@@ -294,6 +305,7 @@ def parse_session(
         set_up_errors=tuple(map(set_up_readings, session.set_up_errors)),
         seal=seal,
         amendments=tuple(map(amendment_entry, session.amendments)),
+        notes=tuple(map(note_entry, session.notes)),
     )
 
 

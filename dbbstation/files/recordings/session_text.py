@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.recordings.entries import Note, RunEntry
     from dbbstation.files.recordings.seal import Amendment, Seal
     from dbbstation.files.recordings.session_set_up import SetUpReadings
     from dbbstation.plan.bar import Bar
@@ -33,6 +33,7 @@ class SessionDetails:
         set_up_errors: micrometer readings of balls that were put up under the spindle.
         seal: hashes of machine, plan and jig, and the end of the chain of runs.
         amendments: what was changed on purpose after it was sealed.
+        notes: what was noted while it was measured, oldest first.
     """
 
     serial_number: str = ""
@@ -43,6 +44,7 @@ class SessionDetails:
     set_up_errors: tuple[SetUpReadings, ...] = ()
     seal: Seal | None = None
     amendments: tuple[Amendment, ...] = ()
+    notes: tuple[Note, ...] = ()
 
 
 def session_text(folder: Path, names: Sequence[str], details: SessionDetails, runs: Sequence[RunEntry]) -> str:
@@ -66,6 +68,7 @@ def session_text(folder: Path, names: Sequence[str], details: SessionDetails, ru
         "bar_waiver": details.bar_waiver or None,
         "seal": seal and seal_data(seal),
         "amendments": [_amendment_data(amendment) for amendment in details.amendments] or None,
+        "notes": [_note_data(note) for note in details.notes] or None,
         # Directly above the runs, where people write them in.
         "set_up_errors": [_without_none(asdict(readings)) for readings in details.set_up_errors] or None,
     }
@@ -83,6 +86,10 @@ def seal_data(seal: Seal) -> dict[str, object]:
 
 def _amendment_data(amendment: Amendment) -> object:
     return _without_none({each.name: _plain(getattr(amendment, each.name)) or None for each in fields(amendment)})
+
+
+def _note_data(note: Note) -> object:
+    return _without_none({**asdict(note), "made": _plain(note.made), "text": note.text or None})
 
 
 def _run_data(folder: Path, run: RunEntry) -> dict[str, object]:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.recordings.entries import Counts
+    from dbbstation.files.recordings.entries import Counts, Note
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
 
@@ -297,6 +297,15 @@ class SessionWriter:
         judged = self._put(replace(run, state=state, reason="" if accepted else reason))
         self._write()
         return judged
+
+    def note(self, note: Note) -> None:
+        """Note something while it is measured.
+
+        Raises:
+            OutputError: the disk refuses.
+        """
+        self._session = replace(self._session, notes=(*self._session.notes, note))
+        self._write()
 
     def take_in(self, path: Path) -> RunEntry:
         """List a sealed run that lies in the folder and is in no list, as `complete`: it is still to be judged.

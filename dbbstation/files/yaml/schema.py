@@ -57,6 +57,7 @@ SINCE: dict[str, dict[str, int]] = {
         "amendments": 3,
         "chain_sha256": 3,
         "counts": 3,
+        "notes": 3,
         **dict.fromkeys(_OF_BARS, 3),
     },
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},

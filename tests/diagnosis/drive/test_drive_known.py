@@ -137,19 +137,9 @@ def test_asymmetric_coulomb_friction_and_a_load_look_the_same():
     ("truth", "variable"),
     [
         # A tight spot: position-friction knows slopes and bows only.
-        pytest.param(
-            Truth(load=lambda _t, x, _v: 15.0 * exp(-(((x - 0.13) / 0.012) ** 2))),
-            "position",
-            marks=pytest.mark.xfail(strict=True, reason="smooth laws of position are called in for a narrow spot"),
-        ),
+        (Truth(load=lambda _t, x, _v: 15.0 * exp(-(((x - 0.13) / 0.012) ** 2))), "position"),
         # A brake that drags for some seconds.
-        pytest.param(
-            Truth(sliding=lambda t, _x, _v, _d: 15.0 * (6.0 < t < 13.0)),
-            "time by direction",
-            marks=pytest.mark.xfail(
-                strict=True, reason="called a transient force: no curve over time by direction is known"
-            ),
-        ),
+        (Truth(sliding=lambda t, _x, _v, _d: 15.0 * (6.0 < t < 13.0)), "time by direction"),
     ],
 )
 def test_what_no_name_describes_is_called_unexplained(truth, variable):

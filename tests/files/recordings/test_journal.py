@@ -155,7 +155,7 @@ def test_a_header_that_was_lost_is_an_error() -> None:
         parse_run(bytes(600), "a.csv.part", partial=True)
 
 
-def test_synced_once_a_second_and_on_demand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_synced_twice_a_second_and_on_demand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
     synced: list[int] = []
     writer = writer_in(tmp_path, lambda: now[0])
@@ -164,13 +164,13 @@ def test_synced_once_a_second_and_on_demand(tmp_path: Path, monkeypatch: pytest.
     for index in range(300):
         now[0] = index * 0.01
         writer.append((now[0], 150.0, "ok"))
-    assert synced == [101, 201]
+    assert synced == [51, 101, 151, 201, 251]
     writer.sync_if_due()
-    assert len(synced) == 2
+    assert len(synced) == 5
     now[0] = 10.0
     writer.sync_if_due()
     writer.sync()
-    assert synced == [101, 201, 300, 300]
+    assert synced == [51, 101, 151, 201, 251, 300, 300]
     writer.close()
 
 

@@ -1,0 +1,102 @@
+"""What stands out of what base and members leave: the looks of a comparison, and edges in time at their best places."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.looks import looked_for
+from dbbstation.inference.patterns import Family
+from dbbstation.inference.pieces import Left
+from dbbstation.inference.square_root import free_directions
+from dbbstation.inference.stretches import refined, stretches
+from dbbstation.inference.variables import Kind, Variable
+
+if TYPE_CHECKING:
+    from collections.abc import Container, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.bank import Bank
+    from dbbstation.inference.channel import Channel
+    from dbbstation.inference.model_comparison import Member
+    from dbbstation.inference.patterns import Pattern
+
+IN_TIME = (Family.PULSES, Family.PULSES_BY_DIRECTION)
+"""Patterns whose edges are nonlinear parameters: they are moved to their best places in each noise."""
+
+
+def seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Pattern]:
+    """Patterns that stand out of what base and members leave."""
+    channel = bank.channel
+    left = _left(bank, *_fitted(bank, members))
+    size = channel.size / left.noise
+    found = looked_for(left, channel.variables, channel.kept, size)
+    if in_time and channel.time is not None:
+        found += _in_time(left, channel, size)
+    return bank.worthy(left, found)
+
+
+def _fitted(bank: Bank, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Whitened columns of base and members, and the standard deviations of their amplitudes, shape (m, k) and (k,)."""
+    known, held = bank.channel.known, bank.channel.held
+    fixed, random = np.flatnonzero(~known.random), np.flatnonzero(known.random)
+    base = bank.base
+    columns = [base[:, fixed] @ free_directions(known, fixed, held), base[:, random]]
+    sd = [np.full(columns[0].shape[1], np.inf), known.prior[random]]
+    for member in members:
+        columns.append(bank.fitted(member.columns))
+        sd.append(member.sd)
+    return np.hstack(columns), np.concatenate(sd)
+
+
+def _left(bank: Bank, columns: NDArray[np.float64], sd: NDArray[np.float64]) -> Left:
+    return Left.of(bank.target, columns, sd, bank.noise, bank.whitening)
+
+
+def edges_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> tuple[Member, ...]:
+    """Members with the ends of their stretches of time where they explain most beside the others, in the noise that there is."""
+    channel = bank.channel
+    members = list(members)
+    for number, member in enumerate(members):
+        pattern = bank.patterns.get(member.cause.name)
+        if pattern is None or pattern.family not in IN_TIME or pattern.name not in among:
+            continue
+        others, sd = _fitted(bank, [*members[:number], *members[number + 1 :]])
+        count = len(member.variant.columns)
+
+        sd = np.concatenate([sd, member.sd[:-1]])
+        better = refined(
+            pattern,
+            count,
+            partial(_left_beside, bank, others, sd),
+            channel.blocks,
+            channel.kept,
+            channel.size / bank.noise.innovation,
+            clock=channel.clock,
+            direction=channel.direction if pattern.family is Family.PULSES_BY_DIRECTION else None,
+        )
+        bank.drop({pattern.name})
+        bank.add([better])
+        cause = next(cause for cause in bank.causes if cause.name == better.name)
+        variant = max(cause.variants, key=lambda one: len(one.columns))
+        members[number] = replace(member, cause=cause, variant=variant)
+    return tuple(members)
+
+
+def _left_beside(
+    bank: Bank, others: NDArray[np.float64], sd: NDArray[np.float64], but_for: int, own: NDArray[np.float64]
+) -> Left:
+    """What is left beside others and all but one of some columns that are not whitened."""
+    return _left(bank, np.hstack([others, np.delete(bank.whitened(own), but_for, axis=1)]), sd)
+
+
+def _in_time(left: Left, channel: Channel, size: float) -> list[Pattern]:
+    """Stretches of time that stand out of what a fit leaves, and those in which it turns with the direction of travel."""
+    by = None
+    if channel.time is not None and channel.direction is not None:
+        by = (Variable("time", channel.time_unit, Kind.TIME, channel.time), channel.direction)
+    return stretches(left, channel.blocks, channel.kept, size, clock=channel.clock, by=by)

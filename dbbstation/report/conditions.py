@@ -1,0 +1,102 @@
+"""Under which conditions a session was measured, as rows of a table."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from dbbstation.files.recordings.entries import RunState
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.circled import MeasuredCircle
+    from dbbstation.files.recordings.entries import Note
+    from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.plan.bar import Bar
+
+_NOT_NOTED = "not noted"
+
+
+def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: str) -> tuple[tuple[str, str], ...]:
+    """Return name and value of each condition; what nobody noted is said to be not noted.
+
+    Args:
+        session: the session.
+        circles: its accepted runs.
+        job: what it was measured for, as typed.
+    """
+    compensated = sum(1 for run in session.in_state(RunState.ACCEPTED) if run.program is not None)
+    accepted = len(session.in_state(RunState.ACCEPTED))
+    return (
+        ("machine", session.machine.name),
+        ("serial number", session.serial_number or _NOT_NOTED),
+        ("operator", session.operator or _NOT_NOTED),
+        ("job", job or _NOT_NOTED),
+        ("measured", when_measured(session)),
+        ("plan", session.plan.name),
+        ("runs", _runs(session)),
+        ("programs", f"{compensated} of {accepted} accepted runs under NC programs that the session keeps"),
+        *_bar(session.bar, session.bar_waiver),
+        ("temperature of the shop", _degc(session.ambient_temp_c)),
+        ("logged temperatures", _logged(circles)),
+        *(("noted", _noted(note)) for note in session.notes),
+        ("seal", _seal(session)),
+        *(("changed since", amendment.text) for amendment in session.amendments),
+    )
+
+
+def when_measured(session: SessionFolder) -> str:
+    """Return the starts of the first and the last run of a session, in words."""
+    moments = [run.started for run in session.runs if run.started is not None]
+    return f"{min(moments):%Y-%m-%d %H:%M} to {max(moments):%Y-%m-%d %H:%M %Z}" if moments else _NOT_NOTED
+
+
+def _runs(session: SessionFolder) -> str:
+    states = Counter(str(run.state) for run in session.runs)
+    return ", ".join(f"{count} {state}" for state, count in sorted(states.items()))
+
+
+def _bar(bar: Bar | None, waiver: str) -> tuple[tuple[str, str], ...]:
+    without = (("measured without a fresh calibration of the bar", waiver),) if waiver else ()
+    if bar is None:
+        return (("bar", _NOT_NOTED), *without)
+    calibrated = f"{bar.calibrated_length_mm:.4f} mm, u {1e3 * bar.calibrator_uncertainty_mm:.2g} µm"
+    when = "" if bar.calibrated is None else f", {bar.calibrated:%Y-%m-%d %H:%M %Z}"
+    at = "" if bar.temp_c is None else f", at {_degc(bar.temp_c)}"
+    grows = _NOT_NOTED if bar.expansion_um_m_k is None else f"{bar.expansion_um_m_k:g} µm/(m K)"
+    return (
+        ("bar", bar.serial_number or _NOT_NOTED),
+        ("bar calibrated", calibrated + when + at),
+        ("thermal expansion of the bar", grows),
+        *without,
+    )
+
+
+def _noted(note: Note) -> str:
+    shop = "" if note.ambient_temp_c is None else f"shop at {_degc(note.ambient_temp_c)}"
+    return f"{note.made:%Y-%m-%d %H:%M %Z}: {'; '.join(part for part in (note.text, shop) if part)}"
+
+
+def _degc(value: float | None) -> str:
+    return _NOT_NOTED if value is None else f"{value:.1f} °C"
+
+
+def _logged(circles: Sequence[MeasuredCircle]) -> str:
+    """Range of every thermometer over the accepted runs."""
+    ranges: dict[str, tuple[float, float]] = {}
+    for one in circles:
+        logged = {} if one.analysis is None else one.analysis.raw.temperature_degc
+        for name, values in logged.items():
+            low, high = float(values.min()), float(values.max())
+            before = ranges.get(name, (low, high))
+            ranges[name] = min(low, before[0]), max(high, before[1])
+    told = [f"{name} {low:.1f} to {high:.1f} °C" for name, (low, high) in sorted(ranges.items())]
+    return ", ".join(told) or "none"
+
+
+def _seal(session: SessionFolder) -> str:
+    if session.seal is None:
+        return "none"
+    chain = session.seal.chain_sha256[:16]
+    return f"{session.seal.runs} sealed runs, chain ends with {chain or 'nothing'}; unbroken when this was written"

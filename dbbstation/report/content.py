@@ -1,0 +1,271 @@
+"""What a report says: figures, verdict, conditions and drawings, ready for its template."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.circled import circled_summary
+from dbbstation.machine.difference import differences, in_words
+from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.report.conditions import conditions, when_measured
+from dbbstation.report.model_part import not_visible, parameters
+from dbbstation.report.plate_map import WIDTH, plate_map
+from dbbstation.report.polar import CIRCLE, SIZE, polar
+from dbbstation.report.verdict import verdict_of
+from dbbstation.tolerated import Conformity, held_against, tolerated_circles
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from dbbstation.circled import Circled
+    from dbbstation.circles.path import Filter
+    from dbbstation.files.formats.settings import Settings
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.tolerated import Held, ToleratedCircle
+
+
+@dataclass(frozen=True, eq=False)
+class Modelled:
+    """A model beside the circles.
+
+    Attributes:
+        identified: the model.
+        evaluation: what `evaluated` returns; empty where it could not be worked out.
+        problem: why it could not; empty where it could.
+    """
+
+    identified: IdentifiedModel
+    evaluation: Mapping[str, Any]
+    problem: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Reported:
+    """What goes into a report.
+
+    Attributes:
+        found: circles as measured, with findings.
+        chosen: filter of their figures.
+        settings: of the shop, with its tolerances.
+        coverage_factor: k of U = k u.
+        before: circles measured before; None where none are given.
+        modelled: a model beside them; None where none is given.
+        job: what was measured for; empty where not said.
+    """
+
+    found: Circled
+    chosen: Filter
+    settings: Settings
+    coverage_factor: float
+    before: Circled | None = None
+    modelled: Modelled | None = None
+    job: str = ""
+
+
+def numbers_of(reported: Reported) -> dict[str, Any]:
+    """Return the numbers of a report: what its command prints as JSON, and its template shows."""
+    now = tolerated_circles(reported.found.circles)
+    held = held_against(reported.settings.tolerances, now, reported.coverage_factor)
+    verdict = verdict_of(held, reported.found, reported.coverage_factor)
+    before = () if reported.before is None else tolerated_circles(reported.before.circles)
+    rows = list(_side_by_side(now, before))
+    return {
+        "verdict": {
+            "kind": verdict.kind,
+            "headline": verdict.headline,
+            "reasons": list(verdict.reasons),
+            "to_do": list(verdict.to_do),
+        },
+        "coverage_factor": reported.coverage_factor,
+        "tolerances": [_held_data(one, reported.coverage_factor) for one in held],
+        "measured": rows,
+        "measured_means": _means(rows),
+        "circles": circled_summary(reported.found, reported.chosen),
+        "model": None if reported.modelled is None else dict(reported.modelled.evaluation),
+    }
+
+
+def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Provenance) -> dict[str, Any]:
+    """Return everything that the template of a report names.
+
+    Args:
+        reported: what goes into it.
+        numbers: what `numbers_of` returns of it.
+        provenance: where it comes from.
+    """
+    found, modelled = reported.found, reported.modelled
+    bad = {one["worst"]["test"] for one in numbers["tolerances"] if one["worst"] and not one["within"]}
+    bad |= {one.entry.test for one in found.circles if one.problem or (one.judgement and one.judgement.wrong)}
+    return {
+        **numbers,
+        "machine": found.sessions[0].machine.name,
+        "job": reported.job,
+        "sessions": [
+            {
+                "name": session.name,
+                "measured": when_measured(session),
+                "conditions": conditions(
+                    session, [c for c in found.circles if c.session == session.name], reported.job
+                ),
+                "places": plate_map({name: session.plan.tests[name] for name in _tests_of(found, session.name)}, bad),
+                "known": all(session.plan.tests[name].ball.place_known for name in _tests_of(found, session.name)),
+            }
+            for session in found.sessions
+            if any(c.session == session.name for c in found.circles)
+        ],
+        "map_width": WIDTH,
+        "polar_size": SIZE,
+        "polar_radius": CIRCLE,
+        "polars": _polars(reported),
+        "before_name": "" if reported.before is None else reported.before.sessions[0].name,
+        "several": len(found.sessions) > 1,
+        "findings": _findings(found),
+        "not_stated": _not_stated(numbers["circles"]),
+        "tolerances_from": reported.settings.tolerances_from,
+        "modelled": None
+        if modelled is None
+        else {
+            "problem": modelled.problem,
+            "parameters": parameters(modelled.identified, reported.coverage_factor),
+            "not_visible": not_visible(modelled.identified),
+        },
+        "notes": [*found.warnings, *_notes_before(reported)],
+        "files": list(_files(reported, provenance)),
+        "provenance": provenance,
+    }
+
+
+def _notes_before(reported: Reported) -> list[str]:
+    """Return what is to be said of the circles before: where they are of another machine, first of all."""
+    if reported.before is None:
+        return []
+    one, other = reported.before.sessions[0].machine, reported.found.sessions[0].machine
+    unlike = differences(one, other)
+    told = f"The session before is of another nominal machine; before and now: {in_words(unlike)}."
+    return [*([told] if unlike else []), *reported.before.warnings]
+
+
+def _tests_of(found: Circled, session: str) -> list[str]:
+    return list(dict.fromkeys(one.entry.test for one in found.circles if one.session == session))
+
+
+def _held_data(held: Held, coverage_factor: float) -> dict[str, Any]:
+    worst = held.worst
+    size = None if worst is None else worst.sizes[held.tolerance.figure]
+    return {
+        "quantity": held.tolerance.figure.value,
+        "largest_um": held.tolerance.largest_um,
+        "tests": list(held.tolerance.tests),
+        "directions": [direction.value for direction in held.tolerance.directions],
+        "conformity": None if held.conformity is None else str(held.conformity),
+        "within": held.conformity in {None, Conformity.WITHIN},
+        "exceeded": held.exceeded,
+        "undecided": held.undecided,
+        "circles": held.circles,
+        "worst": None
+        if worst is None or size is None
+        else {
+            "test": worst.test,
+            "direction": worst.direction,
+            "repeat": worst.repeat,
+            "um": size.um,
+            "expanded_um": coverage_factor * size.u_um,
+        },
+    }
+
+
+def _side_by_side(now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle]) -> Iterable[dict[str, Any]]:
+    """Yield figures as measured, each with those of the same test, direction and repeat before."""
+    former = {one.key: one for one in before}
+    for one in now:
+        then = former.get(one.key)
+        yield {
+            "session": one.session,
+            "test": one.test,
+            "direction": one.direction,
+            "repeat": one.repeat,
+            "now": _sizes(one),
+            "before": None if then is None else _sizes(then),
+        }
+
+
+def _sizes(one: ToleratedCircle) -> dict[str, dict[str, float]]:
+    return {str(figure): {"um": size.um, "u_um": size.u_um} for figure, size in one.sizes.items()}
+
+
+def _means(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Mean and largest of each figure; with those before of the circles that were measured both times."""
+    both = [row for row in rows if row["before"] is not None]
+    told = both or list(rows)
+    return [
+        {
+            "quantity": figure.value,
+            "circles": len(told),
+            "now": _mean_and_largest([row["now"][figure.value]["um"] for row in told]),
+            "before": _mean_and_largest([row["before"][figure.value]["um"] for row in both]),
+        }
+        for figure in CircleFigure
+    ]
+
+
+def _mean_and_largest(sizes: Sequence[float]) -> dict[str, float] | None:
+    return {"mean_um": sum(sizes) / len(sizes), "largest_um": max(sizes)} if sizes else None
+
+
+def _polars(reported: Reported) -> list[dict[str, Any]]:
+    before = () if reported.before is None else reported.before.circles
+    tests = dict.fromkeys((one.session, one.entry.test) for one in reported.found.circles if one.analysis is not None)
+    several = len(reported.found.sessions) > 1
+    return [
+        {
+            "title": f"{session}: test {test}" if several else f"test {test}",
+            "drawing": polar(
+                test,
+                [
+                    c
+                    for c in reported.found.circles
+                    if (c.session, c.entry.test) == (session, test) and c.analysis is not None
+                ],
+                [c for c in before if c.entry.test == test and c.analysis is not None],
+            ),
+        }
+        for session, test in tests
+    ]
+
+
+def _findings(found: Circled) -> dict[str, Any]:
+    """Return findings that are wrong, run by run, and those that could not be told, by what they are."""
+    wrong, untold, good = [], dict[tuple[str, str], list[str]](), 0
+    for one in found.circles:
+        for finding in () if one.judgement is None else one.judgement.findings:
+            if finding.wrong:
+                wrong.append((one.session, one.entry.label, finding))
+            elif finding.verdict.value == "good":
+                good += 1
+            else:
+                untold.setdefault((str(finding.name), finding.text), []).append(one.entry.label)
+    return {
+        "wrong": wrong,
+        "untold": [(name, text, runs) for (name, text), runs in untold.items()],
+        "good": good,
+    }
+
+
+def _not_stated(circles: Mapping[str, Any]) -> list[str]:
+    budgets = [
+        budget for run in [*circles["runs"], *circles["pairs"]] for budget in run.get("uncertainty", {}).values()
+    ]
+    return list(dict.fromkeys(cause for budget in budgets for cause in budget["missing"]))
+
+
+def _files(reported: Reported, provenance: Provenance) -> Iterable[tuple[str, str]]:
+    """Yield name and SHA-256 of every file that the report rests on, recordings too."""
+    yield from provenance.inputs.items()
+    for found in (reported.found, *(() if reported.before is None else (reported.before,))):
+        for one in found.circles:
+            yield f"{one.session}/runs/{one.entry.path.name}", one.entry.sha256
+            if one.entry.program is not None:
+                program = one.entry.program
+                yield f"{one.session}/{program.path.parent.name}/{program.path.name}", program.sha256

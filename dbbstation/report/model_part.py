@@ -1,0 +1,42 @@
+"""What a model adds to a report: what it leaves, its parameters with U, and what its recordings could not see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.sources.contract import Owner
+
+if TYPE_CHECKING:
+    from dbbstation.model.identified import IdentifiedModel
+
+
+def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tuple[str, str, str, str, str], ...]:
+    """Return source, parameter, value, U and unit of every parameter of the machine; U is a dash where it is not known.
+
+    Args:
+        identified: the model.
+        coverage_factor: k of U = k u.
+    """
+    u = dict(zip(identified.covariance_rows, np.sqrt(np.maximum(np.diag(identified.covariance), 0.0)), strict=True))
+    rows = []
+    for fitted in identified.model.sources:
+        if fitted.source.belongs_to is not Owner.MACHINE:
+            continue
+        named = fitted.source.parameters(identified.model.machine)
+        for parameter, value in zip(named, fitted.values, strict=True):
+            known = u.get((fitted.source.name, fitted.shared, parameter.name))
+            expanded = "-" if known is None else f"{coverage_factor * float(known):.2g}"
+            rows.append((fitted.source.name, parameter.name, f"{float(value):.5g}", expanded, parameter.unit))
+    return tuple(rows)
+
+
+def not_visible(identified: IdentifiedModel) -> tuple[str, ...]:
+    """Return what the recordings of a model could not see, and what they saw least, in words."""
+    lost = [f"Not visible, held at nominal: {text}." for text in identified.directions_lost]
+    seen = identified.report.get("observability")
+    weak: Any = seen.get("weak_directions", []) if isinstance(seen, Mapping) else []
+    told = [f"Seen least: {one['text']}, ± {one['uncertainty']:.2g} {one['unit']} (u)." for one in weak]
+    return (*lost, *told)

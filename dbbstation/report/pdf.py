@@ -1,0 +1,78 @@
+"""A report as PDF, printed by a Chromium that is installed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from dbbstation.errors import StationError
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge")
+"""Names under which a Chromium is installed, on the PATH."""
+
+BROWSER_VARIABLE = "DBBSTATION_CHROMIUM"
+"""Environment variable that names one elsewhere."""
+
+PATIENCE_S = 120.0
+"""A report of a hundred runs prints in seconds; a browser that takes longer waits for something that does not come [s]."""
+
+
+def chromium() -> str:
+    """Return the Chromium that prints.
+
+    Raises:
+        StationError: none is installed.
+    """
+    named = os.environ.get(BROWSER_VARIABLE)
+    found = next((path for name in ((named,) if named else BROWSERS) if (path := shutil.which(name))), None)
+    if found is None:
+        what = (
+            f"{named}, which {BROWSER_VARIABLE} names, is no program"
+            if named
+            else "no Chromium is installed to print a PDF"
+        )
+        remedy = (
+            "install Chromium (Debian: apt install chromium; Windows: Edge is one), name one in "
+            f"{BROWSER_VARIABLE}, or open the HTML file in any browser and print it"
+        )
+        raise StationError(what, where="--pdf", remedy=remedy)
+    return found
+
+
+def printed(html: bytes, browser: str) -> bytes:
+    """Return a report as PDF.
+
+    Args:
+        html: the report.
+        browser: what `chromium` returns.
+
+    Raises:
+        StationError: the browser fails, with what it said last.
+    """
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        page, out = Path(folder) / "report.html", Path(folder) / "report.pdf"
+        page.write_bytes(html)
+        command = [
+            browser,
+            "--headless",
+            "--disable-gpu",
+            "--no-pdf-header-footer",
+            f"--user-data-dir={folder}/profile",
+        ]
+        if hasattr(os, "geteuid") and os.geteuid() == 0:
+            command.append("--no-sandbox")  # as root it does not start with one; the page has no script
+        command += [f"--print-to-pdf={out}", page.as_uri()]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise StationError(f"the browser did not print: {error}", where=browser, remedy=_BY_HAND) from error
+        if not out.is_file():
+            said = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
+            raise StationError(f"the browser did not print: {said[0]}", where=browser, remedy=_BY_HAND)
+        return out.read_bytes()
+
+
+_BY_HAND = "open the HTML file in any browser and print it"

@@ -1,0 +1,73 @@
+"""Where the tests of a plan stand on the table, as what an SVG needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    from dbbstation.plan.plan import PlannedTest
+
+WIDTH = 420
+"""Width and height of the map in its own units."""
+
+_MARGIN = 70.0
+
+_SAME_MM = 1.0
+"""Balls whose places differ by less stand in one place: holders of several heights in one bore."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where balls stand, one above another.
+
+    Attributes:
+        x: on the map.
+        y: on the map.
+        label: bore, or X and Y where there is none.
+        tests: names of the tests there.
+        marked: whether one of them needs attention.
+    """
+
+    x: float
+    y: float
+    label: str
+    tests: str
+    marked: bool
+
+
+def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tuple[Place, ...]:
+    """Return the places of tests; +X is to the right, +Y up.
+
+    Args:
+        tests: by name; at least one.
+        marked: names of those that need attention.
+    """
+    at: dict[tuple[int, int], list[PlannedTest]] = {}
+    for test in tests.values():
+        x, y, _ = test.ball.centre_mm
+        at.setdefault((round(x / _SAME_MM), round(y / _SAME_MM)), []).append(test)
+    xs, ys = [x for x, _ in at], [y for _, y in at]
+    width_mm = max(max(xs) - min(xs), max(ys) - min(ys), 1) * _SAME_MM
+    scale = (WIDTH - 2.0 * _MARGIN) / width_mm
+    middle = _SAME_MM * (max(xs) + min(xs)) / 2.0, _SAME_MM * (max(ys) + min(ys)) / 2.0
+    return tuple(
+        Place(
+            x=round(WIDTH / 2.0 + scale * (_SAME_MM * x - middle[0]), 1),
+            y=round(WIDTH / 2.0 - scale * (_SAME_MM * y - middle[1]), 1),
+            label=_label(there),
+            tests=" ".join(test.name for test in there),
+            marked=any(test.name in marked for test in there),
+        )
+        for (x, y), there in at.items()
+    )
+
+
+def _label(there: list[PlannedTest]) -> str:
+    bores = list(dict.fromkeys(test.ball.bore for test in there if test.ball.bore is not None))
+    if bores:
+        return f"bore {', '.join(map(str, bores))}"
+    x, y, _ = there[0].ball.centre_mm
+    return f"X {x:.0f} Y {y:.0f}"

@@ -1,0 +1,162 @@
+"""Polar traces of measured circles as what an SVG needs: points, rings and their labels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.circled import MeasuredCircle
+
+SIZE = 320
+"""Width and height of a polar figure in its own units."""
+
+CIRCLE = 92.0
+"""Radius at which the nominal circle is drawn."""
+
+REACH = 44.0
+"""How far from that the greatest deviation of a figure is drawn, either way."""
+
+BINS = 240
+"""Stretches of a turn, of which each is drawn by its greatest and least deviation: narrower ones cannot be told apart at the size
+of the figure, and a peak of a single reading is still there."""
+
+MOST_DRAWN = 4
+"""Repeats of one direction that are drawn; more cover one another. The others are counted below the figure."""
+
+_STEPS = (1.0, 2.0, 5.0)
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One run as drawn.
+
+    Attributes:
+        points: of the path, as SVG takes them.
+        direction: `ccw` or `cw`.
+        former: whether it was measured before.
+        thin: whether it is a repeat of one that is drawn already.
+        title: what is shown where the pointer rests on it.
+    """
+
+    points: str
+    direction: str
+    former: bool
+    thin: bool
+    title: str
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A circle of equal deviation.
+
+    Attributes:
+        radius: in units of the figure.
+        um: deviation [µm].
+    """
+
+    radius: float
+    um: float
+
+    @property
+    def label(self) -> str:
+        """The deviation with its sign."""
+        return f"{self.um:+g}" if self.um else "0"
+
+
+@dataclass(frozen=True)
+class Polar:
+    """The circles of one test.
+
+    Attributes:
+        test: its name.
+        what: the circle in words.
+        traces: in drawing order.
+        rings: nominal circle and one division either way.
+        step_um: of a division [µm].
+        not_drawn: repeats that are left out.
+    """
+
+    test: str
+    what: str
+    traces: tuple[Trace, ...]
+    rings: tuple[Ring, ...]
+    step_um: float
+    not_drawn: int
+
+
+def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCircle] = ()) -> Polar:
+    """Return the circles of a test about their least-squares centres, before and now to one scale.
+
+    Args:
+        test: its name.
+        now: its runs with figures, in the order in which they were measured; at least one.
+        before: the same, measured before.
+    """
+    drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in _chosen(runs)]
+    analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
+    most_um = max(float(np.abs(analysis.residual_um).max()) for _, analysis, _, _ in analysed)
+    scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
+    traces = tuple(
+        Trace(
+            points=_points(analysis.path.theta_deg, analysis.residual_um, scale),
+            direction=str(one.entry.direction),
+            former=former,
+            thin=thin,
+            title=f"{'before: ' if former else ''}{one.entry.label}: G {analysis.g_um:.1f} µm",
+        )
+        for one, analysis, former, thin in analysed
+    )
+    circle = analysed[-1][1].raw.circle
+    tilt = ", ".join(f"{axis} {angle:g}°" for axis, angle in zip("ABC", circle.tilt_deg, strict=True) if angle)
+    step_um = step_of(most_um)
+    return Polar(
+        test=test,
+        what=f"bar {circle.bar_mm:g} mm, {tilt or 'not tilted'}, {circle.feed_mm_min:g} mm/min",
+        traces=traces,
+        rings=tuple(Ring(CIRCLE + scale * um, um) for um in (-step_um, 0.0, step_um)),
+        step_um=step_um,
+        not_drawn=len(now) + len(before) - len(drawn),
+    )
+
+
+def step_of(most_um: float) -> float:
+    """Return the largest of 1, 2, 5, 10, ... that is no larger than a deviation [µm]; 0.001 at the least."""
+    most_um = max(most_um, 1e-3)
+    power = 10.0 ** np.floor(np.log10(most_um))
+    return float(max(step for step in _STEPS if step * power <= most_um * (1.0 + 1e-9)) * power)
+
+
+def _chosen(runs: Sequence[MeasuredCircle]) -> list[tuple[MeasuredCircle, bool]]:
+    """Return the runs that are drawn, the last of each direction full, those before it thin."""
+    chosen: list[tuple[MeasuredCircle, bool]] = []
+    for direction in dict.fromkeys(one.entry.direction for one in runs):
+        of = [one for one in runs if one.entry.direction is direction][-MOST_DRAWN:]
+        chosen += [(one, one is not of[-1]) for one in of]
+    return chosen
+
+
+def _points(theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64], scale: float) -> str:
+    """Return the closed path of a turn; Y is up in the machine and down in SVG."""
+    order = np.argsort(theta_deg, kind="stable")
+    theta, deviation = np.radians(theta_deg[order]), deviation_um[order]
+    kept = np.arange(len(theta)) if len(theta) <= 2 * BINS else _extremes(theta, deviation)
+    radius = CIRCLE + scale * deviation[kept]
+    middle = SIZE / 2
+    x, y = middle + radius * np.cos(theta[kept]), middle - radius * np.sin(theta[kept])
+    return " ".join(f"{one:.1f},{other:.1f}" for one, other in zip(x, y, strict=True))
+
+
+def _extremes(theta: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return where each stretch has its greatest and its least deviation, in the order of the turn."""
+    stretch = np.minimum((theta / (2.0 * np.pi) * BINS).astype(np.intp), BINS - 1)
+    by_size = np.lexsort((deviation, stretch))
+    first = np.flatnonzero(np.diff(stretch[by_size], prepend=-1))
+    last = np.append(first[1:], len(by_size)) - 1
+    return np.unique(np.concatenate([by_size[first], by_size[last]]))

@@ -1,0 +1,112 @@
+"""The first page of a report: what the shop's tolerances say, and what to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.tolerated import Conformity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from dbbstation.circled import Circled, MeasuredCircle
+    from dbbstation.tolerated import Held
+
+MOST_TOLD = 5
+"""Runs that the first page names; the findings name all."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a foreman reads first.
+
+    Attributes:
+        kind: `within`, `exceeded`, `cannot tell` or `none`, where nothing was held against anything.
+        headline: in one sentence.
+        reasons: one sentence for each tolerance that is not kept.
+        to_do: what to do, in order.
+    """
+
+    kind: str
+    headline: str
+    reasons: tuple[str, ...]
+    to_do: tuple[str, ...]
+
+
+def verdict_of(held: Sequence[Held], found: Circled, coverage_factor: float) -> Verdict:
+    """Return the verdict of tolerances held against measured circles.
+
+    Args:
+        held: tolerances; empty where the shop has none.
+        found: the circles, with their findings.
+        coverage_factor: k of U = k u.
+    """
+    said = {one.conformity for one in held}
+    repeat = tuple(_to_repeat(found.circles))
+    if not said - {None}:
+        nothing = "The shop's settings have no tolerance for these circles: there is no verdict."
+        write = "Write tolerances into the shop's settings (`dbbstation settings --template` shows how) and make the report anew."
+        return Verdict("none", nothing, (), (*repeat, write))
+    told = [one for one in held if one.conformity in {Conformity.EXCEEDED, Conformity.UNDECIDED}]
+    reasons = tuple(_reason(one, coverage_factor) for one in told)
+    if Conformity.EXCEEDED in said:
+        headline = "The machine is NOT within the shop's tolerances."
+        return Verdict(Conformity.EXCEEDED, headline, reasons, (*repeat, *_cure(found)))
+    if Conformity.UNDECIDED in said:
+        headline = "It cannot be told whether the machine is within the shop's tolerances."
+        narrow = (
+            "A limit lies within the uncertainty U of a figure. The budget of the figure says what U comes from "
+            "(`dbbstation circles --budget`): lessen its largest term, or agree on another limit."
+        )
+        return Verdict(Conformity.UNDECIDED, headline, reasons, (*repeat, narrow))
+    keep = (
+        "The circles need no correction. Measure again after a crash, a repair or a move of the machine; the plan "
+        "ten-minute-check.yaml shows in three tests whether this still holds."
+    )
+    return Verdict(Conformity.WITHIN, "Every circle is within the shop's tolerances.", (), (*repeat, keep))
+
+
+def _reason(held: Held, coverage_factor: float) -> str:
+    worst = held.worst
+    if worst is None:
+        return ""
+    size = worst.sizes[held.tolerance.figure]
+    name = held.tolerance.figure.value.replace("-", " ").capitalize()
+    run = f"{worst.test} {worst.direction} {worst.repeat}"
+    exceeded = f"{held.exceeded} of {held.circles} circles exceed it"
+    undecided = f"of {held.undecided} it cannot be told" if held.undecided else ""
+    counts = ", ".join(part for part in (exceeded, undecided) if part)
+    measured = f"{size.um:.1f} µm, U {coverage_factor * size.u_um:.1f} µm"
+    return f"{name}: run {run} has {measured}; at most {held.tolerance.largest_um:g} µm. {counts}."
+
+
+def _to_repeat(circles: Iterable[MeasuredCircle]) -> list[str]:
+    """What is wrong with runs comes before what is wrong with the machine."""
+    told = []
+    for one in circles:
+        wrong = () if one.judgement is None else one.judgement.wrong
+        texts = [one.problem] if one.problem else [finding.text for finding in wrong]
+        if texts:
+            told.append(f"Look at run {one.entry.label} of {one.session}, and measure it again: {'; '.join(texts)}.")
+    more = len(told) - MOST_TOLD
+    return [*told[:MOST_TOLD], *([f"{more} more runs have findings: see Findings."] if more > 0 else [])]
+
+
+def _cure(found: Circled) -> tuple[str, ...]:
+    compensated = all(one.entry.program is not None and one.entry.program.model_sha256 for one in found.circles)
+    if compensated:
+        return (
+            (
+                "The programs were compensated, and the circles are off all the same: `dbbstation diagnose` looks for what the "
+                "model lacks. See that nothing has moved since the model was made."
+            ),
+        )
+    names = " ".join(session.name for session in found.sessions)
+    return (
+        f"Calibrate the machine: `dbbstation calibrate {names} --out model.yaml`.",
+        (
+            "Write compensated programs with `dbbstation program --model model.yaml`, measure them, and make the report again "
+            "with `--before` and this session."
+        ),
+    )

@@ -1,0 +1,103 @@
+"""What every new run of a session is held against: the runs before it, and where its circle should lie."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError
+from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.files.recordings.judged import runs_of
+from dbbstation.quality.judge import SessionRuns
+from dbbstation.quality.knowledge import seen
+from dbbstation.station import events
+from dbbstation.trace.analysis import figures
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.files.recordings.entries import Program
+    from dbbstation.files.recordings.session_writer import SessionWriter
+    from dbbstation.plan.circle import Direction
+    from dbbstation.quality.finding import Finding
+    from dbbstation.quality.knowledge import Seen
+    from dbbstation.station.events import Event, RunId
+    from dbbstation.trace.recording import Recording
+
+
+class RunJudge:
+    """Judges runs beside those that count; an observer of the station, which learns of verdicts.
+
+    Args:
+        writer: of the session; its accepted runs are read and analysed now.
+        programs: NC program by test and direction.
+    """
+
+    def __init__(self, writer: SessionWriter, programs: Mapping[tuple[str, Direction], Program] | None = None) -> None:
+        self._writer = writer
+        self._programs = programs or {}
+        self._counting: dict[tuple[str, Direction, int], Seen] = {}
+        self._waiting: dict[tuple[str, Direction, int], Seen] = {}
+        for entry in writer.runs:
+            if entry.state is RunState.ACCEPTED:
+                self._read(entry)
+
+    def __call__(self, event: Event) -> None:
+        """Learn which runs count."""
+        if isinstance(event, events.RunAccepted):
+            key = _key(event.run)
+            if key in self._waiting:
+                self._counting[key] = self._waiting.pop(key)
+        elif isinstance(event, events.RunRejected):
+            for known in (self._counting, self._waiting):
+                known.pop(_key(event.run), None)
+
+    def known(self) -> tuple[events.RunCompleted, ...]:
+        """Return what accepted runs say, from disk: figures and findings of each beside the others."""
+        together = SessionRuns(list(self._counting.values()))
+        mountings = {_key(entry): entry.mounting or 0 for entry in self._writer.runs}
+        found = []
+        for key, one in self._counting.items():
+            shown = None if one.analysis is None else figures(one.analysis.raw)
+            run = events.RunId(*key, mountings[key])
+            samples = len(one.run.recording)
+            findings = () if shown is None else together.judge(one).findings
+            found.append(events.RunCompleted(run, samples, one.lost[0], shown, one.problem, findings))
+        return tuple(found)
+
+    def judge(self, run: RunId, recording: Recording) -> tuple[Finding, ...]:
+        """Return all findings of a run that has just been recorded.
+
+        Args:
+            run: which run; storage may not have heard of it yet.
+            recording: the whole of it.
+        """
+        entry = RunEntry(
+            test=run.test,
+            direction=run.direction,
+            repeat=run.repeat,
+            mounting=run.mounting,
+            state=RunState.COMPLETE,
+            reason="",
+            started=None,
+            path=self._writer.session.folder,
+            sha256="",
+            program=self._programs.get((run.test, run.direction)),
+            centre_mm=None,
+        )
+        (one,) = runs_of(self._writer.session, [(entry, recording)])
+        self._waiting[_key(run)] = new = seen(one)
+        others = [known for key, known in self._counting.items() if key != _key(run)]
+        return SessionRuns([*others, new]).judge(new).findings
+
+    def _read(self, entry: RunEntry) -> None:
+        """Take in a run that was recorded before; one that cannot be read is told of by who reads it for its figures."""
+        try:
+            recording = self._writer.session.load(entry).recording
+        except InputError:
+            return
+        (one,) = runs_of(self._writer.session, [(entry, recording)])
+        self._counting[_key(entry)] = seen(one)
+
+
+def _key(run: RunId | RunEntry) -> tuple[str, Direction, int]:
+    return run.test, run.direction, run.repeat

@@ -1,0 +1,162 @@
+"""From measured circles to what the shop's tolerances say of them, uncertainty included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.calibration.reporting.prediction import smooth_circularity_um
+from dbbstation.circles.budget import Quantity, budgets
+from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.trace.analysis import figures
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from dbbstation.circled import MeasuredCircle
+    from dbbstation.circles.analysis import CircleAnalysis
+    from dbbstation.circles.budget import Budget
+    from dbbstation.plan.tolerance import Tolerance
+
+
+class Conformity(StrEnum):
+    """What a figure with an uncertainty says of a limit, by the decision rule of ISO 14253-1."""
+
+    WITHIN = "within"
+    """The limit is kept, whatever the figure is within U."""
+    EXCEEDED = "exceeded"
+    """The limit is passed, whatever the figure is within U."""
+    UNDECIDED = "cannot tell"
+    """The limit lies within U of the figure."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """A figure of one circle as measured.
+
+    Attributes:
+        um: its size [µm].
+        u_um: its standard uncertainty [µm].
+    """
+
+    um: float
+    u_um: float
+
+
+@dataclass(frozen=True)
+class ToleratedCircle:
+    """Figures of one circle that may have a tolerance.
+
+    Attributes:
+        session: name of its session.
+        test: name of its test.
+        direction: `ccw` or `cw`.
+        repeat: counts runs of this test and direction.
+        sizes: by figure; G is that of readings up to 30 undulations per revolution, as in `evaluate`.
+    """
+
+    session: str
+    test: str
+    direction: str
+    repeat: int
+    sizes: Mapping[CircleFigure, Size]
+
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """Test, direction and repeat."""
+        return self.test, self.direction, self.repeat
+
+
+@dataclass(frozen=True)
+class Held:
+    """A tolerance held against circles.
+
+    Attributes:
+        tolerance: the limit.
+        conformity: exceeded where one circle exceeds it, else undecided where one is; None where it holds for none.
+        worst: the circle with the largest figure; None where it holds for none.
+        exceeded: how many circles exceed it.
+        undecided: of how many nothing can be told.
+        circles: how many it holds for.
+    """
+
+    tolerance: Tolerance
+    conformity: Conformity | None
+    worst: ToleratedCircle | None
+    exceeded: int
+    undecided: int
+    circles: int
+
+
+def tolerated_circles(circles: Iterable[MeasuredCircle]) -> tuple[ToleratedCircle, ...]:
+    """Return the figures of measured circles that may have a tolerance; without runs that show no circle."""
+    return tuple(
+        ToleratedCircle(
+            one.session,
+            one.entry.test,
+            str(one.entry.direction),
+            one.entry.repeat,
+            _sizes(one.analysis, budgets(one.analysis, one.known)),
+        )
+        for one in circles
+        if one.analysis is not None
+    )
+
+
+def _sizes(one: CircleAnalysis, known: Mapping[Quantity, Budget]) -> dict[CircleFigure, Size]:
+    """Sizes with their uncertainties.
+
+    That of G is of G with all its noise, and that of the mean radial error of the radius in the plane of the circle: neither is
+    smaller than the figure's own.
+    """
+    measured = figures(one.raw)
+    off = np.array(measured.centre_mm)
+    u_centre = np.array([known[Quantity.X].u_um, known[Quantity.Y].u_um])
+    # A centre that is not off has no direction: either axis may be the one that counts.
+    along = np.abs(off) / np.hypot(*off) if np.any(off) else np.array([1.0, 1.0])
+    return {
+        CircleFigure.CIRCULAR_DEVIATION: Size(
+            smooth_circularity_um(one.raw, one.raw.length_mm), known[Quantity.G].u_um
+        ),
+        CircleFigure.CENTRE_DEVIATION: Size(measured.centre_deviation_um, float(np.linalg.norm(along * u_centre))),
+        CircleFigure.MEAN_RADIAL_ERROR: Size(abs(measured.mean_radial_error_um), known[Quantity.RADIUS].u_um),
+    }
+
+
+def conformity(size: Size, largest_um: float, coverage_factor: float) -> Conformity:
+    """Hold a figure against a limit.
+
+    Args:
+        size: the figure.
+        largest_um: the limit [µm].
+        coverage_factor: k of U = k u.
+    """
+    expanded = coverage_factor * size.u_um
+    if size.um + expanded <= largest_um:
+        return Conformity.WITHIN
+    return Conformity.EXCEEDED if size.um - expanded > largest_um else Conformity.UNDECIDED
+
+
+def held_against(
+    tolerances: Sequence[Tolerance], circles: Sequence[ToleratedCircle], coverage_factor: float
+) -> tuple[Held, ...]:
+    """Hold every tolerance against the circles that it is for; arguments as of `conformity`."""
+    return tuple(_held(tolerance, circles, coverage_factor) for tolerance in tolerances)
+
+
+def _held(tolerance: Tolerance, circles: Sequence[ToleratedCircle], coverage_factor: float) -> Held:
+    of = [one for one in circles if tolerance.holds_for(one.test, one.direction)]
+    said = [conformity(one.sizes[tolerance.figure], tolerance.largest_um, coverage_factor) for one in of]
+    worst = max(of, key=lambda one: one.sizes[tolerance.figure].um, default=None)
+    order = (Conformity.EXCEEDED, Conformity.UNDECIDED, Conformity.WITHIN)
+    return Held(
+        tolerance=tolerance,
+        conformity=next((each for each in order if each in said), None),
+        worst=worst,
+        exceeded=said.count(Conformity.EXCEEDED),
+        undecided=said.count(Conformity.UNDECIDED),
+        circles=len(of),
+    )

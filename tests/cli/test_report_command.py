@@ -1,0 +1,283 @@
+"""`dbbstation report`: its numbers, its words, and what people typed."""
+
+from __future__ import annotations
+
+import html.parser
+import re
+import shutil
+import stat
+import sys
+
+import numpy as np
+import pytest
+
+from dbbstation.cli import DONE, FAILED
+from dbbstation.files.shipped import shipped_folder
+from tests.cli.conftest import call
+from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.plan import subset, table_ii_plan
+from tests.plant.session import record
+
+SMALL = shipped_folder("fixtures") / "sessions" / "small"
+MODEL = shipped_folder("fixtures") / "models" / "small.yaml"
+VOID = {"meta", "link", "br", "img", "input", "hr"}
+EVIL = "<script>alert(1)</script>"
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report") / "session"
+    plan = subset(table_ii_plan(4), ["a", "f"])
+    record(folder, seed=4, plan=plan, mechanisms=[RandomKinematics()], rate_hz=10.0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def better(tmp_path_factory):
+    """The same circles on a machine without errors."""
+    folder = tmp_path_factory.mktemp("report") / "better"
+    record(folder, seed=5, plan=subset(table_ii_plan(4), ["a", "f"]), rate_hz=10.0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def written(session, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out") / "report.html"
+    outcome = call("report", session, "--out", out, "--json")
+    assert outcome.code == DONE, outcome.err
+    return out.read_text("utf-8"), outcome.data
+
+
+def copy_of(session, tmp_path, **changed):
+    folder = tmp_path / "copy"
+    shutil.copytree(session, folder)
+    path = folder / "session.yaml"
+    text = path.read_text("utf-8")
+    for key, value in changed.items():
+        text = re.sub(rf"^{key}:.*\n", "", text, flags=re.MULTILINE)
+        text = text.replace(
+            "plan: plan.yaml\n", f"plan: plan.yaml\n{key}: {value!r}\n" if value else "plan: plan.yaml\n"
+        )
+    path.write_text(text, "utf-8")
+    return folder
+
+
+class Page(html.parser.HTMLParser):
+    """Tags that open and close as they must; text and attributes of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.attributes, self.words = [], [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        names = [name for name, _ in attrs]
+        assert len(names) == len(set(names)), (tag, names)
+        self.attributes += attrs
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+
+def test_it_has_the_figures_of_circles(session, written):
+    text, data = written
+    circles = call("circles", session, "--findings", "--json").data
+    assert data["circles"]["runs"] == circles["runs"]
+    assert data["circles"]["pairs"] == circles["pairs"]
+    page = Page(text).text
+    for run in circles["runs"]:
+        u = 2 * run["uncertainty"]["G"]["u_um"]
+        row = f"{run['test']} {run['direction']} {run['repeat']} {run['g_um']:.1f} {u:.1f} {run['g_least_squares_um']:.1f}"
+        assert row in page
+    for pair in circles["pairs"]:
+        assert f"{pair['test']} both {pair['repeat']} {pair['g_um']:.1f}" in page
+
+
+def test_it_is_sound_html_and_refers_to_nothing_outside(written):
+    text, _ = written
+    page = Page(text)
+    assert text.startswith("<!DOCTYPE html>")
+    assert (
+        page.tags.count("h1")
+        == page.tags.count("main")
+        == page.tags.count("title") - text.count("<g><title>") - (text.count("<polygon"))
+    )
+    assert "script" not in page.tags
+    assert "http" not in text
+    assert "url(" not in text
+    assert "@import" not in text
+    ids = [value for name, value in page.attributes if name == "id"]
+    assert len(ids) == len(set(ids))
+    links = [value for name, value in page.attributes if name in {"href", "src", "xlink:href"}]
+    assert {link.removeprefix("#") for link in links} <= set(ids)
+    assert not [name for name, _ in page.attributes if name.startswith("on")]
+
+
+def test_the_same_files_give_the_same_bytes(session, written, tmp_path):
+    again = tmp_path / "other-name.html"
+    assert call("report", session, "--out", again, "--json").code == DONE
+    assert again.read_text("utf-8") == written[0]
+
+
+def test_what_people_typed_is_escaped(session, tmp_path):
+    folder = copy_of(session, tmp_path, operator=EVIL)
+    plan = folder / "plan.yaml"
+    plan.write_text(
+        re.sub(r"^name:.*$", f"name: '{EVIL} & \"co\"'", plan.read_text("utf-8"), flags=re.MULTILINE), "utf-8"
+    )
+    out = tmp_path / "report.html"
+    outcome = call("report", folder, "--job", f"'{EVIL}", "--out", out)
+    assert outcome.code == DONE, outcome.err
+    text = out.read_text("utf-8")
+    page = Page(text)
+    assert "script" not in page.tags
+    assert "<script" not in text
+    assert f"operator {EVIL}" in page.text
+    assert f'plan {EVIL} & "co"' in page.text
+    assert f"job '{EVIL}" in page.text
+
+
+def settings(tmp_path, *limits):
+    path = tmp_path / "settings.yaml"
+    lines = [f"  - {{quantity: {name}, largest: {largest}, unit: µm}}\n" for name, largest in limits]
+    path.write_text("format: dbb-settings/2\ntolerances:\n" + "".join(lines), "utf-8")
+    return path
+
+
+def test_the_first_page_holds_circles_against_the_tolerances(session, written, tmp_path):
+    """The limit is the figure itself: within U of it nothing can be told, further off it can."""
+    rows = written[1]["measured"]
+    worst = max(rows, key=lambda row: row["now"]["centre-deviation"]["um"])
+    size = worst["now"]["centre-deviation"]
+    off = 2 * size["u_um"] + 0.1
+    for largest, kind in ((size["um"], "cannot tell"), (size["um"] + off, "within"), (size["um"] - off, "exceeded")):
+        out = tmp_path / f"{kind}.html"
+        limits = settings(tmp_path, ("centre-deviation", f"{largest:.5f}"))
+        outcome = call("--settings", limits, "report", session, "--out", out, "--json")
+        assert outcome.data["verdict"]["kind"] == kind
+        assert outcome.data["tolerances"][0]["worst"]["test"] == worst["test"]
+        assert outcome.data["verdict"]["headline"] in out.read_text("utf-8").replace("&#39;", "'")
+    assert written[1]["verdict"]["kind"] == "none"
+
+
+def test_before_and_now_stand_side_by_side_as_measured(session, better, tmp_path):
+    out = tmp_path / "both.html"
+    outcome = call("report", better, "--before", session, "--out", out, "--json")
+    assert outcome.code == DONE, outcome.err
+    centres = {
+        name: [
+            np.hypot(run["centre_um"]["x"], run["centre_um"]["y"])
+            for run in call("circles", folder, "--json").data["runs"]
+        ]
+        for name, folder in (("before", session), ("now", better))
+    }
+    (row,) = [one for one in outcome.data["measured_means"] if one["quantity"] == "centre-deviation"]
+    for when, sizes in centres.items():
+        assert row[when]["mean_um"] == pytest.approx(np.mean(sizes), abs=1e-6)
+        assert row[when]["largest_um"] == pytest.approx(max(sizes), abs=1e-6)
+        assert f"{np.mean(sizes):.1f}" in Page(out.read_text("utf-8")).text
+    assert out.read_text("utf-8").count('former" points') == 4
+    assert "another nominal machine" not in out.read_text("utf-8")
+
+
+def test_before_of_another_machine_is_said(session, tmp_path):
+    machine = tmp_path / "copy" / "machine.yaml"
+    folder = copy_of(session, tmp_path)
+    text = machine.read_text("utf-8")
+    joint = re.search(r"base_joints_mm:\D*(-?\d+\.\d+)", text)
+    machine.write_text(text[: joint.start(1)] + f"{float(joint[1]) + 1.0:.6f}" + text[joint.end(1) :], "utf-8")
+    out = tmp_path / "other.html"
+    outcome = call("report", session, "--before", folder, "--out", out)
+    assert outcome.code == DONE, outcome.err
+    assert "The session before is of another nominal machine" in out.read_text("utf-8")
+
+
+def test_a_model_stands_beside(tmp_path):
+    out = tmp_path / "model.html"
+    outcome = call("report", SMALL, "--model", MODEL, "--out", out, "--json")
+    assert outcome.code == DONE, outcome.err
+    evaluated = call("evaluate", SMALL, "--model", MODEL, "--json").data
+    assert outcome.data["model"]["runs"] == evaluated["runs"]
+    page = Page(out.read_text("utf-8")).text
+    assert f"a flatness of {evaluated['flatness_um']:.1f} µm" in page
+    assert "What was not visible" in page
+    assert f"the model {evaluated['residual_rms_um']:.2f} µm" in page
+
+
+def test_every_file_has_its_hash(session, written):
+    page = Page(written[0]).text
+    found = re.findall(r"sha256: ([0-9a-f]{64})", (session / "session.yaml").read_text("utf-8"))
+    assert len(found) == 4
+    for digest in found:
+        assert digest in page
+
+
+def test_one_direction_only(session, tmp_path):
+    folder = copy_of(session, tmp_path)
+    path = folder / "session.yaml"
+    text = re.sub(r"(direction: \"?cw.*state: \"?)accepted", r"\1rejected", path.read_text("utf-8"))
+    path.write_text(text, "utf-8")
+    out = tmp_path / "one.html"
+    outcome = call("report", folder, "--out", out, "--json")
+    assert outcome.code == DONE, outcome.err
+    assert {run["direction"] for run in outcome.data["circles"]["runs"]} == {"ccw"}
+    assert "No test was measured in both directions" in Page(out.read_text("utf-8")).text
+
+
+def test_no_accepted_run_is_said(session, tmp_path):
+    folder = copy_of(session, tmp_path)
+    path = folder / "session.yaml"
+    path.write_text(re.sub(r"(state: \"?)accepted", r"\1rejected", path.read_text("utf-8")), "utf-8")
+    outcome = call("report", folder, "--out", tmp_path / "none.html")
+    assert outcome.code == FAILED
+    assert "no accepted run is left" in outcome.err
+    assert not (tmp_path / "none.html").exists()
+
+
+def test_no_file_is_replaced_without_force(session, tmp_path):
+    out = tmp_path / "there.html"
+    out.write_text("mine")
+    refused = call("report", session, "--out", out)
+    assert refused.code == FAILED
+    assert "--force" in refused.err
+    assert out.read_text() == "mine"
+    assert call("report", session, "--test", "a", "--out", out, "--force").code == DONE
+
+
+def test_a_pdf_needs_a_browser_and_says_which(session, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("DBBSTATION_CHROMIUM", raising=False)
+    refused = call("report", session, "--out", tmp_path / "r.html", "--pdf", tmp_path / "r.pdf")
+    assert refused.code == FAILED
+    assert "install Chromium" in refused.err
+    assert not (tmp_path / "r.html").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the browser of this test is a script")
+def test_a_browser_prints(session, tmp_path, monkeypatch):
+    """A stand-in that does what is asked of a browser: writes the file that the option names."""
+    browser = tmp_path / "browser"
+    browser.write_text(
+        '#!/bin/sh\nfor a in "$@"; do case $a in --print-to-pdf=*) printf %%PDF > "${a#*=}";; esac; done\n'
+    )
+    browser.chmod(browser.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("DBBSTATION_CHROMIUM", str(browser))
+    outcome = call("report", session, "--test", "a", "--out", tmp_path / "r.html", "--pdf", tmp_path / "r.pdf")
+    assert outcome.code == DONE, outcome.err
+    assert (tmp_path / "r.pdf").read_bytes() == b"%PDF"
+    browser.write_text("#!/bin/sh\necho no display >&2\nexit 3\n")
+    failed = call("report", session, "--test", "a", "--out", tmp_path / "s.html", "--pdf", tmp_path / "s.pdf")
+    assert failed.code == FAILED
+    assert "did not print: no display" in failed.err

@@ -1,0 +1,87 @@
+"""Stretches of time: rounded edges, ends in noise that differs from row to row, and what turns with the direction of travel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+
+from dbbstation.inference.bank import Bank
+from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.curves import Clock, Stretches
+from dbbstation.inference.patterns import Family
+from dbbstation.inference.settle import settle
+
+ROWS = 1200
+
+
+def made(residual, **more):
+    """A channel of one block with a constant and a ramp as base."""
+    time = np.arange(len(residual)) * 0.01
+    base = Base.flat(("constant", "ramp"), np.column_stack([np.ones(len(time)), time]))
+    return Channel(residual, "N", (slice(0, len(time)),), ("one",), (), base, time=time, static=(), **more)
+
+
+def forms(settled):
+    """Family and edges of the stretches of the best hypothesis."""
+    found = []
+    for member in settled.best.members:
+        pattern = settled.bank.patterns[member.cause.name]
+        edges = np.column_stack([pattern.form.first, pattern.form.last])[: len(member.variant.columns)]
+        found += [(pattern.family, *edge) for edge in edges.tolist()]
+    return sorted(found, key=lambda one: one[1])
+
+
+def test_a_stretch_is_the_difference_of_two_steps():
+    """Gaussian edges, as of a mean over neighbouring rows, against their closed form."""
+    rows = np.arange(40.0)
+    column = Stretches((10.3,), (25.8,), lambda since: ndtr(since / 1.5)).columns(rows)[:, 0]
+    assert column == pytest.approx(ndtr((rows - 10.3) / 1.5) - ndtr((rows - 25.8) / 1.5))
+    endless = Stretches((10.3,), (np.inf,), lambda since: ndtr(since / 1.5)).columns(rows)[:, 0]
+    assert endless == pytest.approx(ndtr((rows - 10.3) / 1.5))
+
+
+def test_a_round_edge_is_found_between_two_rows(rng):
+    """Rows that blur a step over two of them show where it was to some hundredths of one, and it is one stretch."""
+    clock = Clock(np.arange(ROWS, dtype=np.float64), lambda since: ndtr(since / 1.5))
+    pulse = ndtr((clock.rows - 400.3) / 1.5) - ndtr((clock.rows - 631.8) / 1.5)
+    settled = settle(made(3.0 * pulse + rng.normal(0.0, 0.05, ROWS), clock=clock))
+    ((family, first, last),) = forms(settled)
+    assert family is Family.PULSES
+    assert first == pytest.approx(400.3, abs=0.1)
+    assert last == pytest.approx(631.8, abs=0.1)
+
+
+def test_what_turns_with_the_direction_is_one_stretch(rng):
+    """A friction that is there for a while, over six strokes to and fro."""
+    direction = np.where(np.arange(ROWS) // 100 % 2 == 0, 1.0, -1.0)
+    inside = (np.arange(ROWS) >= 250) & (np.arange(ROWS) < 850)
+    settled = settle(made(1.0 * direction * inside + rng.normal(0.0, 0.2, ROWS), direction=direction))
+    ((family, first, last),) = forms(settled)
+    assert family is Family.PULSES_BY_DIRECTION
+    assert first == pytest.approx(249.5, abs=2.0)
+    assert last == pytest.approx(849.5, abs=2.0)
+
+
+def test_noise_that_grows_is_measured_and_no_pulse_is_seen_in_it(rng):
+    """Noise of 0.1 with 0.3 times a size on top of it, which is 1 in some stretches and 0 elsewhere."""
+    size = (np.arange(ROWS) // 60 % 4 == 0).astype(float)
+    sigma = np.hypot(0.1, 0.3 * size)
+    channel = made(rng.normal(0.0, 1.0, ROWS) * sigma, grows=size)
+    bank = Bank(channel)
+    bank.measure_noise()
+    # A grid of ratios that are apart by factors of two.
+    ratio = bank.spread[size > 0].mean() / bank.spread[size == 0].mean()
+    assert np.sqrt(10.0) / np.sqrt(2.0) < ratio < np.sqrt(10.0) * np.sqrt(2.0)
+    assert settle(channel).best.members == ()
+    even = Bank(replace(channel, grows=None))
+    even.measure_noise()
+    assert np.ptp(even.spread) == 0.0
+
+
+def test_noise_that_is_the_same_everywhere_does_not_grow(rng):
+    bank = Bank(made(rng.normal(0.0, 0.1, ROWS), grows=np.abs(np.sin(np.arange(ROWS) / 20.0))))
+    bank.measure_noise()
+    assert np.ptp(bank.spread) == 0.0

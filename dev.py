@@ -86,6 +86,8 @@ def set_up() -> bool:
 
 def installer() -> list[str | Path]:
     """Make the environment and return the command that is its pip."""
+    if Path(sys.prefix).resolve() == ENVIRONMENT:  # who has it on their PATH runs this with it: it stands
+        return [PYTHON, "-m", "pip"]
     described = ENVIRONMENT / "pyvenv.cfg"
     this_python = f"version = {platform.python_version()}\n"
     other = described.exists() and this_python not in described.read_text(encoding="utf-8")

@@ -115,13 +115,14 @@ class StationApp(App[None]):
     def look(self) -> None:
         """Take the mail and draw what changed."""
         before = self.board.state
+        alive = self._runner.alive  # asked before its mail is taken: what it sends last is then shown
         for event in self._runner.mail():
             self.board.take(event)
         if self.board.state in _VERDICT and before not in _VERDICT:
             self.bell()
         self._drop_stale_question()
         self.draw()
-        if self._runner.crash is not None or (self._leaving and not self._runner.alive):
+        if self._runner.crash is not None or (self._leaving and not alive):
             self.exit()
 
     @property

@@ -87,7 +87,6 @@ def measure(
     """
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
-    from dbbstation.files.recordings.session_text import SessionDetails
     from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.library import at_rate
     from dbbstation.station.assembly import Job, assemble
@@ -123,7 +122,7 @@ def measure(
         ) as source,
     ):
         workplace = assemble(job, source, source.unreadable)
-        if workplace.writer.runs and job.details != SessionDetails():
+        if workplace.writer.runs and job.details.noted:
             click.echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)
         interrupted = _run(workplace, hands, as_json=as_json)
     if interrupted:

@@ -14,7 +14,7 @@ from dbbstation.cli.shop import from_settings, shop_option
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from dbbstation.files.recordings.session_text import SessionDetails
+    from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.plan.bar import Bar
     from dbbstation.station.assembly import Job
 
@@ -84,7 +84,7 @@ def session_details(
         click.UsageError: length without uncertainty, something of the bar without either, or a file and options of the bar.
         InputError: faults of the bar's file.
     """
-    from dbbstation.files.recordings.session_text import SessionDetails
+    from dbbstation.files.recordings.session_details import SessionDetails
 
     if bar_file is not None:
         from dbbstation.files.formats.bar import read_bar

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.recordings.bar_reach import unlike_bar
-from dbbstation.files.recordings.session_text import SessionDetails
+from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.judging import RunJudge

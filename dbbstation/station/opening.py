@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.formats.plan import InlinePlan
     from dbbstation.files.recordings.session import SessionFolder
-    from dbbstation.files.recordings.session_text import SessionDetails
+    from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
 

@@ -22,8 +22,8 @@ from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.amending import amend
 from dbbstation.files.recordings.entries import Counts
 from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_set_up import SetUpReadings
-from dbbstation.files.recordings.session_text import SessionDetails
 from dbbstation.files.recordings.session_writer import FinishedRun, SessionWriter, write_session
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel

@@ -6,6 +6,7 @@ What no page shows is not tested here; the files say `verified: false` of it.
 from __future__ import annotations
 
 import time
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import pytest
@@ -25,6 +26,7 @@ from dbbstation.virtual.wire_clock import ScaledClock
 from tests.instrument.scripted_port import expected
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from dbbstation.instrument.protocol import Protocol
@@ -35,6 +37,17 @@ BAR_MM = 150.0003
 
 def usable(protocol: Protocol) -> Protocol:
     return with_zero(protocol, 150.0) if protocol.length.relative else protocol
+
+
+@contextmanager
+def reading_of(protocol: Protocol, length_mm: float | None) -> Iterator[Instrument]:
+    """Read a virtual instrument with a bar of this length, faster than real where it is asked for each value."""
+    clock = ScaledClock(20.0 if protocol.ask.asked else 1.0)
+    with (
+        VirtualInstrument(protocol, lambda _: length_mm, clock=clock) as virtual,
+        Instrument(protocol, virtual.port, clock=clock) as instrument,
+    ):
+        yield instrument
 
 
 @pytest.mark.parametrize(
@@ -209,11 +222,7 @@ def test_a_display_with_nothing_to_explain_says_nak() -> None:
 def test_driver_and_virtual_instrument_agree(protocol: Protocol) -> None:
     """Values to the last digit that the wire has; a gauge that rounds to 10 µm is allowed half of that."""
     protocol = usable(protocol)
-    clock = ScaledClock(20.0 if protocol.ask.asked else 1.0)
-    with (
-        VirtualInstrument(protocol, lambda _: BAR_MM, clock=clock) as virtual,
-        Instrument(protocol, virtual.port, clock=clock) as instrument,
-    ):
+    with reading_of(protocol, BAR_MM) as instrument:
         readings = list(instrument.readings(5))
         instrument.stop()
     assert {one.status for one in readings} == {"ok"}
@@ -226,11 +235,7 @@ def test_driver_and_virtual_instrument_agree(protocol: Protocol) -> None:
 @pytest.mark.parametrize("protocol", ALL, ids=lambda one: one.label)
 def test_without_a_bar_the_status_is_fault_with_words_and_remedy(protocol: Protocol) -> None:
     protocol = usable(protocol)
-    clock = ScaledClock(20.0 if protocol.ask.asked else 1.0)
-    with (
-        VirtualInstrument(protocol, lambda _: None, clock=clock) as virtual,
-        Instrument(protocol, virtual.port, clock=clock) as instrument,
-    ):
+    with reading_of(protocol, None) as instrument:
         reading = instrument.read()
     assert (reading.length_mm, reading.status) == (None, "fault")
     assert reading.said

@@ -29,7 +29,7 @@ from tests.station.bench import MACHINE_FILE
 from tests.station.readings import run_readings
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from datetime import tzinfo
     from pathlib import Path
 
@@ -61,6 +61,18 @@ class Script:
 def made(plan_file: Path, source: Script) -> Station:
     plan = read_plan(plan_file)
     return Station(Sequencer(plan, Schedule(plan, lambda *_: 1), recording_of), source)
+
+
+def accepts_ccw(station: Station) -> Callable[[events.Event], None]:
+    """Return an operator who accepts each complete circle, and goes when the cw one is announced."""
+
+    def operate(event: events.Event) -> None:
+        if isinstance(event, events.StateChanged) and event.state is State.COMPLETE:
+            station.send(Accept())
+        elif isinstance(event, events.RunAnnounced):
+            station.send(Quit() if event.run.direction is Direction.CW else Start())
+
+    return operate
 
 
 def test_commands_from_another_thread_wake_it(plan_file: Path) -> None:
@@ -160,14 +172,7 @@ def test_what_came_over_the_line_is_counted_in_run_file_and_session(plan_file: P
     station = workplace.station
     told: list[events.Event] = []
 
-    def judge(event: events.Event) -> None:
-        told.append(event)
-        if isinstance(event, events.StateChanged) and event.state is State.COMPLETE:
-            station.send(Accept())
-        elif isinstance(event, events.RunAnnounced):
-            station.send(Quit() if event.run.direction is Direction.CW else Start())
-
-    for observer in (source, judge):
+    for observer in (source, told.append, accepts_ccw(station)):
         station.subscribe(observer)
     station.run()
     workplace.close()
@@ -219,13 +224,7 @@ def test_a_disk_that_is_full_ends_the_run_with_its_cause_and_the_same_command_go
     workplace = assemble(job, source := Script(readings))
     station = workplace.station
 
-    def accept(event: events.Event) -> None:
-        if isinstance(event, events.StateChanged) and event.state is State.COMPLETE:
-            station.send(Accept())
-        elif isinstance(event, events.RunAnnounced):
-            station.send(Quit() if event.run.direction is Direction.CW else Start())
-
-    for observer in (source, accept):
+    for observer in (source, accepts_ccw(station)):
         station.subscribe(observer)
     station.run()
     workplace.close()

@@ -54,7 +54,7 @@ class Seat:
     freedom: int
 
 
-class Finding(StrEnum):
+class ScatterVerdict(StrEnum):
     """How balls scatter beside what is stated of them."""
 
     AS_STATED = "as-stated"
@@ -81,12 +81,12 @@ class ScatterCheck:
     low_um: float
     high_um: float
     mountings: int
-    finding: Finding
+    finding: ScatterVerdict
 
     @property
     def fits(self) -> bool | None:
         """Whether balls stand as well as stated, or better; None where the runs say too little."""
-        return None if self.finding is Finding.UNTOLD else self.finding is not Finding.MORE
+        return None if self.finding is ScatterVerdict.UNTOLD else self.finding is not ScatterVerdict.MORE
 
 
 def seats_of(calibration: Calibration) -> list[Seat]:
@@ -142,15 +142,15 @@ def check_scatter(seats: Sequence[Seat]) -> list[ScatterCheck]:
 def _checked(stated_um: float, group: Sequence[Seat]) -> ScatterCheck:
     square, freedom = sum(seat.square for seat in group), sum(seat.freedom for seat in group)
     if freedom == 0:
-        return ScatterCheck(stated_um, float("nan"), 0.0, float("inf"), len(group), Finding.UNTOLD)
+        return ScatterCheck(stated_um, float("nan"), 0.0, float("inf"), len(group), ScatterVerdict.UNTOLD)
     tail = (1.0 - CONFIDENCE) / 2.0
     low, high = (stated_um * float(np.sqrt(square / chdtri(freedom, p))) for p in (tail, 1.0 - tail))
-    within = Finding.LESS if high < stated_um else Finding.AS_STATED
+    within = ScatterVerdict.LESS if high < stated_um else ScatterVerdict.AS_STATED
     return ScatterCheck(
         stated_um=stated_um,
         found_um=stated_um * float(np.sqrt(square / freedom)),
         low_um=low,
         high_um=high,
         mountings=len(group),
-        finding=Finding.MORE if low > stated_um else within,
+        finding=ScatterVerdict.MORE if low > stated_um else within,
     )

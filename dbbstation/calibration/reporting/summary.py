@@ -11,7 +11,7 @@ from dbbstation.calibration.checks.gaps import gaps
 from dbbstation.calibration.checks.missing_physics import is_missing_physics, misfit_of
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.checks.plan_check import PlanCheck, check_plan
-from dbbstation.calibration.checks.scatter import Finding, check_scatter, seats_of
+from dbbstation.calibration.checks.scatter import ScatterVerdict, check_scatter, seats_of
 from dbbstation.calibration.checks.visibility import visibility
 from dbbstation.calibration.reporting.currents import currents_summary
 from dbbstation.calibration.reporting.evaluation import Evaluation, RunFigures, rms_um
@@ -114,7 +114,7 @@ def outlier_summary(outlier: Outlier) -> dict[str, Any]:
 
 
 def _scatter(check: ScatterCheck) -> dict[str, Any]:
-    told = check.finding is not Finding.UNTOLD
+    told = check.finding is not ScatterVerdict.UNTOLD
     return {
         "stated_um": check.stated_um,
         "found_um": check.found_um if told else None,

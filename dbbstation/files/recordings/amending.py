@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
@@ -22,7 +22,7 @@ from dbbstation.files.recordings.seal import (
     sealed_over,
 )
 from dbbstation.files.recordings.session import SESSION_FILE, parse_session
-from dbbstation.files.recordings.session_text import SessionDetails, session_text
+from dbbstation.files.recordings.session_text import session_text
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -82,10 +82,7 @@ def amend(
         if not found:
             what = "nothing differs from what was sealed"
             raise InputError([Problem(str(folder), 0, 0, what, "give --plan or --machine, or change the file first")])
-        details = SessionDetails(
-            **{each.name: getattr(session, each.name) for each in fields(SessionDetails)}
-            | {"seal": sealed_over(now, runs), "amendments": (*session.amendments, *found)}
-        )
+        details = replace(session, seal=sealed_over(now, runs), amendments=(*session.amendments, *found))
         for name, content in new.items():
             write_bytes(folder / copy_name(name, now[name]), content, force=True, rewrites=True)
             write_bytes(folder / name, content, force=True, rewrites=True)

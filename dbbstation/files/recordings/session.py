@@ -15,7 +15,6 @@ from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.recordings.entries import (
-    Note,
     RunEntry,
     RunState,
     bar_entry,
@@ -28,7 +27,8 @@ from dbbstation.files.recordings.run_csv import PART, RunFile, read_run
 from dbbstation.files.recordings.run_lines import split_file
 from dbbstation.files.recordings.seal import amendment_entry, seal_entry, seal_faults
 from dbbstation.files.recordings.session_checks import check_bar, check_runs
-from dbbstation.files.recordings.session_set_up import SetUpReadings, check_set_up_errors, mounted_name, set_up_readings
+from dbbstation.files.recordings.session_details import SessionDetails
+from dbbstation.files.recordings.session_set_up import check_set_up_errors, mounted_name, set_up_readings
 from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import read_document, validate
 from dbbstation.plan.circle import Direction
@@ -40,9 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.seal import Amendment, Seal
     from dbbstation.machine.geometry import Machine
-    from dbbstation.plan.bar import Bar
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Plan
     from dbbstation.trace.recording import Recording
@@ -57,9 +55,9 @@ _SLOWEST, _FASTEST = 50.0, 0.05
 """Times as long as the circle should take, between which a recording's duration is plausible."""
 
 
-@dataclass(frozen=True, eq=False)
-class SessionFolder:
-    """A session with its machine and plan; runs are read when asked for.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SessionFolder(SessionDetails):
+    """A session with its machine and plan, and what it notes; runs are read when asked for.
 
     Attributes:
         name: of the folder.
@@ -70,15 +68,6 @@ class SessionFolder:
         plan_path: of the plan's file.
         runs: in the order they were started, of every state.
         sha256: of the session file.
-        serial_number: of the machine; empty where not noted.
-        operator: empty where not noted.
-        ambient_temp_c: temperature of the shop [degC]; None where not noted.
-        bar: None where not noted.
-        bar_waiver: why it was measured without a fresh calibration of the bar; empty where there was one.
-        set_up_errors: micrometer readings of balls that were put up under the spindle, at most one per mounting.
-        seal: what machine, plan and list of runs were when they were sealed; None where nobody sealed them.
-        amendments: what was changed on purpose after that, oldest first.
-        notes: what was noted while it was measured, oldest first.
     """
 
     name: str
@@ -89,15 +78,6 @@ class SessionFolder:
     plan_path: Path
     runs: tuple[RunEntry, ...]
     sha256: str
-    serial_number: str = ""
-    operator: str = ""
-    ambient_temp_c: float | None = None
-    bar: Bar | None = None
-    bar_waiver: str = ""
-    set_up_errors: tuple[SetUpReadings, ...] = ()
-    seal: Seal | None = None
-    amendments: tuple[Amendment, ...] = ()
-    notes: tuple[Note, ...] = ()
 
     @property
     def names(self) -> tuple[str, str]:

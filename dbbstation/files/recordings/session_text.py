@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
@@ -16,35 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.recordings.entries import Note, RunEntry
     from dbbstation.files.recordings.seal import Amendment, Seal
-    from dbbstation.files.recordings.session_set_up import SetUpReadings
-    from dbbstation.plan.bar import Bar
-
-
-@dataclass(frozen=True)
-class SessionDetails:
-    """What a session notes beside its runs; everything optional.
-
-    Attributes:
-        serial_number: of the machine.
-        operator: who measures.
-        ambient_temp_c: temperature of the shop [degC].
-        bar: the bar.
-        bar_waiver: why it is measured without a fresh calibration of the bar; empty where there is one.
-        set_up_errors: micrometer readings of balls that were put up under the spindle.
-        seal: hashes of machine, plan and jig, and the end of the chain of runs.
-        amendments: what was changed on purpose after it was sealed.
-        notes: what was noted while it was measured, oldest first.
-    """
-
-    serial_number: str = ""
-    operator: str = ""
-    ambient_temp_c: float | None = None
-    bar: Bar | None = None
-    bar_waiver: str = ""
-    set_up_errors: tuple[SetUpReadings, ...] = ()
-    seal: Seal | None = None
-    amendments: tuple[Amendment, ...] = ()
-    notes: tuple[Note, ...] = ()
+    from dbbstation.files.recordings.session_details import SessionDetails
 
 
 def session_text(folder: Path, names: Sequence[str], details: SessionDetails, runs: Sequence[RunEntry]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError, Problem
@@ -17,8 +17,9 @@ from dbbstation.files.recordings.lock import SessionLock
 from dbbstation.files.recordings.seal import chained, copy_name, hashes, keep_copies, sealed_names, sealed_over
 from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, part_entry, read_session
 from dbbstation.files.recordings.session_checks import check_bar
+from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_set_up import readings_in
-from dbbstation.files.recordings.session_text import SessionDetails, session_text
+from dbbstation.files.recordings.session_text import session_text
 from dbbstation.files.yaml.schema import validate
 from dbbstation.files.yaml.text import parse_yaml
 
@@ -367,8 +368,7 @@ class SessionWriter:
         if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() != session.sha256:
             # Somebody wrote micrometer readings into it while runs come in; nothing else may be changed there.
             session = replace(session, set_up_errors=readings_in(file, session.plan))
-        details = SessionDetails(**{each.name: getattr(session, each.name) for each in fields(SessionDetails)})
-        text = session_text(session.folder, session.names, details, session.runs)
+        text = session_text(session.folder, session.names, session, session.runs)
         write_text(file, text, force=True, rewrites=True)
         self._session = replace(session, sha256=hashlib.sha256(text.encode()).hexdigest())
 

@@ -17,7 +17,7 @@ from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.recordings.amending import amend
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.recordings.session_text import SessionDetails
+from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_writer import FinishedRun, SessionWriter, write_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -94,12 +93,6 @@ def signalled_within(chart: Chart, means: Iterable[float]) -> NDArray[np.float64
         state = state @ moves[mean]
         within.append(1.0 - state.sum())
     return np.array(within)
-
-
-def average_delay(chart: Chart, means: Iterable[float], most: int) -> float:
-    """Return the mean number of values until the upward chart signals, no longer than `most` values; arguments as above."""
-    still = 1.0 - signalled_within(chart, islice(means, most))
-    return float(1.0 + still[:-1].sum())
 
 
 @cache

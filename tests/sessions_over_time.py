@@ -25,9 +25,17 @@ BEGINS_S, OVERSHOOT_RAD = 1.0, np.pi / 4.0
 
 
 def sessions_over_time(
-    folder: Path, count: int, *, seed: int, step_at: int, step_um: float, tests: Sequence[str] = ("a",)
+    folder: Path,
+    count: int,
+    *,
+    seed: int,
+    step_at: int,
+    step_um: float,
+    long_at: int = -1,
+    long_um: float = 0.0,
+    tests: Sequence[str] = ("a",),
 ) -> None:
-    """Make weekly sessions: each with a centre and a length of its own, 0.7 µm one standard deviation.
+    """Make weekly sessions: each with a centre and a length of its own, 0.7 µm one standard deviation, and 0.4 µm of two undulations.
 
     Args:
         folder: to make.
@@ -35,6 +43,8 @@ def sessions_over_time(
         seed: of the scatter.
         step_at: from this session on, counted from 0, the centre is further in X.
         step_um: by so much [µm].
+        long_at: the bar of this one session is longer.
+        long_um: by so much [µm].
         tests: of a, g and l.
     """
     rng = np.random.default_rng(seed)
@@ -46,13 +56,13 @@ def sessions_over_time(
             shutil.copy(small / name, place / name)
         lines = (small / "session.yaml").read_text("utf-8").splitlines(keepends=True)
         text = "".join(one for one in lines if "{test" not in one or _wanted(one, tests))
-        shift_um = rng.normal((step_um if week >= step_at else 0.0, 0.0, 0.0), 0.7)
+        own_um = rng.normal((step_um * (week >= step_at), 0.0, long_um * (week == long_at), 0.0), (0.7, 0.7, 0.7, 0.4))
         for source in sorted((small / "runs").glob("*.csv")):
             if source.name not in text:
                 continue
             run = place / "runs" / source.name
             sense = -1.0 if "-cw-" in run.name else 1.0
-            run.write_text(_shifted(source.read_text("utf-8"), shift_um, sense), encoding="utf-8")
+            run.write_text(_changed(source.read_text("utf-8"), own_um, sense), encoding="utf-8")
             text = text.replace(_sha256(source), _sha256(run))
         day = BEGUN + timedelta(weeks=week)
         text = re.sub(r"2026-11-20T(\d\d:\d\d:\d\dZ, state)", rf"{day:%Y-%m-%d}T\1", text)
@@ -68,9 +78,9 @@ def _sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def _shifted(text: str, shift_um: Sequence[float], sense: float) -> str:
-    """Move the centre by (x, y) and lengthen the bar. Lines lose their checksums."""
-    x, y, longer = (1e-3 * value for value in shift_um)
+def _changed(text: str, own_um: Sequence[float], sense: float) -> str:
+    """Move the centre by (x, y), lengthen the bar, add two undulations. Lines lose their checksums."""
+    x, y, longer, oval = (1e-3 * value for value in own_um)
     out = []
     for line in text.splitlines():
         cells = line.split(",")
@@ -78,7 +88,7 @@ def _shifted(text: str, shift_um: Sequence[float], sense: float) -> str:
             line = ",".join(cells[:-1])  # noqa: PLW2901 - the header loses its last column
         elif re.match(r"[-\d]", line):
             angle = sense * (2.0 * np.pi * (float(cells[0]) - BEGINS_S) / TURN_S - OVERSHOOT_RAD)
-            length = float(cells[1]) + longer + x * np.cos(angle) + y * np.sin(angle)
+            length = float(cells[1]) + longer + x * np.cos(angle) + y * np.sin(angle) + oval * np.cos(2.0 * angle)
             line = ",".join([cells[0], f"{length:.5f}", *cells[2:-1]])  # noqa: PLW2901 - as above
         out.append(line)
     return "\n".join(out) + "\n"

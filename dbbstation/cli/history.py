@@ -117,7 +117,7 @@ def _say(found: Historied) -> None:
 
 def _print(machine: Mapping[str, Any], summary: Mapping[str, Any]) -> None:
     from dbbstation.cli.output import EXPANDED, print_table
-    from dbbstation.history.words import changes_in_words
+    from dbbstation.history.words import changes_in_words, headline
 
     sessions = machine["sessions"]
     first, last = (sessions[k]["started"][:10] for k in (0, -1))
@@ -129,8 +129,9 @@ def _print(machine: Mapping[str, Any], summary: Mapping[str, Any]) -> None:
             f"{machine['false_alarms_expected']:.2g} over this history"
         )
     k = summary["coverage_factor"]
+    click.echo(headline(machine))
     for line in changes_in_words(machine, k):
-        click.echo(line)
+        click.echo(f"  {line}")
     click.echo(f"\n{EXPANDED}; level: since the last change")
     titles = ["quantity", "unit", "n", "last", "U", "limit", "", "level", "U", "verdict", "since", "by", "U"]
     print_table(titles, [_row(one, k) for one in machine["quantities"]])

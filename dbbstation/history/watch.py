@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -38,7 +38,8 @@ class Event:
         verdict: `STANDS_OUT` or `CHANGED`.
         since: number of the value from which it is so.
         found: number of the value that showed it.
-        difference: values from `since` to `found` less the level before, as weighted mean.
+        difference: values from `since` to `found` less the level before; of a change that is a baseline's length ago: the level
+            after it less the level before.
         u_difference: its standard uncertainty, by the larger of stated uncertainty and scatter.
     """
 
@@ -119,16 +120,20 @@ def watch(
         end = count if found is None else found.found + 1
         inside = at < end
         z[at[inside]], high[at[inside]], low[at[inside]] = (x[inside] for x in (stretch.of.z, *stretch.sums))
-        if found is not None and found.verdict is Verdict.STANDS_OUT and not _goes_on(found, events, at):
-            events.append(found)
-            out.append(found.found)
-            continue
-        if found is not None and found.verdict is Verdict.STANDS_OUT:
-            first = events.pop()
-            found = stretch.change(first.since, found.found, also=(values[first.since], u[first.since]))
+        if found is not None:
+            alike = _leads_to(found, events, start)
+            if found.verdict is Verdict.STANDS_OUT and not alike:
+                events.append(found)
+                out.append(found.found)
+                continue
+            if alike:
+                events = [event for event in events if event not in alike]
+                found = _change(min(found.since, alike[0].since), found.found, at, values, u)
         stays = at[inside] if found is None else at[at < found.since]
         until = count if found is None else found.since
         level[start:until], u_level[start:until] = stretch.final(len(stays))
+        if start and len(stays) >= baseline:
+            events = [_settled(e, level, u_level, start) if e.found == start - 1 else e for e in events]
         if found is None:
             break
         events.append(found)
@@ -142,12 +147,50 @@ def watch(
     return Watched(tuple(events), z, high, low, level, u_level, scatter, max(baseline - left, 0))
 
 
-def _goes_on(found: Event, events: list[Event], at: NDArray[np.intp]) -> bool:
-    """Whether the value before stood out as well, on the same side."""
-    if not events or events[-1].verdict is not Verdict.STANDS_OUT or events[-1].found < at[0]:
-        return False
-    last = events[-1]
-    return last.found == found.found - 1 and last.difference * found.difference > 0.0
+def _settled(event: Event, level: NDArray[np.float64], u_level: NDArray[np.float64], start: int) -> Event:
+    """Return a change with the difference of the levels about it: that of the values which showed it was chosen for being large.
+
+    Args:
+        event: the change.
+        level: of every value.
+        u_level: its standard uncertainty.
+        start: number of the first value of the level after it.
+    """
+    before = event.since - 1
+    difference, u = float(level[start] - level[before]), float(np.hypot(u_level[start], u_level[before]))
+    return replace(event, difference=difference, u_difference=u)
+
+
+def _leads_to(found: Event, events: list[Event], start: int) -> list[Event]:
+    """Return the single values that stood out on the same side where a change begins: they belong to it.
+
+    Of a value that stands out itself only the one just before it: a change is what goes on.
+    """
+    first = found.since - 1
+    return [
+        event
+        for event in events
+        if event.verdict is Verdict.STANDS_OUT
+        and event.found >= max(first, start)
+        and event.difference * found.difference > 0.0
+    ]
+
+
+def _change(since: int, found: int, at: NDArray[np.intp], values: NDArray[np.float64], u: NDArray[np.float64]) -> Event:
+    """Return a change with all its values, those that stood out among them.
+
+    Args:
+        since: number of its first value.
+        found: number of the value that showed it.
+        at: numbers of the values that the level before is taken from, as far as they are before it.
+        values: all of them.
+        u: their standard uncertainties.
+    """
+    before, these = at[at < since], slice(since, found + 1)
+    level, u_level = _mean(values[before], u[before])
+    after, u_after = _mean(values[these], u[these])
+    spread = max(1.0, _scatter(values[before], u[before]))
+    return Event(Verdict.CHANGED, since, found, after - level, spread * float(np.hypot(u_after, u_level)))
 
 
 def _scatter(values: NDArray[np.float64], u: NDArray[np.float64]) -> float:
@@ -199,22 +242,22 @@ class _Stretch:
             if single[k]:
                 event = self._event(Verdict.STANDS_OUT, int(k), int(k))
             else:
-                side = high if high[k] >= low[k] else low
-                since = int(np.flatnonzero(side[:k] <= 0.0)[-1]) + 1  # the baseline's are zero
+                since = self._since(int(k), 1.0 if high[k] >= low[k] else -1.0)
                 event = self._event(Verdict.CHANGED, since, int(k))
             if abs(event.difference) > self.coverage_factor * self._stated(event):
                 return event
         return None
 
-    def change(self, since: int, found: int, also: tuple[float, float]) -> Event:
-        """Return a change that two values standing out show, one of which is not in this stretch."""
-        k = int(np.searchsorted(self.at, found))
-        pair, u = np.array([also[0], self.values[k]]), np.array([also[1], self.u[k]])
-        after, u_after = _mean(pair, u)
-        before = float(self.of.level[k])
-        spread = self._spread(k)
-        u_both = spread * float(np.hypot(u_after, self.of.u_level[k]))
-        return Event(Verdict.CHANGED, since, found, after - before, u_both)
+    def _since(self, k: int, side: float) -> int:
+        """Return the most probable first value of a change that value k showed, behind the sum's last zero.
+
+        Of normal values that one whose sum up to k is the largest, over the root of how many they are [Hinkley 1970,
+        Biometrika 57, 1].
+        """
+        sums = np.nan_to_num(self._sum(side))
+        first = int(np.flatnonzero(sums[:k] <= 0.0)[-1]) + 1  # those of the baseline are zero
+        behind = np.cumsum(side * self.of.z[first : k + 1][::-1])[::-1]
+        return first + int(np.argmax(behind / np.sqrt(np.arange(len(behind), 0, -1))))
 
     def final(self, count: int) -> tuple[float, float]:
         """Return the level of the first values and its standard uncertainty; NaN for none."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from math import floor, log10
 from typing import TYPE_CHECKING, Any
 
@@ -50,18 +51,26 @@ def verdict_in_words(one: Mapping[str, Any]) -> str:
     return one["verdict"] + (f", watched again after {lacking} more" if lacking else "")
 
 
+def headline(machine: Mapping[str, Any]) -> str:
+    """Return how many changes a machine shows, in one line; `machine` is as in `history_summary`."""
+    if not machine["changes"]:
+        if any(one["watched_sessions"] for one in machine["quantities"]):
+            return "Nothing changed beyond scatter and uncertainty"
+        return "Cannot tell whether anything changed: there are too few sessions"
+    counts = Counter(change["verdict"] for change in machine["changes"])
+    changed, single = counts["changed"], counts["stands out"]
+    told = [f"{changed} change{'s' if changed > 1 else ''}"] if changed else []
+    told += [f"{single} session{'s stand' if single > 1 else ' stands'} out"] if single else []
+    return ", ".join(told)
+
+
 def changes_in_words(machine: Mapping[str, Any], coverage_factor: float) -> Iterator[str]:
-    """Yield what changed on a machine: one line for each session that showed something, and its largest quantities.
+    """Yield what changed on a machine: one line for each session that showed something, with its largest quantities.
 
     Args:
         machine: as in `history_summary`.
         coverage_factor: k of U = k u.
     """
-    if not machine["changes"]:
-        if machine["watched_quantities"] and any(one["watched_sessions"] for one in machine["quantities"]):
-            yield "nothing changed beyond scatter and uncertainty"
-        else:
-            yield "cannot tell whether anything changed: there are too few sessions"
     for change in machine["changes"]:
         found, since = change["found"], change["since"]
         when = f"{found['name']} ({found['started'][:10]})"

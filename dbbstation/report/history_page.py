@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.history.words import changes_in_words, difference_in_words, verdict_in_words
+from dbbstation.history.words import changes_in_words, difference_in_words, headline, verdict_in_words
 from dbbstation.report.html import environment
 from dbbstation.report.polar import step_of
 
@@ -92,6 +92,7 @@ def history_html(summary: Mapping[str, Any], provenance: Provenance, tolerances_
         {
             **machine,
             "ident": f"m{number}",
+            "headline": headline(machine),
             "words": list(changes_in_words(machine, k)),
             "quantities": [{**one, "verdict_words": verdict_in_words(one)} for one in machine["quantities"]],
             "drawings": [

@@ -139,7 +139,7 @@ def test_what_somebody_wrote_into_the_index_is_not_believed(told, sessions):
 def test_the_terminal_says_what_changed(sessions):
     outcome = call("history", sessions)
     assert "machine PM600-0007: 14 sessions, 2017-01-02 to 2017-04-03" in outcome.out
-    assert re.search(r"^changed: w014 \(2017-04-03\), since w013 \(2017-03-27\): X a c+w", outcome.out, re.MULTILINE)
+    assert re.search(r"^  changed: w014 \(2017-04-03\), since w013 \(2017-03-27\): X a c+w", outcome.out, re.MULTILINE)
 
 
 def test_the_shops_limits_are_held_against_the_last_session(few):
@@ -157,7 +157,7 @@ def test_the_shops_limits_are_held_against_the_last_session(few):
 
 def test_too_few_sessions_cannot_tell(few):
     outcome = call("history", few)
-    assert "cannot tell whether anything changed: there are too few sessions" in outcome.out
+    assert "Cannot tell whether anything changed: there are too few sessions" in outcome.out
     assert "cannot tell: needs 7 more sessions" in outcome.out
 
 

@@ -119,6 +119,19 @@ def test_after_a_change_the_new_level_is_the_baseline(rng):
     assert found.u_level[-1] == pytest.approx(max(1.0, values[62:].std(ddof=1)) / np.sqrt(28))
 
 
+def test_the_size_of_a_change_is_right_on_average(rng):
+    """Values that showed a change are chosen for being large; those after it are not."""
+    values = rng.standard_normal((200, 90))
+    values[:, 40:] += 3.0
+    sizes = []
+    for row in values:
+        changes = [e for e in watch(row, np.ones(90), ONE, K).events if e.verdict is Verdict.CHANGED]
+        sizes += [(e.difference - 3.0) / e.u_difference for e in changes if e.since > 35]
+    assert len(sizes) > 190
+    assert np.mean(sizes) == pytest.approx(0.0, abs=4.0 / np.sqrt(len(sizes)))
+    assert 0.8 < np.std(sizes) < 1.2
+
+
 def test_after_a_late_change_it_is_said_how_many_sessions_are_lacking(rng):
     values = rng.standard_normal(40)
     values[34:] += 20.0

@@ -19,6 +19,7 @@ from tests.cli.conftest import call
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record
+from tests.sessions_over_time import sessions_over_time
 
 HERE = Path(__file__).resolve().parents[2]
 DOCUMENTS = [
@@ -192,6 +193,9 @@ def test_a_command_prints_what_is_shown(command, workshop, monkeypatch):
     assert words[0] == "dbbstation"
     if words[1:4] == ["compare", "before", "after"]:
         record_before_and_after(workshop)
+    if words[1:3] == ["history", "sessions"]:
+        sessions_over_time(workshop / "sessions", 16, seed=1, step_at=13, step_um=8.0)
+        monkeypatch.setenv("XDG_CACHE_HOME", str(workshop / "cache"))
     outcome = call(*words[1:])
     # On a terminal both streams are seen; which comes first depends on the command.
     printed = [outcome.out, outcome.err + outcome.out, outcome.out + outcome.err]

@@ -57,10 +57,12 @@ class _Found:
     Attributes:
         sessions: session files.
         models: files that may be models.
+        closed: folders that cannot be looked into, with the reason.
     """
 
     sessions: dict[str, Path]
     models: dict[str, Path]
+    closed: list[tuple[str, str]]
 
 
 def load_history(
@@ -100,7 +102,7 @@ def load_history(
     progress(reading.of, reading.of)
     sessions, alike = _once(sessions)
     dated = [one for one in sessions if one.started is not None]
-    left_out = reading.left_out + [
+    left_out = [*found.closed, *reading.left_out] + [
         (one.name, "none of its accepted runs says when it started: it has no place in time")
         for one in sessions
         if one.started is None
@@ -115,7 +117,7 @@ def load_history(
     machines = histories(dated, by_session, asked)
     for machine in machines:
         notes += date_faults(machine.sessions, now or datetime.now(UTC))
-        notes += [f"{one.name}: {note}" for one in machine.sessions for note in one.notes]
+        notes += _gathered(machine.sessions)
     return Historied(machines, tuple(left_out), tuple(notes), reading.worked_out)
 
 
@@ -123,10 +125,15 @@ def _files_of(folder: Path) -> _Found:
     """Return session files, and files that may be models, in and below a folder; what lies deep in a session is its own."""
     sessions: dict[str, Path] = {}
     models: dict[str, Path] = {}
+    closed: list[tuple[str, str]] = []
 
     def look(here: Path, depth: int) -> None:
-        with os.scandir(here) as listed:
-            entries = sorted(listed, key=lambda entry: entry.name)
+        try:
+            with os.scandir(here) as listed:
+                entries = sorted(listed, key=lambda entry: entry.name)
+        except OSError as error:
+            closed.append((here.relative_to(folder).as_posix(), _reason(error)))
+            return
         is_session = here != folder and any(entry.name == SESSION_FILE for entry in entries)
         for entry in entries:
             path = here / entry.name
@@ -145,7 +152,11 @@ def _files_of(folder: Path) -> _Found:
         what = "this folder is one session, a history is of a folder that holds several"
         raise InputError([Problem(str(folder), 0, 0, what, f"name the folder around it: {folder.resolve().parent}")])
     look(folder, 1)
-    return _Found(sessions, models)
+    return _Found(sessions, models, closed)
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
 
 
 def _is_folder(entry: os.DirEntry[str]) -> bool:
@@ -222,7 +233,7 @@ class _Reading:
             self.left_out.append((called, _first_of(error)))
             return None
         except OSError as error:
-            self.left_out.append((called, (error.strerror or str(error)).lower()))
+            self.left_out.append((called, _reason(error)))
             return None
         note_known(path, found.sha256)
         return found
@@ -285,6 +296,23 @@ def model_from(data: dict[str, Any], name: str) -> ModelFigures:
     """Return a model as the index keeps it, under the name that it has now; errors as of `session_from`."""
     parameters = tuple(ModelParameter(**parameter) for parameter in data["parameters"])
     return ModelFigures(name, data["sha256"], dict(data["sessions"]), parameters)
+
+
+MOST_NAMED = 3
+"""Sessions that are named where many have the same to be said of them."""
+
+
+def _gathered(sessions: Sequence[SessionFigures]) -> list[str]:
+    """Return what is to be said of sessions, what many have in common once."""
+    by_text: dict[str, list[str]] = {}
+    for one in sessions:
+        for note in one.notes:
+            by_text.setdefault(note, []).append(one.name)
+    said = []
+    for note, names in by_text.items():
+        more = len(names) - MOST_NAMED
+        said.append(f"{', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}: {note}")
+    return said
 
 
 def _once(sessions: Iterable[SessionFigures]) -> tuple[list[SessionFigures], list[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -225,11 +226,15 @@ def _parameter_series(sessions: Sequence[SessionFigures], models: Mapping[str, M
 def _labels(subjects: Sequence[Subject]) -> dict[Subject, str]:
     """Return names that tell quantities apart: with the circle, or with the other sources, only where that is needed."""
     short = {s: f"{s.of} {s.figure}" if s.is_parameter else f"{s.figure} {s.test} {s.direction}" for s in subjects}
-    names = list(short.values())
-    return {
-        s: name if names.count(name) == 1 else f"{name} ({'beside ' + ', '.join(s.beside) if s.is_parameter else s.of})"
-        for s, name in short.items()
-    }
+    count = Counter(short.values())
+    return {s: name if count[name] == 1 else f"{name} ({_apart(s)})" for s, name in short.items()}
+
+
+def _apart(subject: Subject) -> str:
+    """Return what tells a quantity from another of the same name."""
+    if not subject.is_parameter:
+        return subject.of
+    return f"beside {', '.join(subject.beside)}" if subject.beside else "alone"
 
 
 def _limit(subject: Subject, tolerances: Sequence[Tolerance]) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import html.parser
+import os
 import re
 import shutil
 import sqlite3
@@ -15,6 +16,7 @@ import pytest
 from dbbstation.cli import DONE, FAILED
 from dbbstation.files.kept import index_file
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.session_figures import session_figures
 from tests.cli.conftest import call
 from tests.sessions_over_time import sessions_over_time
 
@@ -124,8 +126,46 @@ def test_the_second_time_says_the_same_and_reads_no_recording(told, sessions, mo
     assert again.out == told.out
 
 
-def test_rebuild_reads_all_anew(told, sessions):
-    assert call("history", sessions, "--json", "--rebuild").out == told.out
+def test_a_session_file_that_was_only_touched_is_known_by_its_content(few, monkeypatch):
+    before = call("history", few, "--json").out
+    (few / "w002" / "session.yaml").touch()
+    shutil.move(few / "w003", few / "w003 moved")
+    monkeypatch.setattr("dbbstation.session_figures.session_figures", None)
+    assert call("history", few, "--json").out.replace("w003 moved", "w003") == before
+
+
+def test_what_was_read_before_an_interrupt_is_not_read_again(few, monkeypatch):
+    real, read = session_figures, []
+
+    def third_time(folder):
+        read.append(folder.name)
+        if len(read) == 3:
+            raise KeyboardInterrupt
+        return real(folder)
+
+    monkeypatch.setattr("dbbstation.session_figures.session_figures", third_time)
+    assert call("history", few).code == FAILED
+    assert call("history", few).code == DONE
+    assert read == ["w001", "w002", "w003", "w003", "w004"]
+
+
+@pytest.mark.skipif(getattr(os, "geteuid", lambda: 1)() == 0, reason="root may look into every folder")
+def test_a_folder_that_cannot_be_looked_into_is_named(few):
+    (few / "w002").chmod(0)
+    try:
+        outcome = call("history", few, "--json")
+    finally:
+        (few / "w002").chmod(0o700)
+    assert [one["name"] for one in outcome.data["left_out"]] == ["w002"]
+
+
+def test_rebuild_reads_all_anew(few):
+    """A recording that is damaged afterwards is only noticed then."""
+    before = call("history", few, "--json").out
+    run = few / "w003" / "runs" / "a-cw-2.csv"
+    run.write_bytes(run.read_bytes()[:-40])
+    assert call("history", few, "--json").out == before
+    assert [one["name"] for one in call("history", few, "--json", "--rebuild").data["left_out"]] == ["w003"]
 
 
 def test_what_somebody_wrote_into_the_index_is_not_believed(told, sessions):

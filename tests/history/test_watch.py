@@ -26,10 +26,10 @@ def tables_with_an_alarm(rng, *, tables, quantities, sessions, rate, scatter):
     return found, chart
 
 
-@pytest.mark.parametrize("scatter", [1.0, 1.5, 4.0])
+@pytest.mark.parametrize("scatter", [1.0, 3.0])
 def test_a_table_gives_as_many_false_alarms_as_stated(rng, scatter):
-    """600 tables; the stated share by the Markov chain, its 99.9 % binomial interval."""
-    tables, quantities, sessions, rate = 600, 6, 110, 0.01
+    """500 tables; the stated share by the Markov chain, its 99.9 % binomial interval."""
+    tables, quantities, sessions, rate = 500, 6, 110, 0.01
     found, chart = tables_with_an_alarm(
         rng, tables=tables, quantities=quantities, sessions=sessions, rate=rate, scatter=scatter
     )

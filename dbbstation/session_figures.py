@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -87,6 +88,15 @@ def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
     )
 
 
+def _as_printed(parameter: ModelParameter) -> ModelParameter:
+    """Return a parameter as `calibrate` prints it: lengths in micrometres, its name without its unit."""
+    name = parameter.name.removesuffix("_mm").replace("_", " ")
+    if parameter.unit != "mm":
+        return replace(parameter, name=name)
+    u_um = None if parameter.u is None else 1e3 * parameter.u
+    return replace(parameter, name=name, value=1e3 * parameter.value, u=u_um, unit="µm")
+
+
 def _in_words(circle: Circle) -> str:
     """Return what two circles share where their figures are comparable: place, bar, tilt, elevation and feed."""
     place = " ".join(f"{axis}{round(value)}" for axis, value in zip("XYZ", circle.ball_mm, strict=True))
@@ -146,7 +156,9 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
         for parameter, value in zip(fitted.source.parameters(identified.model.machine), fitted.values, strict=True):
             known = u.get((fitted.source.name, fitted.shared, parameter.name))
             sure = None if known is None or known == 0.0 else float(known)  # held at nominal
-            parameters.append(ModelParameter(fitted.source.name, parameter.name, float(value), sure, parameter.unit))
+            parameters.append(
+                _as_printed(ModelParameter(fitted.source.name, parameter.name, float(value), sure, parameter.unit))
+            )
     return ModelFigures(
         path.name, hashlib.sha256(path.read_bytes()).hexdigest(), dict(identified.sessions), tuple(parameters)
     )

@@ -121,7 +121,9 @@ def _print(machine: Mapping[str, Any], summary: Mapping[str, Any]) -> None:
 
     sessions = machine["sessions"]
     first, last = (sessions[k]["started"][:10] for k in (0, -1))
-    click.echo(f"machine {machine['machine']}: {len(sessions)} sessions, {first} to {last}")
+    click.echo(
+        f"machine {machine['machine']}: {len(sessions)} session{'s' if len(sessions) > 1 else ''}, {first} to {last}"
+    )
     if machine["watched_quantities"]:
         rate = summary["false_alarms_per_session"]
         click.echo(

@@ -313,10 +313,10 @@ def test_parameters_come_from_models_of_one_session(few):
     shutil.copy(few / "w002.yaml", few / "again.yaml")
     shutil.copy(MODEL, few / "elsewhere.yaml")
     data = call("history", few, "--json").data
-    found = quantity(data, "strut-reference-length strut_2_mm")
-    assert [one["value"] for one in found["values"]] == pytest.approx([0.01494, 0.01594, 0.01694])
-    assert [one["u"] for one in found["values"]] == pytest.approx([7.395e-8**0.5] * 3)
-    assert found["unit"] == "mm"
+    found = quantity(data, "strut-reference-length strut 2")
+    assert [one["value"] for one in found["values"]] == pytest.approx([14.94, 15.94, 16.94])
+    assert [one["u"] for one in found["values"]] == pytest.approx([1e3 * 7.395e-8**0.5] * 3)
+    assert found["unit"] == "µm"
     assert any("w002.yaml and again.yaml are of one session" in note for note in data["notes"])
     assert any("elsewhere.yaml comes from a session small that is not here" in note for note in data["notes"])
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.patience import driver_patience
@@ -53,6 +54,7 @@ _DEMO_SEED = 3
 )
 @spy_option
 @loss_option
+@judging_model_options
 @session_options
 def station(
     *,
@@ -69,6 +71,8 @@ def station(
     time_scale: float,
     largest_loss_percent: float | None,
     largest_bar_age_h: float | None,
+    model_file: Path | None,
+    source_files: tuple[Path, ...],
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
@@ -106,7 +110,15 @@ def station(
     details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
     with ExitStack() as stack:
-        job = Job(machine, plan, folder, details, rate_hz=protocol.fastest_hz(baud), range_mm=protocol.length.range_mm)
+        job = Job(
+            machine,
+            plan,
+            folder,
+            details,
+            rate_hz=protocol.fastest_hz(baud),
+            range_mm=protocol.length.range_mm,
+            model=judging_model(model_file, source_files),
+        )
         job.check(str(plan_file))
         if not virtual:
             require_bar(job, largest_bar_age_h)

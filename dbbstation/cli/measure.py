@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
+from dbbstation.service.patience import RECONNECT_S, driver_patience
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -96,7 +96,6 @@ def station(
     from dbbstation.files.shipped import shipped_folder
     from dbbstation.service.opening import opener
     from dbbstation.station.assembly import Job
-    from dbbstation.station.events import Observer
 
     def demo(what: str) -> Path:
         folder, _, rest = _DEMO[what].partition("/")

@@ -38,6 +38,7 @@ COMMANDS = {
     "measure": "Measure a plan, test by test, into a session folder.",
     "mismatch": "Where any simulation and any recording differ, and how.",
     "monitor": "Live reading of an instrument.",
+    "plot": "One figure of measured circles, with a title block.",
     "ports": "List the serial ports of this computer.",
     "predict": "Actual poses for commanded ones, under a model.",
     "program": "NC programs of a plan's circles, nominal or compensated.",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.inputs import note_known
 from dbbstation.files.kept import Kept, stamp_of
+from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session import SESSION_FILE
 from dbbstation.history.order import date_faults
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
@@ -22,15 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.history.trend import Asked, MachineHistory
-
-DEEPEST = 4
-"""Folders inside one another that are looked through: year, machine, month, session."""
-
-_MODEL_MARK = b"format: dbb-model/"
-"""How a model file begins; other YAML files are not read."""
-
-_MARK_WITHIN = 4096
-"""Bytes of a file in which the mark is looked for."""
 
 
 @dataclass(frozen=True)
@@ -48,21 +39,6 @@ class Historied:
     left_out: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
     worked_out: int
-
-
-@dataclass(frozen=True)
-class _Found:
-    """Files of a folder, by their paths in it.
-
-    Attributes:
-        sessions: session files.
-        models: files that may be models.
-        closed: folders that cannot be looked into, with the reason.
-    """
-
-    sessions: dict[str, Path]
-    models: dict[str, Path]
-    closed: list[tuple[str, str]]
 
 
 def load_history(
@@ -90,9 +66,7 @@ def load_history(
     Raises:
         InputError: there is no session in it, or none that can be used; a test that none of them has.
     """
-    found = _files_of(folder)
-    if not found.sessions:
-        raise InputError([_no_sessions(folder)])
+    found = files_of(folder)
     with Kept(folder, begin_anew=rebuild) as kept:
         reading = _Reading(kept, source_files, progress, len(found.sessions) + len(found.models))
         sessions = [one for name, path in found.sessions.items() if (one := reading.session(name, path)) is not None]
@@ -119,63 +93,6 @@ def load_history(
         notes += date_faults(machine.sessions, now or datetime.now(UTC))
         notes += _gathered(machine.sessions)
     return Historied(machines, tuple(left_out), tuple(notes), reading.worked_out)
-
-
-def _files_of(folder: Path) -> _Found:
-    """Return session files, and files that may be models, in and below a folder; what lies deep in a session is its own."""
-    sessions: dict[str, Path] = {}
-    models: dict[str, Path] = {}
-    closed: list[tuple[str, str]] = []
-
-    def look(here: Path, depth: int) -> None:
-        try:
-            with os.scandir(here) as listed:
-                entries = sorted(listed, key=lambda entry: entry.name)
-        except OSError as error:
-            closed.append((here.relative_to(folder).as_posix(), _reason(error)))
-            return
-        is_session = here != folder and any(entry.name == SESSION_FILE for entry in entries)
-        for entry in entries:
-            path = here / entry.name
-            name = path.relative_to(folder).as_posix()
-            if is_session and entry.name == SESSION_FILE:
-                sessions[name] = path
-            elif entry.is_file() and entry.name.endswith((".yaml", ".yml")) and _may_be_model(path):
-                models[name] = path
-            elif not is_session and depth < DEEPEST and not entry.name.startswith(".") and _is_folder(entry):
-                look(path, depth + 1)
-
-    if not folder.is_dir():
-        what = "there is no such folder" if not folder.exists() else "this is no folder"
-        raise InputError([Problem(str(folder), 0, 0, what, "name a folder that holds session folders")])
-    if (folder / SESSION_FILE).is_file():
-        what = "this folder is one session, a history is of a folder that holds several"
-        raise InputError([Problem(str(folder), 0, 0, what, f"name the folder around it: {folder.resolve().parent}")])
-    look(folder, 1)
-    return _Found(sessions, models, closed)
-
-
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()
-
-
-def _is_folder(entry: os.DirEntry[str]) -> bool:
-    return entry.is_dir(follow_symlinks=False)
-
-
-def _may_be_model(path: Path) -> bool:
-    try:
-        with path.open("rb") as file:
-            return _MODEL_MARK in file.read(_MARK_WITHIN)
-    except OSError:
-        return False
-
-
-def _no_sessions(folder: Path) -> Problem:
-    what = f"no folder in it holds a {SESSION_FILE}, {DEEPEST} folders deep"
-    return Problem(
-        str(folder), 0, 0, what, "name a folder that holds the session folders of `measure`, `station` or `simulate`"
-    )
 
 
 _Kind = TypeVar("_Kind", SessionFigures, ModelFigures)
@@ -233,7 +150,7 @@ class _Reading:
             self.left_out.append((called, _first_of(error)))
             return None
         except OSError as error:
-            self.left_out.append((called, _reason(error)))
+            self.left_out.append((called, reason_of(error)))
             return None
         note_known(path, found.sha256)
         return found

@@ -14,8 +14,10 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from dbbstation.cli import DONE, FAILED
+from dbbstation.cli.history import history
 from dbbstation.files.kept import index_file
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.history.trend import FALSE_ALARMS
 from dbbstation.session_figures import session_figures
 from tests.cli.conftest import call
 from tests.sessions_over_time import sessions_over_time
@@ -174,6 +176,11 @@ def test_what_somebody_wrote_into_the_index_is_not_believed(told, sessions):
         base.execute("UPDATE kept SET text = 'no json' WHERE name LIKE 'w006%'")
     base.close()
     assert call("history", sessions, "--json").out == told.out
+
+
+def test_the_rate_of_the_command_is_that_of_the_trends():
+    """Stated twice, since help must not wait for NumPy."""
+    assert {option.name: option.default for option in history.params}["false_alarms"] == FALSE_ALARMS
 
 
 def test_the_terminal_says_what_changed(sessions):

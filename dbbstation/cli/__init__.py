@@ -33,6 +33,7 @@ COMMANDS = {
     "drive": "Identify one strut drive: mass, friction, further causes.",
     "emulate": "A virtual machine with a ball bar, on a line of its own.",
     "evaluate": "Circle by circle: what a model leaves of recordings.",
+    "export": "Sessions as one tidy table, CSV or Parquet.",
     "import": "Take recordings that another program made into a session.",
     "instruments": "List the known instruments.",
     "measure": "Measure a plan, test by test, into a session folder.",

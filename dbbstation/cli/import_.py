@@ -163,7 +163,7 @@ def _read(
     for path, table in tables.items():
         runs += reader.read(table, told.get(path) or _asked_run(asker, reader, table, planned))
     reader.check()
-    statements = _statements(mapping, runs, job, not_known)
+    statements = [*_statements(mapping, runs, job, not_known), *reader.left_out]
     now = datetime.now(UTC).replace(microsecond=0)
     notes = tuple(Note(now, f"imported: {text}") for text in statements)
     details = replace(session_details(**options, stroke_mm=None), notes=notes)

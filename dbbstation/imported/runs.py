@@ -94,11 +94,13 @@ class Reader:
         mapping: what the columns mean.
         plan: whose circles were run.
         faults: grows.
+        left_out: grows: runs that are not taken, and why.
     """
 
     mapping: MappingFile
     plan: Plan
     faults: list[Problem] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
     _taken: set[tuple[str, Direction, int]] = field(default_factory=set)
 
     def read(self, table: ForeignTable, told: RunName) -> list[ImportedRun]:
@@ -120,6 +122,10 @@ class Reader:
             return []
         found = []
         for rows, said in self._groups(table):
+            if said.get(STATE) == RunState.RECORDING:
+                name = "-".join(said.get(key, "") for key in (TEST, DIRECTION, REPEAT))
+                self.left_out.append(f"run {name} was broken off where it was measured and is left out")
+                continue
             run = self._run(table, rows, said, told)
             if run is not None:
                 found.append(run)
@@ -191,7 +197,7 @@ class Reader:
         status = self.mapping.column(columns.STATUS)
         cells = () if status is None else table.table.cells[status]
         texts = {} if status is None else {columns.STATUS: tuple(cells[k] for k in rows[travelled.rows].tolist())}
-        state = said.get(STATE, "")
+        state = self._state(said.get(STATE, ""), file, line)
         run = FinishedRun(
             test=name.test,
             direction=direction,
@@ -199,8 +205,8 @@ class Reader:
             repeat=self._repeat(name, direction, file, line),
             mounting=count_in(said.get(MOUNTING, "")) or None,
             started=self._moment(said.get(STARTED, ""), file, line),
-            state=RunState(state) if state in _STATES else RunState.ACCEPTED,
-            reason="rejected where it was measured" if state == RunState.REJECTED else "",
+            state=state,
+            reason="rejected where it was measured" if state is RunState.REJECTED else "",
             texts=texts,
             exact=True,
         )
@@ -272,6 +278,12 @@ class Reader:
         self._taken.add((name.test, direction, repeat))
         return repeat
 
+    def _state(self, text: str, file: str, line: int) -> RunState:
+        """State of a run: accepted where nothing is said."""
+        if text and text not in set(RunState):
+            self._fault(file, line, f"`{text}` is no state of a run", f"use one of {', '.join(_STATES)}")
+        return RunState(text) if text in _STATES else RunState.ACCEPTED
+
     def _moment(self, text: str, file: str, line: int) -> datetime | None:
         if not text:
             return None
@@ -323,5 +335,5 @@ def run_name(text: str, known: Sequence[str]) -> RunName | None:
     return RunName(test, Direction(direction), count_in(repeat))
 
 
-_STATES = {RunState.ACCEPTED, RunState.REJECTED, RunState.COMPLETE}
+_STATES = (RunState.ACCEPTED, RunState.REJECTED, RunState.COMPLETE)
 _SAY_IT = "add it to the mapping, as `ignored` where it does not matter"

@@ -88,6 +88,7 @@ def test_every_way_of_writing_gives_the_same_lengths(run, tmp_path, head, separa
     np.testing.assert_allclose(recording.t_s, ANGLES / 360.0 * turn_s, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_machine_is_calibrated_from_imported_traces_as_from_its_own(run, tmp_path, fifteen, calibrated):
     """Whole traces of 15 circles as another program would write them: ms, inch, decimal comma, both directions in German."""
     session = read_session(fifteen)

@@ -28,6 +28,8 @@ _LANGUAGES = (
 )
 """Ways of writing tables; the first of those that fit as well."""
 
+_SIGNS = ",;\t"
+
 _LOOKED_AT = 300
 """Lines that tell how a table is written: text before it is a page at the most."""
 
@@ -119,11 +121,11 @@ def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str |
 
 
 def _language(lines: list[str], file: str) -> NumberLanguage:
-    """The way of writing with most cells that are numbers less those that are none: `0,5;1,5` has two numbers, not `0`, `5;1` and `5`."""
+    """The way of writing with most numbers less cells that were not taken apart: `0,5;1,5` is `0`, `5;1`, `5` with a comma between."""
 
     def fit(language: NumberLanguage) -> int:
         rows = [_cells(line, language, file, k) for k, line in enumerate(lines[:_LOOKED_AT], start=1)]
-        return sum(2 * _count(row, language) - len(row) for row in rows if len(row) > 1)
+        return sum(_count(row, language) - _whole(row, language) for row in rows if len(row) > 1)
 
     return max(_LANGUAGES, key=fit)
 
@@ -137,6 +139,12 @@ def _cells(line: str, language: NumberLanguage, file: str, number: int) -> list[
 
 def _count(row: list[str], language: NumberLanguage) -> int:
     return sum(bool(np.isfinite(language.number(cell))) for cell in row)
+
+
+def _whole(row: list[str], language: NumberLanguage) -> int:
+    """How many cells are no numbers and hold digits beside a separator or decimal comma."""
+    others = [cell for cell in row if any(sign in cell for sign in _SIGNS) and any(map(str.isdigit, cell))]
+    return len(others) - _count(others, language)
 
 
 def _is_row(row: list[str], language: NumberLanguage) -> bool:

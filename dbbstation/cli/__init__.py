@@ -36,6 +36,7 @@ COMMANDS = {
     "export": "Sessions as one tidy table, CSV or Parquet.",
     "import": "Take recordings that another program made into a session.",
     "instruments": "List the known instruments.",
+    "jig": "A jig file from a CMM sheet; how well holders repeat.",
     "measure": "Measure a plan, test by test, into a session folder.",
     "mismatch": "Where any simulation and any recording differ, and how.",
     "monitor": "Live reading of an instrument.",

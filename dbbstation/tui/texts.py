@@ -71,7 +71,7 @@ HELP = {
         (
             (
                 "The map shows the plate from above, X to the right and Y up. Under each bore stand its tests with a sign for each "
-                "direction. The list has the same signs with a word."
+                "direction and, where there is room, the greatest circularity. The list has the same signs with a word."
             ),
             (
                 "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict."

@@ -9,7 +9,8 @@ import numpy as np
 
 from dbbstation.circles.analysis import EDITION, CircleAnalysis, PairAnalysis, analyse, analyse_pair
 from dbbstation.circles.budget import SetUpKnowledge, budgets, pair_budgets
-from dbbstation.circles.summary import circle_summary, pair_summary
+from dbbstation.circles.quick_look import quick_look
+from dbbstation.circles.summary import circle_summary, pair_summary, quick_look_summary
 from dbbstation.errors import InputError, Problem, TraceError
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.judged import judge_session
@@ -57,10 +58,12 @@ class MeasuredPair:
 
     Attributes:
         one: run of the direction that was measured first.
+        other: run of the other direction.
         analysis: figures of both.
     """
 
     one: MeasuredCircle
+    other: MeasuredCircle
     analysis: PairAnalysis
 
 
@@ -188,7 +191,7 @@ def _pairs(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[Me
         key = (circle.entry.test, circle.entry.repeat, session.setup(circle.entry).mounting)
         before = first.setdefault(key, circle)
         if before is not circle and before.analysis is not None:
-            pairs.append(MeasuredPair(before, analyse_pair(before.analysis, circle.analysis)))
+            pairs.append(MeasuredPair(before, circle, analyse_pair(before.analysis, circle.analysis)))
     return pairs
 
 
@@ -231,3 +234,29 @@ def circled_summary(found: Circled, chosen: Filter) -> dict[str, Any]:
         "runs": runs,
         "pairs": pairs,
     }
+
+
+def quick_looks(found: Circled) -> list[dict[str, Any]]:
+    """Signatures of serial axes in every circle, both directions of one together: what `circles --quick-look` prints.
+
+    Args:
+        found: the circles.
+    """
+    partner = {id(pair.one): pair.other for pair in found.pairs}
+    second = {id(pair.other) for pair in found.pairs}
+    looks = []
+    for circle in found.circles:
+        if circle.analysis is None or id(circle) in second:
+            continue
+        turns = [one for one in (circle, partner.get(id(circle))) if one is not None]
+        looked = quick_look([one.analysis for one in turns if one.analysis is not None])
+        looks.append(
+            {
+                "session": circle.session,
+                "test": circle.entry.test,
+                "repeat": circle.entry.repeat,
+                "directions": [str(one.entry.direction) for one in turns],
+                **quick_look_summary(looked),
+            }
+        )
+    return looks

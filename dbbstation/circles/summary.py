@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
     from dbbstation.circles.analysis import CircleAnalysis, Deviations, PairAnalysis
     from dbbstation.circles.budget import Budget, Quantity
+    from dbbstation.circles.quick_look import QuickLook
     from dbbstation.circles.reversals import Step
 
 
@@ -74,6 +75,28 @@ def budget_summary(budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
             "noise_adds_up_to_um": budget.noise_adds_um,
         }
         for quantity, budget in budgets.items()
+    }
+
+
+def quick_look_summary(found: QuickLook | None) -> dict[str, Any]:
+    """Signatures of serial axes as plain numbers, u beside each; without symptoms where there are too few samples."""
+    if found is None:
+        return {"symptoms": [], "form_rms_um": None, "left_rms_um": None}
+    return {
+        "symptoms": [
+            {
+                "signature": str(one.signature),
+                "place": one.place or None,
+                "value": one.value,
+                "u": one.u,
+                "unit": one.unit,
+                "seen": one.seen,
+                "text": one.text or None,
+            }
+            for one in found.symptoms
+        ],
+        "form_rms_um": found.form_rms_um,
+        "left_rms_um": found.left_rms_um,
     }
 
 

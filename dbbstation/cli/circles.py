@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     "--model", type=click.Path(path_type=Path), help="Expect circles where this model has them; with --findings."
 )
 @click.option("--budget", is_flag=True, help="Print the uncertainty budget of every figure, term by term.")
+@click.option(
+    "--quick-look", is_flag=True, help="Look for the classical signatures of serial axes: symptoms, no causes here."
+)
 @chosen_tests_options
 @click.option("--csv", "out", type=click.Path(path_type=Path, dir_okay=False), help="Write the table here, as CSV.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
@@ -33,6 +36,7 @@ def circles(
     findings: bool,
     model: Path | None,
     budget: bool,
+    quick_look: bool,
     tests: tuple[str, ...],
     exclude: tuple[str, ...],
     out: Path | None,
@@ -51,8 +55,9 @@ def circles(
       dbbstation circles session --filter 50 --csv circles.csv
       dbbstation circles session --findings --model model.yaml
       dbbstation circles session --test a --budget --json
+      dbbstation circles session --test a --quick-look
     """
-    from dbbstation.circled import circled_summary, load_circles
+    from dbbstation.circled import circled_summary, load_circles, quick_looks
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
@@ -80,6 +85,8 @@ def circles(
     for warning in found.warnings:
         say(f"note: {warning}")
     summary = circled_summary(found, chosen)
+    if quick_look:
+        summary["quick_look"] = quick_looks(found)
     if out is not None:
         names, rows = _flat(summary["runs"])
         write_table(out, table_csv(names, list(zip(*rows, strict=True))), provenance(), force=force)
@@ -92,6 +99,8 @@ def circles(
         _print_budgets(summary)
     if findings:
         _print_findings(summary["runs"])
+    if quick_look:
+        _print_quick_looks(summary["quick_look"])
 
 
 def _print(summary: Mapping[str, Any], *, several: bool) -> None:
@@ -218,6 +227,37 @@ def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
         if finding["verdict"] == Verdict.WRONG
     ]
     click.echo("\n".join(wrong) if wrong else "nothing is wrong")
+
+
+def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
+    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
+
+    rows: list[list[object]] = []
+    for look in looks:
+        name = [look["test"], "+".join(look["directions"]), look["repeat"]]
+        if not look["symptoms"]:
+            rows.append([*name, "too few samples", "", "-", "-", "", "-", ""])
+        for one in look["symptoms"]:
+            known = one["value"] is not None
+            rows.append(
+                [
+                    *name,
+                    one["signature"],
+                    one["place"] or "",
+                    _digits(one["value"]) if known else "-",
+                    _digits(COVERAGE_FACTOR * one["u"]) if known else "-",
+                    one["unit"],
+                    ("yes" if one["seen"] else "no") if known else "-",
+                    one["text"] or "",
+                ]
+            )
+    click.echo(f"\nquick look at the signatures of serial axes, {EXPANDED}")
+    click.echo("On a hexapod these are symptoms, no causes: it has no axes X and Y. Causes: `dbbstation diagnose`.")
+    print_table(["test", "dir", "n", "signature", "at", "value", "U", "unit", "seen", ""], rows)
+
+
+def _digits(value: float) -> str:
+    return f"{value:.3g}" if abs(value) < 1.0 else f"{value:.1f}"
 
 
 def _flat(runs: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[object]]]:

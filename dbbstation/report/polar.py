@@ -42,6 +42,7 @@ class Trace:
         direction: `ccw` or `cw`.
         former: whether it was measured before.
         thin: whether it is a repeat of one that is drawn already.
+        name: of the run, in few letters.
         title: what is shown where the pointer rests on it.
     """
 
@@ -49,6 +50,7 @@ class Trace:
     direction: str
     former: bool
     thin: bool
+    name: str
     title: str
 
 
@@ -80,6 +82,7 @@ class Polar:
         traces: in drawing order.
         rings: nominal circle and one division either way.
         step_um: of a division [µm].
+        scale: units of the figure per µm.
         not_drawn: repeats that are left out.
     """
 
@@ -88,6 +91,7 @@ class Polar:
     traces: tuple[Trace, ...]
     rings: tuple[Ring, ...]
     step_um: float
+    scale: float
     not_drawn: int
 
 
@@ -109,6 +113,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
             direction=str(one.entry.direction),
             former=former,
             thin=thin,
+            name=f"{'before ' if former else ''}{str(one.entry.direction).upper()} {one.entry.repeat}",
             title=f"{'before: ' if former else ''}{one.entry.label}: G {analysis.g_um:.1f} µm",
         )
         for one, analysis, former, thin in analysed
@@ -122,6 +127,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
         traces=traces,
         rings=tuple(Ring(CIRCLE + scale * um, um) for um in (-step_um, 0.0, step_um)),
         step_um=step_um,
+        scale=scale,
         not_drawn=len(now) + len(before) - len(drawn),
     )
 

@@ -58,14 +58,15 @@ def best_circle(
     """
     theta = np.radians(theta_deg)
     x, y = radius_mm * np.cos(theta), radius_mm * np.sin(theta)
-    columns = np.ones((len(theta), 3))
+    columns = np.ones((3, len(theta)))
     centre, radius = np.zeros(2), float(radius_mm.mean())
     for _ in range(MOST_STEPS):
         across, along = x - centre[0], y - centre[1]
         distance = np.sqrt(across * across + along * along)
-        columns[:, 0], columns[:, 1] = across / distance, along / distance
-        step, _, rank, _ = np.linalg.lstsq(columns, distance - radius, rcond=1e-9)
-        if rank < columns.shape[1]:
+        np.divide(across, distance, out=columns[0])
+        np.divide(along, distance, out=columns[1])
+        step = _step(columns, distance - radius)
+        if step is None:
             break
         centre += step[:2]
         radius += step[2]
@@ -75,6 +76,27 @@ def best_circle(
         "its points do not determine a circle",
         remedy="record more of the turn",
     )
+
+
+def _step(columns: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return the least-squares solution of few columns, shape (k,); None where they do not determine one.
+
+    By normal equations, a tenth of the work of an orthogonal solution: what rounding leaves the next step of Gauss-Newton takes
+    out. Columns of a small part of the turn are too much alike for that and are solved orthogonally.
+
+    Args:
+        columns: shape (k, n).
+        left: shape (n,).
+    """
+    normal = columns @ columns.T
+    if np.linalg.cond(normal) < WORST_CONDITION:
+        return np.asarray(np.linalg.solve(normal, columns @ left))
+    step, _, rank, _ = np.linalg.lstsq(columns.T, left, rcond=1e-9)
+    return np.asarray(step) if rank == len(columns) else None
+
+
+WORST_CONDITION = 1e6
+"""Condition of normal equations up to which they are taken: a whole turn has 2, a quarter of one some thousands."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -234,13 +235,27 @@ def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]
 
 
 def overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float] | None:
-    """Feed and its standard deviation [mm/min] that make both passes of the overlap agree.
+    """Feed and its standard deviation [mm/min] that make both passes of the overlap agree; worked out once.
 
     Looked for about the programmed feed and about the one that the trace's duration suggests; the better match counts.
 
     Returns:
         None where the overlap cannot tell: too few samples, or a trace too round to show a shift.
     """
+    found = _FEEDS.setdefault(recording, {})
+    key = (circle, edges)
+    if key not in found:
+        found[key] = _overlap_feed(recording, circle, edges)
+    return found[key]
+
+
+_FEEDS: WeakKeyDictionary[Recording, dict[tuple[Circle, tuple[float, float]], tuple[float, float] | None]] = (
+    WeakKeyDictionary()
+)
+"""Feeds that overlaps show, which cutting, figures and findings all ask for."""
+
+
+def _overlap_feed(recording: Recording, circle: Circle, edges: tuple[float, float]) -> tuple[float, float] | None:
     turn_s = FULL_TURN_DEG / circle.turning_deg_s
     by_duration_s = (edges[1] - edges[0]) * FULL_TURN_DEG / circle.swept_deg
     middle = (edges[0] + edges[1]) / 2.0

@@ -78,7 +78,9 @@ def minimum_zone(points_mm: NDArray[np.float64]) -> MinimumZone:
 
 def _extremes(points_mm: NDArray[np.float64]) -> NDArray[np.int64]:
     """Indices of the farthest and nearest point of each sector."""
-    if len(np.unique(points_mm, axis=0)) < FEWEST_POINTS:
+    # Sorting all points takes longer than the search: those of a sound path differ from the first.
+    first = points_mm[:FEWEST_POINTS]
+    if len(np.unique(first, axis=0)) < FEWEST_POINTS and len(np.unique(points_mm, axis=0)) < FEWEST_POINTS:
         raise TraceError("it has fewer than four points", remedy="record more of the turn")
     middle = points_mm.mean(axis=0)
     x, y = (points_mm - middle).T

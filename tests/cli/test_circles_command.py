@@ -138,3 +138,27 @@ def test_a_spoilt_run_is_found_by_both_commands(session, tmp_path):
 
 def digest_of(line):
     return line.partition("sha256: ")[2].strip(" }") if "sha256" in line else "nothing"
+
+
+def test_a_quick_look_is_printed_as_symptoms():
+    """On the machine of the fixtures: both directions together where both are there, u and the words that it is no cause."""
+    outcome = call("circles", SMALL, "--quick-look")
+    assert outcome.code == DONE
+    assert "On a hexapod these are symptoms, no causes" in outcome.out
+    looks = call("circles", SMALL, "--quick-look", "--json").data["quick_look"]
+    by_test = {(look["test"], look["repeat"]): look for look in looks}
+    assert by_test["g", 1]["directions"] == ["ccw", "cw"]
+    both, single = by_test["g", 1], by_test["a", 2]
+    assert single["directions"] == ["cw"]
+    # The second harmonic of both directions, as `circles` has it: A cos 2(θ - θ_0) is -β R/2 sin 2θ + s R/2 cos 2θ.
+    runs = call("circles", SMALL, "--test", "g", "--json").data["runs"]
+    waves = [
+        run["harmonics"][0]["amplitude_um"] * np.exp(2j * np.radians(run["harmonics"][0]["peak_deg"])) for run in runs
+    ]
+    mean, radius_m = np.mean(waves), 1e-3 * runs[0]["radius_mm"]
+    sizes = {one["signature"]: one for one in both["symptoms"] if one["place"] is None}
+    square, scale = sizes["squareness"], sizes["scale mismatch"]
+    assert square["value"] == pytest.approx(-2 * mean.imag / radius_m, abs=4 * square["u"])
+    assert scale["value"] == pytest.approx(2 * mean.real / radius_m, abs=4 * scale["u"])
+    assert {one["signature"] for one in single["symptoms"] if one["value"] is None} == {"squareness", "servo mismatch"}
+    assert "quick_look" not in call("circles", SMALL, "--json").data

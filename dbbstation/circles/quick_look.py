@@ -1,0 +1,266 @@
+"""The classical signatures of machines with serial axes in circles of any machine, by least squares.
+
+On a hexapod they are symptoms, no causes: there are no axes X and Y that could be out of square or lag.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from dbbstation.circles.noise import LEAST_UM
+from dbbstation.circles.signatures import Shape, Signature, cyclic_shapes, shapes_of
+from dbbstation.inference.harmonics import LOW, basis, misfit
+from dbbstation.trace.average import means, sector_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.circles.analysis import CircleAnalysis
+
+SECTORS = 2880
+"""Means of an eighth of a degree stand for the samples of a longer recording: the shortest shape here, a cyclic error of 40
+periods over the diameter, loses 0.3 % of its amplitude."""
+
+SPIKES_DEG = (1.5, 3.0, 6.0, 12.0)
+"""Lengths of reversal spikes that are tried; that of the least residual is taken for all four [deg]."""
+
+FREE = 10
+"""Undulations per revolution, from 3, that the turn may have in both senses alike without being a signature: the form that any
+machine has. It is fitted beside them and not reported. Below, a signature would have to stand for it."""
+
+PERIODS = np.arange(6.0, 40.01, 0.25)
+"""Periods of a cyclic error over the diameter that are tried. Fewer cannot be told from that form, a quarter of a period is the
+width of a peak of that scan."""
+
+AT_END_DEG = 0.3
+"""Stretch either side of an end of an axis that does not count: on which side of a step a sample stands is not known better
+than the start of the turn and the place of the ball [deg]."""
+
+SEEN = 4.0
+"""Standard uncertainties from which a figure counts as seen: by chance one look of 11 figures in 1400 has one (normal)."""
+
+CHANCE = 1e-3
+"""Chance at which noise alone shows a cyclic error somewhere in the scan."""
+
+FEWEST = 200
+"""Samples of a turn below which there is no quick look: a spike of 1.5 degrees must have one."""
+
+
+@dataclass(frozen=True)
+class Symptom:
+    """Size of one signature.
+
+    Attributes:
+        signature: which.
+        place: end or axis; empty where it belongs to both axes.
+        value: its size; None where it cannot be told.
+        u: standard uncertainty of that; None likewise.
+        unit: of both.
+        seen: whether it stands out of its uncertainty.
+        text: what else is to be said, such as the period of a cyclic error.
+    """
+
+    signature: Signature
+    place: str
+    value: float | None
+    u: float | None
+    unit: str
+    seen: bool
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class QuickLook:
+    """All signatures of one circle.
+
+    Attributes:
+        symptoms: all of them.
+        form_rms_um: of the deviations from the least-squares circles [µm].
+        left_rms_um: of what the signatures leave of them, noise included [µm].
+        spike_deg: length of the spikes [deg].
+        sigma_um: standard deviation of a sample, as these figures feel what is left [µm].
+    """
+
+    symptoms: tuple[Symptom, ...]
+    form_rms_um: float
+    left_rms_um: float
+    spike_deg: float
+    sigma_um: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Turn:
+    """One turn as it is fitted."""
+
+    one: CircleAnalysis
+    theta_deg: NDArray[np.float64]
+    deviation_um: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Least squares of all shapes, and of what stands beside them: centre, radius and form."""
+
+    shapes: tuple[Shape, ...]
+    value: NDArray[np.float64]
+    unit_covariance: NDArray[np.float64]
+    left_um: NDArray[np.float64]
+    basis: NDArray[np.float64]
+    spike_deg: float
+
+
+def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
+    """Fit the signatures to both directions of a circle, or to one.
+
+    Beside them are fitted centre and radius of each turn, and a form of 3 to 10 undulations that both have alike. What is then
+    left beyond noise counts like noise that is white up to 30 undulations per revolution and absent above: nothing is known
+    of it but its size. One direction does not tell squareness from servo mismatch: both are then missing.
+
+    Args:
+        turns: one or two, of opposite sense.
+
+    Returns:
+        None where a turn has too few samples.
+    """
+    if min(len(one.raw) for one in turns) < FEWEST:
+        return None
+    cut = [_turn(one) for one in turns]
+    fit = min((_fitted(cut, spike_deg) for spike_deg in SPIKES_DEG), key=lambda one: float(np.sum(one.left_um**2)))
+    waves = {axis: _cyclic(cut, fit, axis) for axis in ("X", "Y")}
+    strongest, other = sorted(waves, key=lambda axis: waves[axis].gained, reverse=True)
+    shown = [waves[strongest].columns] if waves[strongest].symptom.seen else []
+    if shown:
+        fit = _fitted(cut, fit.spike_deg, shown)
+        waves[other] = _cyclic(cut, fit, other)
+        if waves[other].symptom.seen:
+            fit = _fitted(cut, fit.spike_deg, [*shown, waves[other].columns])
+    sigma_um = _sigma_um(cut, fit)
+    return QuickLook(
+        symptoms=(*_symptoms(fit, sigma_um, both=len(turns) > 1), *(waves[axis].symptom for axis in sorted(waves))),
+        form_rms_um=_rms(np.concatenate([turn.deviation_um for turn in cut])),
+        left_rms_um=_rms(fit.left_um),
+        spike_deg=fit.spike_deg,
+        sigma_um=sigma_um,
+    )
+
+
+def _turn(one: CircleAnalysis) -> _Turn:
+    theta_deg, deviation = one.path.theta_deg, one.residual_um
+    if len(one.raw) > SECTORS:
+        sector = sector_of(one.raw, SECTORS)
+        phi_deg = means(one.raw.phi_deg, sector)
+        away_deg = np.mod(theta_deg - one.raw.theta_deg + 180.0, 360.0) - 180.0  # about the ball less commanded
+        theta_deg = np.mod(one.raw.circle.theta_deg(phi_deg) + means(away_deg, sector), 360.0)
+        deviation = means(deviation, sector)
+    inside = np.abs(np.mod(theta_deg + 45.0, 90.0) - 45.0) > AT_END_DEG
+    return _Turn(one, theta_deg[inside], deviation[inside])
+
+
+def _fitted(turns: Sequence[_Turn], spike_deg: float, waves: Sequence[NDArray[np.float64]] = ()) -> _Fit:
+    each = [shapes_of(turn.theta_deg, turn.one.raw.circle, spike_deg) for turn in turns]
+    shapes = [shape for shape in each[0] if len(turns) > 1 or shape.signature is not Signature.SERVO]
+    sizes = np.column_stack([np.concatenate([of[shape] for of in each]) for shape in shapes])
+    columns = np.hstack([sizes, *waves, _beside(turns)])
+    values = np.concatenate([turn.deviation_um for turn in turns])
+    basis, upper = np.linalg.qr(columns)
+    inverse = np.linalg.inv(upper)
+    found = inverse @ (basis.T @ values)
+    kept = len(shapes)
+    return _Fit(
+        shapes=tuple(shapes),
+        value=found[:kept],
+        unit_covariance=(inverse @ inverse.T)[:kept, :kept],
+        left_um=values - columns @ found,
+        basis=basis,
+        spike_deg=spike_deg,
+    )
+
+
+def _beside(turns: Sequence[_Turn]) -> NDArray[np.float64]:
+    """Radius and centre of each turn, and a form that all have alike."""
+    waves = [basis(np.radians(turn.theta_deg), FREE) for turn in turns]
+    circle = [0, 1, FREE + 1]
+    form = [k for k in range(2 * FREE + 1) if k not in {*circle, 2, FREE + 2}]
+    return np.hstack([block_diag(*(wave[:, circle] for wave in waves)), np.vstack([wave[:, form] for wave in waves])])
+
+
+def _sigma_um(turns: Sequence[_Turn], fit: _Fit) -> float:
+    """Deviation of white noise, per sample, that the figures feel as they feel what is left."""
+    ends = np.cumsum([len(turn.theta_deg) for turn in turns])[:-1]
+    found = misfit(
+        np.split(fit.left_um, ends),
+        [np.radians(turn.theta_deg) for turn in turns],
+        range(len(turns)),
+        # Radius and centre of each turn are counted by the test itself.
+        freedom_used=float(fit.basis.shape[1] - 2 * len(turns)),
+    )
+    per_undulation = float(np.mean([len(turn.theta_deg) for turn in turns])) / (2.0 * LOW)
+    rounding = float(np.mean([turn.one.noise.resolution_um**2 / 12.0 for turn in turns]))
+    return float(np.sqrt(max(found.noise**2, rounding, LEAST_UM**2) + found.rms**2 * max(per_undulation, 1.0)))
+
+
+def _symptoms(fit: _Fit, sigma_um: float, *, both: bool) -> list[Symptom]:
+    u = sigma_um * np.sqrt(np.diag(fit.unit_covariance))
+    found = [
+        Symptom(shape.signature, shape.place, float(value), float(each), shape.unit, bool(abs(value) > SEEN * each))
+        for shape, value, each in zip(fit.shapes, fit.value, u, strict=True)
+    ]
+    if both:
+        return [_told(one, fit) for one in found]
+    untold = "one direction does not tell squareness from servo mismatch"
+    mixed = [
+        Symptom(signature, "", None, None, unit, seen=False, text=untold)
+        for signature, unit in ((Signature.SQUARENESS, "µm/m"), (Signature.SERVO, "ms"))
+    ]
+    return [*mixed, *(_told(one, fit) for one in found if one.signature is not Signature.SQUARENESS)]
+
+
+def _told(one: Symptom, fit: _Fit) -> Symptom:
+    return replace(one, text=f"over {fit.spike_deg:g}°") if one.signature is Signature.SPIKE else one
+
+
+@dataclass(frozen=True, eq=False)
+class _Wave:
+    symptom: Symptom
+    columns: NDArray[np.float64]
+    gained: float
+
+
+def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
+    """Search the period of a cyclic error of an axis, beside all other signatures."""
+    diameter_mm = 2.0 * turns[0].one.raw.circle.radius_mm
+    trials = []
+    for period_mm in diameter_mm / PERIODS:
+        waves = np.vstack(
+            [cyclic_shapes(turn.theta_deg, turn.one.raw.circle, axis, float(period_mm)) for turn in turns]
+        )
+        beside = waves - fit.basis @ (fit.basis.T @ waves)
+        size = np.linalg.solve(beside.T @ beside, beside.T @ fit.left_um)
+        trials.append((float(fit.left_um @ beside @ size), float(period_mm), size, waves, beside))
+    gained, period_mm, size, waves, beside = max(trials, key=lambda trial: trial[0])
+    sigma_um = _sigma_um(turns, replace(fit, left_um=fit.left_um - beside @ size))
+    covariance = sigma_um**2 * np.linalg.inv(beside.T @ beside)
+    amplitude = float(np.hypot(*size))
+    along = size / max(amplitude, np.finfo(float).tiny)
+    # Half of the squares gained is exponentially distributed in each trial [two degrees of freedom].
+    limit = 2.0 * float(np.log(2 * len(PERIODS) / CHANCE)) * sigma_um**2
+    symptom = Symptom(
+        Signature.CYCLIC,
+        axis,
+        amplitude,
+        float(np.sqrt(along @ covariance @ along)),
+        "µm",
+        seen=gained > limit,
+        text=f"every {period_mm:.1f} mm",
+    )
+    return _Wave(symptom, waves, gained)
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,102 @@
+"""What single faults of a machine with serial axes X and Y do to a circle: known shapes, each of unit size.
+
+Radial deviations outwards, over the angle θ from +X towards +Y of a circle of radius R. The sense of travel is d, +1 where
+the angle grows. With position errors e_x, e_y of the axes the deviation is e_x cos θ + e_y sin θ, to first order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.plan.circle import Circle
+
+
+class Signature(StrEnum):
+    """The classical signatures."""
+
+    SQUARENESS = "squareness"
+    SCALE = "scale mismatch"
+    SERVO = "servo mismatch"
+    BACKLASH = "backlash step"
+    SPIKE = "reversal spike"
+    CYCLIC = "cyclic error"
+
+
+ENDS = {"+X": 0.0, "+Y": 90.0, "-X": 180.0, "-Y": 270.0}
+"""Where an axis turns round [deg]."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One column of the fit.
+
+    Attributes:
+        signature: that it belongs to.
+        place: end or axis that it belongs to; empty where it belongs to both axes.
+        unit: of its size.
+    """
+
+    signature: Signature
+    place: str
+    unit: str
+
+
+def shapes_of(theta_deg: NDArray[np.float64], circle: Circle, spike_deg: float) -> dict[Shape, NDArray[np.float64]]:
+    """Return the deviations that unit sizes cause [µm], shape (n,) each.
+
+    - Squareness β, positive where the axes include more than 90 degrees: e_x = -β y, hence -β R/2 sin 2θ.
+    - Scale mismatch s, X less Y: e_x = s x / 2, e_y = -s y / 2, hence s R/2 cos 2θ.
+    - Servo mismatch τ, by which X lags behind more than Y: e_x = -τ dx/dt, hence d τ v/2 sin 2θ at the feed v.
+    - Backlash step b at an end: the path rises by b there, whatever the sense of travel. An axis with play b stands
+      b/2 behind its command, e_x = -b/2 sgn(dx/dt). Play may differ at both ends and changes evenly between them.
+    - Reversal spike h at an end: half a sine of the height h over the first degrees behind it, as the axis holds on.
+
+    Args:
+        theta_deg: angles, shape (n,) [deg].
+        circle: radius, feed and sense of travel.
+        spike_deg: length of a spike [deg].
+    """
+    theta, sign = np.radians(theta_deg), circle.direction.sign
+    radius_mm = circle.radius_mm
+    cosine, sine = np.cos(theta), np.sin(theta)
+    feed_um_ms = circle.feed_mm_min / 60.0
+    found = {
+        Shape(Signature.SQUARENESS, "", "µm/m"): -5e-4 * radius_mm * np.sin(2.0 * theta),
+        Shape(Signature.SCALE, "", "µm/m"): 5e-4 * radius_mm * np.cos(2.0 * theta),
+        Shape(Signature.SERVO, "", "ms"): 0.5 * sign * feed_um_ms * np.sin(2.0 * theta),
+    }
+    along = {"X": (cosine, -sign * sine), "Y": (sine, sign * cosine)}
+    for end in ENDS:
+        at, speed = along[end[1]]
+        share = 0.5 * (1.0 + at) if end[0] == "+" else 0.5 * (1.0 - at)
+        found[Shape(Signature.BACKLASH, end, "µm")] = -0.5 * np.sign(speed) * at * share
+    for end, end_deg in ENDS.items():
+        behind = np.mod(sign * (theta_deg - end_deg), 360.0)
+        found[Shape(Signature.SPIKE, end, "µm")] = np.where(
+            behind < spike_deg, np.sin(np.pi * np.minimum(behind / spike_deg, 1.0)), 0.0
+        )
+    return found
+
+
+def cyclic_shapes(theta_deg: NDArray[np.float64], circle: Circle, axis: str, period_mm: float) -> NDArray[np.float64]:
+    """Return sine and cosine of an error of unit amplitude that comes back with an axis' position, shape (n, 2) [µm].
+
+    Positions count from the centre of the circle.
+
+    Args:
+        theta_deg: angles, shape (n,) [deg].
+        circle: radius.
+        axis: `X` or `Y`.
+        period_mm: way of the axis after which the error comes back [mm].
+    """
+    theta = np.radians(theta_deg)
+    along = np.cos(theta) if axis == "X" else np.sin(theta)
+    phase = 2.0 * np.pi * circle.radius_mm / period_mm * along
+    return np.column_stack([along * np.sin(phase), along * np.cos(phase)])

@@ -1,0 +1,57 @@
+"""Coefficients and low-pass of whole periods against sums and least squares written out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dbbstation.inference.harmonics import WORST_CONDITION, basis, coefficients, smooth
+
+
+def written_out(phase, highest):
+    """Constant, cosines and sines of mean square one, each computed by itself."""
+    waves = [np.ones(len(phase))]
+    waves += [np.sqrt(2.0) * np.cos(k * phase) for k in range(1, highest + 1)]
+    waves += [np.sqrt(2.0) * np.sin(k * phase) for k in range(1, highest + 1)]
+    return np.column_stack(waves)
+
+
+def about_even(count, seed):
+    rng = np.random.default_rng(seed)
+    return 2.0 * np.pi * (np.arange(count) + rng.uniform(0.0, 0.5, count)) / count, rng.normal(size=count)
+
+
+@pytest.mark.parametrize(("count", "highest"), [(75, 25), (720, 240), (5000, 240), (64, 1), (64, 16), (64, 15)])
+def test_coefficients_are_the_sums(count, highest):
+    phase, values = about_even(count, 1)
+    direct = written_out(phase, highest)
+    assert basis(phase, highest) == pytest.approx(direct, abs=1e-12)
+    assert coefficients(values, phase, highest) == pytest.approx(direct.T @ values / np.sqrt(count), abs=1e-11)
+
+
+def test_coefficients_of_several_at_once():
+    phase, values = about_even(500, 2)
+    three = np.column_stack([values, values**2, np.cos(values)])
+    together = coefficients(three, phase, 40)
+    assert together.shape == (81, 3)
+    for k in range(3):
+        assert together[:, k] == pytest.approx(coefficients(three[:, k], phase, 40), abs=1e-12)
+
+
+@pytest.mark.parametrize(("count", "highest"), [(75, 18), (720, 30), (5000, 30), (64, 1)])
+def test_low_pass_is_least_squares(count, highest):
+    phase, values = about_even(count, 3)
+    columns = written_out(phase, highest)
+    fitted, *_ = np.linalg.lstsq(columns, values, rcond=None)
+    assert smooth(values, phase, highest) == pytest.approx(columns @ fitted, abs=1e-10)
+
+
+@pytest.mark.parametrize(("share", "highest", "ill"), [(0.9, 5, False), (0.9, 12, False), (0.5, 5, True)])
+def test_low_pass_of_a_part_of_the_period_is_least_squares_too(share, highest, ill):
+    """Where the normal equations would lose too many digits the basis is made."""
+    phase, values = about_even(1000, 4)
+    kept = phase < 2.0 * np.pi * share
+    columns = written_out(phase[kept], highest)
+    assert (np.linalg.cond(columns.T @ columns) > WORST_CONDITION) == ill
+    fitted, *_ = np.linalg.lstsq(columns, values[kept], rcond=None)
+    assert smooth(values[kept], phase[kept], highest) == pytest.approx(columns @ fitted, abs=1e-8)

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 from dbbstation.cli.shop import from_settings
@@ -24,9 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from types import FrameType
 
-    from dbbstation.instrument.bytelog import ByteLog
-    from dbbstation.instrument.protocol import Protocol
-    from dbbstation.service.runner import Opener, OpenStation
+    from dbbstation.service.runner import Opener
     from dbbstation.station.assembly import Job
     from dbbstation.station.events import Observer
     from dbbstation.tui.app import StationApp
@@ -53,6 +51,7 @@ _DEMO_SEED = 3
 )
 @spy_option
 @loss_option
+@judging_model_options
 @session_options
 def station(
     *,
@@ -69,6 +68,8 @@ def station(
     time_scale: float,
     largest_loss_percent: float | None,
     largest_bar_age_h: float | None,
+    model_file: Path | None,
+    source_files: tuple[Path, ...],
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
@@ -89,9 +90,11 @@ def station(
         virtual=virtual, time_scale=time_scale, baud=baud, needed=(plan_file, machine_file, instrument, port, out)
     )
     _check_terminal()
+    from dbbstation.cli.measure_talk import Log
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.shipped import shipped_folder
+    from dbbstation.service.opening import opener
     from dbbstation.station.assembly import Job
 
     def demo(what: str) -> Path:
@@ -106,7 +109,15 @@ def station(
     details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
     with ExitStack() as stack:
-        job = Job(machine, plan, folder, details, rate_hz=protocol.fastest_hz(baud), range_mm=protocol.length.range_mm)
+        job = Job(
+            machine,
+            plan,
+            folder,
+            details,
+            rate_hz=protocol.fastest_hz(baud),
+            range_mm=protocol.length.range_mm,
+            model=judging_model(model_file, source_files),
+        )
         job.check(str(plan_file))
         if not virtual:
             require_bar(job, largest_bar_age_h)
@@ -114,7 +125,7 @@ def station(
         if virtual:
             from dataclasses import replace
 
-            from dbbstation.cli.station_virtual import virtual_place
+            from dbbstation.service.virtual_place import virtual_place
 
             click.echo("switching on the virtual machine …", err=True)
             place = stack.enter_context(
@@ -123,7 +134,9 @@ def station(
             job, port, helper = replace(job, clock=place.clock, time_scale=time_scale), place.port, place.helper
         say_sampling(plan.to_domain(), protocol, baud)
         log = stack.enter_context(spying(spy, protocol, str(port)))
-        return _run(job, opener(job, protocol, str(port), baud=baud, helper=helper, time_scale=time_scale, log=log))
+        observers: list[Observer] = [Log(), *([] if helper is None else [helper])]
+        opened = opener(job, protocol, str(port), baud=baud, observers=observers, time_scale=time_scale, log=log)
+        return _run(job, opened)
 
 
 def _check_options(
@@ -152,50 +165,6 @@ def _check_terminal() -> None:
     """
     if not (sys.stdin.isatty() and sys.stdout.isatty() and sys.stderr.isatty()):
         raise click.UsageError("the screen needs a terminal; `dbbstation measure` does the same without one")
-
-
-def opener(
-    job: Job,
-    protocol: Protocol,
-    port: str,
-    *,
-    baud: int | None = None,
-    helper: Observer | None = None,
-    time_scale: float = 1.0,
-    log: ByteLog | None = None,
-) -> Opener:
-    """Return what opens instrument and session, each time anew.
-
-    Args:
-        job: what is measured.
-        protocol: of the instrument.
-        port: where it is.
-        baud: where it is not set to the usual rate.
-        helper: told of everything after storage, before the screen.
-        time_scale: of the job's clock.
-        log: where every byte is written down.
-    """
-    from dbbstation.cli.measure_talk import Log
-    from dbbstation.instrument.driver import Instrument
-    from dbbstation.service.runner import OpenStation
-    from dbbstation.station.assembly import assemble
-
-    @contextmanager
-    def opened() -> Iterator[OpenStation]:
-        patience = driver_patience(time_scale)
-        with Instrument(
-            protocol, port, baud=baud, clock=job.clock, log=log, reconnect_s=RECONNECT_S, **patience
-        ) as source:
-            workplace = assemble(job, source, source.unreadable)
-            workplace.station.subscribe(Log())
-            if helper is not None:
-                workplace.station.subscribe(helper)
-            try:
-                yield OpenStation(workplace.station, workplace.schedule, str(job.folder), workplace.judge.known())
-            finally:
-                workplace.close()
-
-    return opened
 
 
 def _run(job: Job, open_station: Opener) -> int:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.recordings.entries import Program
     from dbbstation.files.recordings.session_writer import SessionWriter
+    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Direction
     from dbbstation.quality.finding import Finding
     from dbbstation.quality.knowledge import Seen
@@ -46,11 +47,18 @@ class RunJudge:
     Args:
         writer: of the session; its accepted and rejected runs are read and analysed now.
         programs: NC program by test and direction.
+        model: of the machine, which says where circles are expected; None: the nominal machine does.
     """
 
-    def __init__(self, writer: SessionWriter, programs: Mapping[tuple[str, Direction], Program] | None = None) -> None:
+    def __init__(
+        self,
+        writer: SessionWriter,
+        programs: Mapping[tuple[str, Direction], Program] | None = None,
+        model: IdentifiedModel | None = None,
+    ) -> None:
         self._writer = writer
         self._programs = programs or {}
+        self._model = model
         self._counting: dict[tuple[str, Direction, int], Seen] = {}
         self._waiting: dict[tuple[str, Direction, int], Seen] = {}
         self._rejected: dict[tuple[str, Direction, int], Seen] = {}
@@ -109,7 +117,7 @@ class RunJudge:
             program=self._programs.get((run.test, run.direction)),
             centre_mm=None,
         )
-        (one,) = runs_of(self._writer.session, [(entry, recording)])
+        (one,) = runs_of(self._writer.session, [(entry, recording)], self._model)
         self._waiting[_key(run)] = new = seen(one)
         others = [known for key, known in self._counting.items() if key != _key(run)]
         return SessionRuns([*others, new]).judge(new).findings
@@ -120,7 +128,7 @@ class RunJudge:
             recording = self._writer.session.load(entry).recording
         except InputError:
             return
-        (one,) = runs_of(self._writer.session, [(entry, recording)])
+        (one,) = runs_of(self._writer.session, [(entry, recording)], self._model)
         into[_key(entry)] = seen(one)
 
 

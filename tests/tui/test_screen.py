@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 import pytest
 from textual.events import Key
 
-from dbbstation.cli.station import opener
-from dbbstation.cli.station_virtual import VirtualPlace, virtual_place
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import InlinePlan, read_inline_plan
@@ -20,7 +18,9 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
+from dbbstation.service.opening import opener
 from dbbstation.service.runner import Runner
+from dbbstation.service.virtual_place import VirtualPlace, virtual_place
 from dbbstation.station.assembly import Job
 from dbbstation.station.events import Event, FeedInSeen, Observer
 from dbbstation.station.states import State
@@ -88,7 +88,7 @@ class Bench:
         helper: Observer | None = None,
     ) -> None:
         """Open a screen and play on it; the screen is closed whatever happens."""
-        runner = Runner(opener(self.job, ENCODER, self.place.port, helper=helper or self.place.helper))
+        runner = Runner(opener(self.job, ENCODER, self.place.port, observers=[helper or self.place.helper]))
         app = StationApp(
             Shown(self.job.plan.plan.name, self.job.plan.jig.bores, tests=self.job.plan.to_domain().tests), runner
         )

@@ -11,7 +11,7 @@ from textual.screen import ModalScreen
 
 from dbbstation.service.board import Board
 from dbbstation.station.commands import Command, Quit
-from dbbstation.station.states import FINAL, RECORDING, State
+from dbbstation.station.states import FINAL, RECORDING, VERDICT
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
 from dbbstation.tui.help_screen import HelpScreen
 from dbbstation.tui.large_screen import LargeScreen
@@ -37,9 +37,6 @@ LOOK_S = 0.1
 
 _TALL_ROWS = 32
 """From so many rows on there is room for more than the necessary."""
-
-_VERDICT = {State.COMPLETE, State.FLAWED}
-"""States that ask for a verdict: the bell rings when one begins."""
 
 DARK, LIGHT = "textual-dark", "textual-light"
 
@@ -118,7 +115,7 @@ class StationApp(App[None]):
         alive = self._runner.alive  # asked before its mail is taken: what it sends last is then shown
         for event in self._runner.mail():
             self.board.take(event)
-        if self.board.state in _VERDICT and before not in _VERDICT:
+        if self.board.state in VERDICT and before not in VERDICT:
             self.bell()
         self._drop_stale_question()
         self.draw()

@@ -49,10 +49,16 @@ HELP = {
                 "On the right: the live reading, the set-up with a map of the plate, the figures of the last two runs, all runs of "
                 "the plan with a sign and a word each. At the bottom: progress, messages, keys."
             ),
+            (
+                "While a run waits for its verdict, its findings stand on the right: number, limit, and good, cannot tell or wrong. "
+                "What is wrong comes first."
+            ),
         ),
         {
             **_RUN_KEYS,
-            "v": "The circle as measured, or complete circles about their own centre on a scale of their own.",
+            "v": (
+                "As measured; complete circles about their own centre on a scale of their own; the form counter-clockwise less that clockwise."
+            ),
         },
     ),
     "large": Help(
@@ -74,7 +80,8 @@ HELP = {
                 "direction and, where there is room, the greatest circularity. The list has the same signs with a word."
             ),
             (
-                "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict."
+                "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict with its "
+                "reason, findings that are wrong with number and limit. E shows the runs before it, rejected ones too."
             ),
             "The time left is that of the circles at their planned feeds. Putting up balls comes on top.",
         ),
@@ -84,6 +91,7 @@ HELP = {
             "left": "The first direction of the test.",
             "right": "The second direction of the test.",
             "enter": "The chosen test and direction is measured next; the plan goes on from there.",
+            "e": "An earlier run of the test and direction; behind the first comes the last again.",
             "x": "The accepted run does not count any more; the station asks for the reason.",
             "a": "The rejected run counts again.",
             "o": "Back.",
@@ -155,9 +163,11 @@ TIME_LEFT = (
 )
 NOTHING_LEFT = "All {count} runs of the plan are accepted."
 NOT_NOW = "While the station is {state}, tests are looked at here; going to another and other verdicts have to wait."
-NO_RUN = "{test} {direction}: no run with a circle yet."
-LAST_RUN = "{run}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularity {circularity:.1f} µm; {verdict}."
+NO_RUN = "{test} {direction}: no run yet."
+RUN_FIGURES = "{run}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularity {circularity:.1f} µm."
+NO_CIRCLE = "{run}: no circle; {problem}"
 NO_VERDICT = "waits for its verdict"
 NO_BORE = "in no bore"
 BORE = "bore {number}"
 CHOOSE = "Arrow keys choose test and direction."
+CHOOSE_RUN = "Run {place} of {count} of this test and direction: E shows an earlier one. Arrow keys choose another."

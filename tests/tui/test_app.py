@@ -10,12 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dbbstation.plan.circle import Direction
-from dbbstation.station.commands import Accept, GoTo, Judge, Quit, Skip
+from dbbstation.station.commands import Accept, GoTo, Judge, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
+from dbbstation.tui.overview_panels import ChosenRun
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.reason_question import ReasonQuestion
 from dbbstation.tui.texts import HELP
+from dbbstation.tui.trace_view import TraceView
 from tests.tui.happenings import Happening, make_plan
 
 if TYPE_CHECKING:
@@ -214,6 +216,54 @@ def test_a_reason_is_typed_and_an_empty_one_is_none() -> None:
     (judged,) = played(happening, play).sent
     assert isinstance(judged, Judge)
     assert (judged.reason, judged.accepted) == ("a chip", False)
+
+
+def twice() -> Happening:
+    """The same run rejected, measured again and accepted."""
+    happening = Happening().circle("t0", Direction.CCW).command(Repeat("the bar slipped"))
+    return happening.circle("t0", Direction.CCW).command(Accept())
+
+
+def test_a_rejected_run_before_the_last_is_seen_and_counts_again() -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("o", "left")
+        chosen = app.screen.query_one(ChosenRun)
+        assert str(chosen.text(app.board)).startswith("t0-ccw-2: centre")
+        await pilot.press("a")  # it counts already
+        await pilot.press("e")
+        figures, verdict, which = str(chosen.text(app.board)).splitlines()
+        assert figures.startswith("t0-ccw-1: centre X +10.8 Y +16.8")  # 20 µm towards 1 rad
+        assert verdict == "rejected: the bar slipped"
+        assert which.startswith("Run 1 of 2")
+        await pilot.press("x")  # it does not count already
+        assert isinstance(app.screen, OverviewScreen)
+        await pilot.press("a", "e", "x", "1")
+
+    again, taken_back = played(twice(), play).sent
+    assert again == Judge("t0", Direction.CCW, 1, accepted=True, reason="")
+    assert (taken_back.repeat, taken_back.accepted) == (2, False)
+
+
+def test_views_are_those_there_is_something_for() -> None:
+    async def views(pilot: Pilot[None], app: StationApp) -> list[str]:
+        seen = []
+        for _ in range(4):
+            seen.append(app.screen.query_one(TraceView)._caption().split(" · ")[0])
+            await pilot.press("v")
+        return seen
+
+    async def running(pilot: Pilot[None], app: StationApp) -> None:
+        assert await views(pilot, app) == ["t0 ccw"] * 4
+
+    async def one(pilot: Pilot[None], app: StationApp) -> None:
+        assert await views(pilot, app) == ["t0 ccw", "t0 ccw centred"] * 2
+
+    async def both(pilot: Pilot[None], app: StationApp) -> None:
+        assert await views(pilot, app) == ["t0 ccw+cw", "t0 ccw+cw centred", "t0 ccw − cw centred", "t0 ccw+cw"]
+
+    played(turning(), running)
+    played(complete(), one)
+    played(complete().command(Accept()).circle("t0", Direction.CW), both)
 
 
 KEYS = (

@@ -338,6 +338,7 @@ def test_a_question_goes_with_the_circle_that_it_is_about(short_plan: InlinePlan
         await press(app, "q")
         await until(pilot, lambda: board.state in {State.COMPLETE, State.FLAWED})
         await until(pilot, lambda: len(app.screen_stack) == 1)
+        await until(pilot, lambda: board.state is State.FLAWED or len(board.views) > 1)
         await press(app, "v")
         if board.state is State.COMPLETE:
             await until(pilot, lambda: "centred" in app.query_one(TraceView)._caption())

@@ -8,24 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
+from dbbstation.cli.filter_option import filter_of, filter_option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 
-FILTERS = {"none": 0, "15": 15, "50": 50, "150": 150}
-
-
 @click.command()
 @click.argument("sessions", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SESSION...")
-@click.option(
-    "--filter",
-    "cut_off",
-    type=click.Choice(list(FILTERS)),
-    default="none",
-    show_default=True,
-    help="Gaussian filter of G, F and H: its cut-off in undulations per revolution.",
-)
+@filter_option
 @click.option("--findings", is_flag=True, help="Judge every run too: number, limit, verdict.")
 @click.option(
     "--model", type=click.Path(path_type=Path), help="Expect circles where this model has them; with --findings."
@@ -62,7 +53,6 @@ def circles(
       dbbstation circles session --test a --budget --json
     """
     from dbbstation.circled import circled_summary, load_circles
-    from dbbstation.circles.path import Filter
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
@@ -75,11 +65,12 @@ def circles(
         raise click.UsageError("--model says where circles are expected: give --findings too")
     if out is not None:
         refuse_existing_table(out, force=force)
+    chosen = filter_of(cut_off)
     identified = None if model is None else read_model(model, every_source(()))
     with count_bar("circles") as progress:
         found = load_circles(
             sessions,
-            Filter(FILTERS[cut_off]),
+            chosen,
             tests,
             exclude,
             findings=findings,
@@ -88,7 +79,7 @@ def circles(
         )
     for warning in found.warnings:
         say(f"note: {warning}")
-    summary = circled_summary(found, Filter(FILTERS[cut_off]))
+    summary = circled_summary(found, chosen)
     if out is not None:
         names, rows = _flat(summary["runs"])
         write_table(out, table_csv(names, list(zip(*rows, strict=True))), provenance(), force=force)

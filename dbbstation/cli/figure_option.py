@@ -16,10 +16,13 @@ if TYPE_CHECKING:
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
-def figure_option(what: str = "Write a figure here") -> Callable[[_Function], _Function]:
-    """Give a command this option; it takes the path as `figure`, None where none is wanted."""
+def figure_option(
+    what: str = "Write a figure here", name: str = "--figure", *, required: bool = False
+) -> Callable[[_Function], _Function]:
+    """Give a command this option; it takes the path under the option's name, None where none is wanted."""
     return click.option(
-        "--figure",
+        name,
+        required=required,
         type=click.Path(path_type=Path, dir_okay=False),
         callback=_known_format,
         help=f"{what}, as SVG, PNG or PDF by the ending of its name.",

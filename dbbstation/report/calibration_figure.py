@@ -13,7 +13,7 @@ from dbbstation.calibration.checks.visibility import visibility
 from dbbstation.calibration.reporting.on_the_plate import ball_shifts, circle_tests
 from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.plan.circle import Direction
-from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, draw_maps, in_style
+from dbbstation.report.drawing import AFTER, BEFORE, ROW_IN, SET, draw_maps, in_style
 from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
 
 if TYPE_CHECKING:
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 WIDTH_IN = 11.0
 COLUMNS = 5
 """Circles side by side."""
-
-HEIGHTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""Colours of the levels of balls [Okabe and Ito]."""
 
 LONGEST_MM = 60.0
 """The longest arrow on the plate [mm of the plate]."""
@@ -132,7 +129,7 @@ def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> Non
     scale: Any = {"angles": "xy", "scale_units": "xy", "scale": per_mm}
     levels = sorted({round(float(z)) for z in where[:, 2]})
     for test, ball, arrow in zip(tests, where, shift, strict=True):
-        colour = HEIGHTS[levels.index(round(float(ball[2]))) % len(HEIGHTS)]
+        colour = SET[levels.index(round(float(ball[2]))) % len(SET)]
         axes.plot(*ball[:2], "o", color="#999999", markersize=4.0, zorder=1)
         axes.quiver(*ball[:2], *arrow, color=colour, angles="xy", scale_units="xy", scale=per_mm, width=0.006, zorder=2)
         tip = ball[:2] + arrow / per_mm + 7.0 * arrow / max(float(np.hypot(*arrow)), 1e-12)
@@ -148,7 +145,7 @@ def _centres(axes: Axes, tests: Sequence[CircleTest], k: int, title: str) -> Non
     start = np.array([middle[0] - half + 8.0, middle[1] - half + 10.0])
     axes.quiver(*start, key, 0.0, color="black", width=0.006, **scale)
     axes.text(start[0], start[1] + 5.0, f"{key:g} µm", fontsize=8, va="bottom")
-    for colour, z in zip(HEIGHTS, levels, strict=False):
+    for colour, z in zip(SET, levels, strict=False):
         axes.plot([], [], color=colour, linewidth=2.0, label=f"Z {z:g} mm")
     axes.legend(loc="upper center", handlelength=1.0, borderpad=0.1, ncols=3, columnspacing=1.0)
 
@@ -162,11 +159,11 @@ def _balls(axes: Axes, balls: Sequence[BallShift]) -> None:
         return
     sizes = sorted({round(ball.stated_um, 2) for ball in balls})
     for ball in balls:
-        colour = HEIGHTS[sizes.index(round(ball.stated_um, 2)) % len(HEIGHTS)]
+        colour = SET[sizes.index(round(ball.stated_um, 2)) % len(SET)]
         (x, y), (dx, dy) = ball.shift_um, 2.0 * ball.sigma_um
         axes.errorbar(x, y, dy, dx, color=colour, marker="o", markersize=3.0, linewidth=0.0, elinewidth=0.5)
         axes.annotate(" ".join(ball.tests), (x, y), (3, 3), textcoords="offset points", fontsize=8, color=colour)
-    for colour, size in zip(HEIGHTS, sizes, strict=False):
+    for colour, size in zip(SET, sizes, strict=False):
         axes.add_patch(Ring((0.0, 0.0), 2.0 * size, fill=False, color=colour, linewidth=0.9))
         axes.plot([], [], color=colour, linewidth=0.9, label=f"2 × {size:g} µm stated")
     reach = 1.1 * max(2.0 * sizes[-1], *(float(np.max(np.abs(b.shift_um) + 2.0 * b.sigma_um)) for b in balls))

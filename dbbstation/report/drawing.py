@@ -36,6 +36,9 @@ STYLE: Any = {
 MEASURED, BEFORE, AFTER = "#555555", "#d55e00", "#0072b2"
 """Colours that the colour-blind tell apart [Okabe and Ito, Color Universal Design, 2008], and that differ in grey."""
 
+SET = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Further colours of the same set, for heights of balls, or sessions."""
+
 DIVERGING = "RdBu_r"
 """Red and blue about white, told apart by all but the totally colour-blind [Brewer, ColorBrewer]."""
 

@@ -1,4 +1,4 @@
-"""A report as one HTML file: everything that is not markup is escaped by the template engine."""
+"""Pages as one HTML file: everything that is not markup is escaped by the template engine."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import jinja2
 
+from dbbstation.history.words import DASH, rounded
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-DASH = "–"
-"""Stands where there is no number."""
 
 
 def report_html(content: Mapping[str, Any]) -> bytes:
@@ -19,7 +18,12 @@ def report_html(content: Mapping[str, Any]) -> bytes:
     Args:
         content: what `content_of` returns.
     """
-    environment = jinja2.Environment(
+    return environment().get_template("report.html").render(content).encode()
+
+
+def environment() -> jinja2.Environment:
+    """Return the template engine of every page: what a text holds is escaped, a name that is not given is an error."""
+    made = jinja2.Environment(
         loader=jinja2.PackageLoader("dbbstation.report"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
@@ -27,8 +31,9 @@ def report_html(content: Mapping[str, Any]) -> bytes:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["um"] = _um
-    return environment.get_template("report.html").render(content).encode()
+    made.filters["um"] = _um
+    made.filters["figure"] = rounded
+    return made
 
 
 def _um(value: float | None, decimals: int = 1) -> str:

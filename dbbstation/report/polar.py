@@ -99,7 +99,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
         now: its runs with figures, in the order in which they were measured; at least one.
         before: the same, measured before.
     """
-    drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in _chosen(runs)]
+    drawn = [(one, former, thin) for former, runs in ((True, before), (False, now)) for one, thin in chosen(runs)]
     analysed = [(one, one.analysis, former, thin) for one, former, thin in drawn if one.analysis is not None]
     most_um = max(float(np.abs(analysis.residual_um).max()) for _, analysis, _, _ in analysed)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
@@ -133,24 +133,42 @@ def step_of(most_um: float) -> float:
     return float(max(step for step in _STEPS if step * power <= most_um * (1.0 + 1e-9)) * power)
 
 
-def _chosen(runs: Sequence[MeasuredCircle]) -> list[tuple[MeasuredCircle, bool]]:
-    """Return the runs that are drawn, the last of each direction full, those before it thin."""
-    chosen: list[tuple[MeasuredCircle, bool]] = []
+def chosen(runs: Sequence[MeasuredCircle], most: int = MOST_DRAWN) -> list[tuple[MeasuredCircle, bool]]:
+    """Return the runs that are drawn, each with whether it is thin: the last of a direction is not, those before it are.
+
+    Args:
+        runs: of one test, in the order in which they were measured.
+        most: of one direction.
+    """
+    drawn: list[tuple[MeasuredCircle, bool]] = []
     for direction in dict.fromkeys(one.entry.direction for one in runs):
-        of = [one for one in runs if one.entry.direction is direction][-MOST_DRAWN:]
-        chosen += [(one, one is not of[-1]) for one in of]
-    return chosen
+        of = [one for one in runs if one.entry.direction is direction][-most:]
+        drawn += [(one, one is not of[-1]) for one in of]
+    return drawn
 
 
 def _points(theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64], scale: float) -> str:
     """Return the closed path of a turn; Y is up in the machine and down in SVG."""
-    order = np.argsort(theta_deg, kind="stable")
-    theta, deviation = np.radians(theta_deg[order]), deviation_um[order]
-    kept = np.arange(len(theta)) if len(theta) <= 2 * BINS else _extremes(theta, deviation)
-    radius = CIRCLE + scale * deviation[kept]
+    angle_deg, deviation = thinned(theta_deg, deviation_um)
+    theta, radius = np.radians(angle_deg), CIRCLE + scale * deviation
     middle = SIZE / 2
-    x, y = middle + radius * np.cos(theta[kept]), middle - radius * np.sin(theta[kept])
+    x, y = middle + radius * np.cos(theta), middle - radius * np.sin(theta)
     return " ".join(f"{one:.1f},{other:.1f}" for one, other in zip(x, y, strict=True))
+
+
+def thinned(
+    theta_deg: NDArray[np.float64], deviation_um: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what an eye can see of a turn, in the order of its angles: greatest and least deviation of each stretch.
+
+    Args:
+        theta_deg: shape (n,) [deg].
+        deviation_um: shape (n,) [µm].
+    """
+    order = np.argsort(theta_deg, kind="stable")
+    theta, deviation = theta_deg[order], deviation_um[order]
+    kept = np.arange(len(theta)) if len(theta) <= 2 * BINS else _extremes(np.radians(theta), deviation)
+    return theta[kept], deviation[kept]
 
 
 def _extremes(theta: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.intp]:

@@ -95,7 +95,8 @@ class StationApp(App[None]):
         ("o", "overview", "Tests"),
         ("f", "large", "Large"),
         ("c", "connect", "Connect again"),
-        ("e", "results", "Results"),
+        # The sentence at the end of the plan names it; until then the footer has no room.
+        Binding("e", "results", "Results", show=False),
         Binding("d", "brightness", "Dark/light", show=False),
         ("f1,question_mark", "explain", "Help"),
         ("q", "leave", "Quit"),

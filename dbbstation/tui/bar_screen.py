@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.service.front import Front
     from dbbstation.service.memory import Line
 
-_NAME = 26
+_NAME = 30
 
 
 class BarScreen(RowScreen):
@@ -92,6 +92,8 @@ class BarScreen(RowScreen):
     def look(self) -> None:
         """Show the live reading, and how the calibration stands."""
         calibration = self._calibration
+        if not self.stands:
+            return
         if calibration is None:
             self.say(self._problem, wrong=True)
             return

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, ClassVar
 
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer
 
@@ -45,7 +44,7 @@ class MeasureScreen(RunScreen):
 
     help_name = "measure"
 
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("v", "view", "View", show=False)]
+    BINDINGS: ClassVar[list[BindingType]] = [("v", "view", "View")]
 
     DEFAULT_CSS = """
     MeasureScreen {

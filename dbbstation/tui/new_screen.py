@@ -259,6 +259,8 @@ class NewScreen(RowScreen):
         return f"{value.name}  ({value.parent})" if isinstance(value, Path) else str(value)
 
     def _prepared(self, prepared: Prepared) -> None:
+        if not self.is_current:  # somebody went back meanwhile
+            return
         self._show()
         self.app.push_screen(PrepareScreen(self._reception, self._front, self.choice, prepared))
 

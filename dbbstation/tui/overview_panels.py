@@ -80,7 +80,7 @@ class LeftLine(Panel):
 
 
 class PlateMap(Panel):
-    """Bores where they are, under each its tests with a sign per direction."""
+    """Bores where they are, under each its tests with a sign per direction and, where there is room, the greatest circularity."""
 
     DEFAULT_CSS = "PlateMap { height: 1fr; padding: 0 1; }"
 
@@ -97,10 +97,12 @@ class PlateMap(Panel):
         ys = sorted({y for _, y in bores.values()}, reverse=True)
         width = max(self.content_size.width // max(len(xs), 1), _CELL)
         gap = max((self.content_size.height - _rows_needed(self._show)) // max(len(ys), 1), 0)
+        # Rows stand no further apart than columns: a cell of the terminal is about twice as high as wide.
+        gap = min(gap, width // 2 - 1)
         rows: list[Content] = []
         for y in ys:
             in_row = {x: number for number, (x, at) in bores.items() if at == y}
-            cells = [self._bore(in_row.get(x), signs, width) for x in xs]
+            cells = [self._bore(in_row.get(x), board, signs, width) for x in xs]
             deepest = max(len(cell) for cell in cells)
             empty = Content(" " * width)
             rows += [Content("").join([cell[k] if k < len(cell) else empty for cell in cells]) for k in range(deepest)]
@@ -108,26 +110,32 @@ class PlateMap(Panel):
         elsewhere = [name for name, test in self._show.tests.items() if test.ball.bore not in bores]
         if elsewhere:
             rows.append(Content.styled(texts.NO_BORE, "dim"))
-            rows += [self._test(name, signs, width) for name in elsewhere]
+            rows += [self._test(name, board, signs, width) for name in elsewhere]
         return lines(*rows)
 
-    def _bore(self, number: int | None, signs: dict[str, list[Mark]], width: int) -> list[Content]:
+    def _bore(self, number: int | None, board: Board, signs: dict[str, list[Mark]], width: int) -> list[Content]:
         if number is None:
             return []
         mine = [name for name, test in self._show.tests.items() if test.ball.bore == number]
         title = texts.BORE.format(number=number)
         return [
             Content.styled(f"{title:{width}}", "bold" if mine else "dim"),
-            *(self._test(name, signs, width) for name in mine),
+            *(self._test(name, board, signs, width) for name in mine),
         ]
 
-    def _test(self, name: str, signs: dict[str, list[Mark]], width: int) -> Content:
+    def _test(self, name: str, board: Board, signs: dict[str, list[Mark]], width: int) -> Content:
         chosen = name == self._choice.test
         room = _CELL - 7
         parts = [
             Content.styled(f"{'▸' if chosen else ' '}{_cut(name, room):{room}} ", "reverse bold" if chosen else "")
         ]
         parts += [Content.styled(*SIGNS[mark]) for mark in signs.get(name, [])]
+        figures = [
+            board.latest[name, way].figures for way in self._show.tests[name].directions if (name, way) in board.latest
+        ]
+        known = [one.circularity_um for one in figures if one is not None]
+        if known and width >= _CELL + _FIGURE:
+            parts.append(Content(f"{max(known):6.1f} µm"[: _FIGURE + 1]))
         text = Content("").join(parts)
         return text + Content(" " * max(width - len(text.plain), 0))
 

@@ -53,7 +53,7 @@ class OverviewScreen(BoardScreen):
     DEFAULT_CSS = """
     OverviewScreen {
         #plate-and-tests { height: 1fr; }
-        #plate { width: 45%; min-width: 38; }
+        #plate { width: 55%; min-width: 38; }
         #tests { width: 1fr; min-width: 40; }
     }
     """

@@ -116,6 +116,8 @@ class ResultsScreen(RowScreen):
 
     def _draw(self) -> None:
         after = self._after
+        if not self.stands:
+            return
         self.put([_row(step, after.results[step]) for step in STEPS])
         self.about(self._found(STEPS[self.at]))
         if after.busy is not None:

@@ -42,13 +42,22 @@ class RowScreen(ExplainedScreen):
 
     def say(self, text: str, *, wrong: bool = False) -> None:
         """Show a sentence at the top."""
+        if not self.stands:
+            return
         now = self.query_one("#row-now", Static)
         now.update(Content(text))
         now.set_class(wrong, "-wrong")
 
     def about(self, text: Content) -> None:
         """Show a text below the rows."""
+        if not self.stands:
+            return
         self.query_one("#row-text", Static).update(text)
+
+    @property
+    def stands(self) -> bool:
+        """Whether its parts are there: what was begun in the background may end before, or after it was left."""
+        return bool(self.query("#row-text"))
 
     @property
     def at(self) -> int:
@@ -57,6 +66,8 @@ class RowScreen(ExplainedScreen):
 
     def put(self, rows: Sequence[Content]) -> None:
         """Show rows; the chosen place stays chosen."""
+        if not self.stands:
+            return
         options = self.query_one("#rows", OptionList)
         if len(rows) == options.option_count:
             for place, row in enumerate(rows):

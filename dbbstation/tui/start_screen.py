@@ -12,8 +12,6 @@ from dbbstation.tui.new_screen import NewScreen
 from dbbstation.tui.row_screen import RowScreen
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from textual.binding import BindingType
     from textual.widgets import OptionList
 
@@ -21,7 +19,7 @@ if TYPE_CHECKING:
     from dbbstation.service.session_list import SessionLine
     from dbbstation.tui.reception import Reception
 
-_NAME, _PLAN, _RUNS = 22, 24, 15
+_NAME = 22
 
 
 class StartScreen(RowScreen):
@@ -119,26 +117,18 @@ class StartScreen(RowScreen):
             self.about(Content(f"{line.folder}\n{line.problem}"))
         else:
             by = self._front.goes_on_with(line.folder).line
-            told = {
-                "folder": _shown(line.folder),
-                "machine": line.machine,
-                "instrument": by.instrument,
-                "port": by.port,
-            }
-            text = texts.START_WHERE.format(**told) if by.instrument and by.port else ""
-            self.about(Content(text or f"{_shown(line.folder)}\n{texts.START_NO_LINE}"))
+            what = texts.START_WHAT.format(folder=line.folder, plan=line.plan, machine=line.machine)
+            known = by.instrument and by.port
+            how = texts.START_BY.format(instrument=by.instrument, port=by.port) if known else texts.START_NO_LINE
+            self.about(Content(f"{what}\n{how}"))
         self.refresh_bindings()
 
     def _failed(self, error: Exception) -> None:
         self.say(str(error), wrong=True)
 
 
-def _shown(folder: Path) -> str:
-    return str(folder)
-
-
 def _row(line: SessionLine) -> Content:
-    when = f"{line.changed.astimezone():%Y-%m-%d %H:%M}"
+    when = f"{line.changed.astimezone():%m-%d %H:%M}"
     name = f"{_cut(line.folder.name, _NAME):{_NAME}}"
     if line.problem:
         return Content.assemble((f"! {name} ", "$text-error"), f"{_cut(line.problem, 52)}")
@@ -149,7 +139,7 @@ def _row(line: SessionLine) -> Content:
         state += texts.START_LEFT.format(time=duration(line.left_s)) if line.left_s else ""
     state += texts.START_UNJUDGED.format(count=line.unjudged) if line.unjudged else ""
     sign = "✓" if line.complete else "▶"
-    return Content.assemble(f"{sign} {name} {when}  ", (state, "bold"), f"  {line.plan}")
+    return Content.assemble(f"{sign} {name} {when}  ", (state, "bold"))
 
 
 def _cut(text: str, width: int) -> str:

@@ -74,7 +74,7 @@ HELP = {
         (
             (
                 "The map shows the plate from above, X to the right and Y up. Under each bore stand its tests with a sign for each "
-                "direction. The list has the same signs with a word."
+                "direction and, where there is room, the greatest circularity. The list has the same signs with a word."
             ),
             (
                 "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict."
@@ -276,7 +276,8 @@ START_COMPLETE = "complete"
 START_RUNS = "{accepted} of {planned} runs"
 START_LEFT = ", {time} left"
 START_UNJUDGED = ", {count} to judge"
-START_WHERE = "{folder}\nmachine {machine}, by {instrument} at {port}"
+START_WHAT = "{folder}\nplan {plan}, machine {machine}"
+START_BY = "by {instrument} at {port}"
 START_NO_LINE = "no instrument yet: I chooses one"
 QUIT_OPENS = "The virtual machine is being switched on; a moment."
 

@@ -1,0 +1,56 @@
+"""Undulations of one circle: amplitude by number per revolution, beside what noise alone would show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.harmonics import SAMPLES_PER_HARMONIC, coefficients
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.circles.analysis import CircleAnalysis
+
+HIGHEST = 60
+"""Undulations per revolution up to which amplitudes are given: twice as many as a machine's form usually reaches."""
+
+
+@dataclass(frozen=True, eq=False)
+class FormSpectrum:
+    """Amplitudes of the deviations from the least-squares circle, not filtered.
+
+    Attributes:
+        undulations: per revolution, 2 and up, shape (h,).
+        amplitude_um: of each, half of peak to valley, shape (h,) [µm].
+        noise_um: root-mean-square amplitude that the circle's noise alone has at each; NaN where it is not known [µm].
+    """
+
+    undulations: NDArray[np.int64]
+    amplitude_um: NDArray[np.float64]
+    noise_um: float
+
+
+def spectrum_of(one: CircleAnalysis) -> FormSpectrum:
+    """Return the undulations of a circle.
+
+    White noise of standard deviation s has two orthonormal coefficients of that size per undulation: an amplitude of
+    2 s / sqrt(n), root mean square.
+
+    Args:
+        one: the circle; of few samples fewer undulations are told apart, of six or less none.
+    """
+    count = len(one.raw)
+    highest = min(HIGHEST, count // SAMPLES_PER_HARMONIC)
+    if highest < FIRST:
+        return FormSpectrum(np.arange(0), np.zeros(0), float("nan"))
+    found = coefficients(one.residual_um, np.radians(one.raw.theta_deg), highest)
+    amplitude = np.sqrt(2.0 / count) * np.hypot(found[1 : highest + 1], found[highest + 1 :])
+    noise_um = 2.0 * one.noise.slow_um / float(np.sqrt(count))
+    return FormSpectrum(np.arange(FIRST, highest + 1), amplitude[FIRST - 1 :], noise_um)
+
+
+FIRST = 2
+"""The first undulation that is form: one per revolution is the centre."""

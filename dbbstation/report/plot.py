@@ -1,0 +1,314 @@
+"""One figure of measured circles alone, with a title block: what `plot` writes."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.circles.budget import Quantity, budgets
+from dbbstation.errors import StationError
+from dbbstation.report.conditions import conditions
+from dbbstation.report.drawing import AFTER, BEFORE, in_style
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
+from dbbstation.report.label_places import Box
+from dbbstation.report.plot_map import draw_map
+from dbbstation.report.plot_panels import CAPTION_IN, draw_deviation, draw_polar, draw_spectrum, draw_together
+from dbbstation.report.polar import chosen
+from dbbstation.report.sheet import MARGIN_IN, Cell, Key, Sheet
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from matplotlib.figure import Figure
+
+    from dbbstation.circled import Circled, MeasuredCircle
+    from dbbstation.circles.path import Filter
+    from dbbstation.report.plot_panels import Drawn
+
+MOST_DRAWN = 20
+"""Repeats of one direction that are drawn: more cover one another even as thin lines. The others are counted on the sheet."""
+
+NARROW_IN, WIDE_IN = 7.5, 11.0
+"""Width of a sheet with one panel, and with several: those fit A4 upright and across [inch]."""
+
+_GAP_IN = 0.2
+
+
+class Kind(StrEnum):
+    """What a figure shows."""
+
+    POLAR = "polar"
+    DEVIATION = "deviation"
+    SPECTRUM = "spectrum"
+    MAP = "map"
+    COMPARE = "compare"
+
+
+TITLES = {
+    Kind.POLAR: "Deviation from the least-squares circle, polar",
+    Kind.DEVIATION: "Deviation from the least-squares circle over the angle",
+    Kind.SPECTRUM: "Undulations of the circles: amplitude by number per revolution",
+    Kind.MAP: "Centres of the circles where their balls stand, seen from above",
+    Kind.COMPARE: "The same tests in several sessions, to one scale each",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Runs that are drawn in one picture: both directions of one test in one session.
+
+    Attributes:
+        session: its name.
+        test: its name.
+        drawn: runs in drawing order, each with whether it is thin.
+        not_drawn: repeats that are left out.
+    """
+
+    session: str
+    test: str
+    drawn: tuple[Drawn, ...]
+    not_drawn: int
+
+
+@dataclass(frozen=True, eq=False)
+class Plotted:
+    """What goes onto a sheet.
+
+    Attributes:
+        kind: what is shown of the circles.
+        found: the circles, of one or more sessions.
+        chosen: filter of their figures.
+        program: name and version of the program that draws.
+    """
+
+    kind: Kind
+    found: Circled
+    chosen: Filter
+    program: str
+
+    def panels(self) -> list[Panel]:
+        """Return what is drawn, session by session.
+
+        Raises:
+            StationError: no run shows a circle; sessions are to be compared and only one has circles.
+        """
+        shown = [one for one in self.found.circles if one.analysis is not None]
+        if not shown:
+            why = "; ".join(f"{one.entry.label}: {one.problem}" for one in self.found.circles)
+            raise StationError(f"no run shows a circle: {why}", remedy="record the test again, or choose another")
+        several = {one.session for one in shown}
+        if self.kind is Kind.COMPARE and len(several) == 1:
+            raise StationError(
+                f"only one session is there to compare, {several.pop()}", remedy="name two sessions or more"
+            )
+        return [
+            self._panel(session, test, [one for one in shown if (one.session, one.entry.test) == (session, test)])
+            for session, test in dict.fromkeys((one.session, one.entry.test) for one in shown)
+        ]
+
+    def _panel(self, session: str, test: str, runs: Sequence[MeasuredCircle]) -> Panel:
+        drawn = chosen(runs, MOST_DRAWN)
+        return Panel(session, test, tuple(drawn), len(runs) - len(drawn))
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what the figure shows as plain numbers: what its command prints as JSON."""
+        panels = self.panels()
+        return {
+            "kind": str(self.kind),
+            "filter": self.chosen.words,
+            "drawn": [_numbers_of(one) for panel in panels for one, _ in panel.drawn],
+            "not_drawn": sum(panel.not_drawn for panel in panels),
+            "one_direction_only": [
+                f"{panel.session}: {panel.test}" for panel in panels if len(_directions(panel.drawn)) == 1
+            ],
+        }
+
+
+def plot_figure(plotted: Plotted, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+    """Return a sheet as a file's bytes, the same for the same circles.
+
+    Raises:
+        StationError: no run shows a circle; sessions are to be compared and only one has circles.
+    """
+    with in_style(), warnings.catch_warnings():
+        # A name in letters that no font here has becomes boxes in PNG and PDF; in SVG the viewer's fonts have them.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        return in_format(draw_plot(plotted), wanted)
+
+
+def draw_plot(plotted: Plotted) -> Figure:
+    """Draw a sheet.
+
+    Raises:
+        StationError: no run shows a circle; sessions are to be compared and only one has circles.
+    """
+    panels = plotted.panels()
+    match plotted.kind:
+        case Kind.POLAR:
+            return _grid(plotted, panels, draw_polar, most_columns=4, height_over_width=1.0)
+        case Kind.DEVIATION:
+            return _grid(plotted, panels, draw_deviation, most_columns=2, height_over_width=0.5)
+        case Kind.SPECTRUM:
+            return _grid(plotted, panels, draw_spectrum, most_columns=2, height_over_width=0.55)
+        case Kind.MAP:
+            return _map(plotted)
+        case Kind.COMPARE:
+            return _compare(plotted, panels)
+
+
+def _grid(
+    plotted: Plotted,
+    panels: Sequence[Panel],
+    draw: Callable[[Sheet, Box, str, Sequence[Drawn]], None],
+    most_columns: int,
+    height_over_width: float,
+) -> Figure:
+    """Panels side by side, row by row."""
+    columns = min(most_columns, len(panels))
+    rows = -(-len(panels) // columns)
+    width_in = NARROW_IN if len(panels) == 1 else WIDE_IN
+    each = (width_in - 2.0 * MARGIN_IN - (columns - 1) * _GAP_IN) / columns
+    height = height_over_width * each + CAPTION_IN
+    sheet = _sheet(plotted, width_in, rows * height + (rows - 1) * _GAP_IN, panels)
+    for k, panel in enumerate(panels):
+        row, column = divmod(k, columns)
+        left = MARGIN_IN + column * (each + _GAP_IN)
+        bottom = sheet.top_in - (row + 1) * height - row * _GAP_IN
+        draw(sheet, Box(left, bottom, each, height), _name(plotted, panel), panel.drawn)
+    return sheet.figure
+
+
+def _compare(plotted: Plotted, panels: Sequence[Panel]) -> Figure:
+    """Row by row a test: polar traces of each session to one scale, and below them the last runs of all over the angle."""
+    tests = {panel.test: [other for other in panels if other.test == panel.test] for panel in panels}
+    columns = max(len(of) for of in tests.values())
+    width_in = NARROW_IN if columns <= 2 else WIDE_IN  # noqa: PLR2004 - two stand side by side upright
+    inner = width_in - 2.0 * MARGIN_IN
+    each = (inner - (columns - 1) * _GAP_IN) / columns
+    heights = (each + CAPTION_IN, 2.2)
+    room = len(tests) * (sum(heights) + 2.0 * _GAP_IN)
+    sheet = _sheet(plotted, width_in, room, panels)
+    top = sheet.top_in
+    for test, of in tests.items():
+        reach_um = max(_reach_um(panel.drawn) for panel in of)
+        for column, panel in enumerate(of):
+            left = MARGIN_IN + column * (each + _GAP_IN)
+            box = Box(left, top - heights[0], each, heights[0])
+            draw_polar(sheet, box, f"{panel.session}: test {test}", panel.drawn, reach_um)
+        below = Box(MARGIN_IN, top - heights[0] - _GAP_IN - heights[1], inner, heights[1])
+        last = {panel.session: [one for one, thin in panel.drawn if not thin] for panel in of}
+        draw_together(sheet, below, f"test {test}, last run of each direction", last)
+        top -= sum(heights) + 2.0 * _GAP_IN
+    return sheet.figure
+
+
+def _map(plotted: Plotted) -> Figure:
+    shown = [one for one in plotted.found.circles if one.analysis is not None]
+    sessions = [s for s in plotted.found.sessions if any(one.session == s.name for one in shown)]
+    columns = min(2, len(sessions))
+    rows = -(-len(sessions) // columns)
+    width_in = NARROW_IN if columns == 1 else WIDE_IN
+    each = (width_in - 2.0 * MARGIN_IN - (columns - 1) * _GAP_IN) / columns
+    sheet = _sheet(plotted, width_in, rows * (each + _GAP_IN), [])
+    for k, session in enumerate(sessions):
+        row, column = divmod(k, columns)
+        box = Box(MARGIN_IN + column * (each + _GAP_IN), sheet.top_in - (row + 1) * each - row * _GAP_IN, each, each)
+        name = f"{session.name}, plan {session.plan.name}" if columns > 1 else ""
+        draw_map(sheet, box, name, session.plan.tests, [one for one in shown if one.session == session.name])
+    return sheet.figure
+
+
+def _sheet(plotted: Plotted, width_in: float, room_in: float, panels: Sequence[Panel]) -> Sheet:
+    tests = list(dict.fromkeys(one.entry.test for one in plotted.found.circles))
+    title = f"{TITLES[plotted.kind]}: test{'s' if len(tests) > 1 else ''} {', '.join(tests)}"
+    return Sheet(width_in, room_in, title, _keys(plotted, panels), _title_block(plotted, panels))
+
+
+def _keys(plotted: Plotted, panels: Sequence[Panel]) -> list[Key]:
+    """Legend: the directions that are drawn, and repeats where there are any."""
+    if plotted.kind is Kind.MAP:
+        return [
+            Key("ball", {"color": "#555555", "marker": "o", "markersize": 4.0, "linewidth": 0.0}),
+            Key("from the ball to the mean centre of the test's circles, enlarged", {"color": AFTER, "linewidth": 1.4}),
+        ]
+    present = dict.fromkeys(str(one.entry.direction) for panel in panels for one, _ in panel.drawn)
+    words = {"ccw": "counter-clockwise (CCW)", "cw": "clockwise (CW)"}
+    styles: dict[str, dict[str, Any]] = {
+        "ccw": {"color": AFTER, "linewidth": 1.2},
+        "cw": {"color": BEFORE, "linewidth": 1.2, "linestyle": "--"},
+    }
+    keys = [Key(words[name], styles[name]) for name in words if name in present]
+    if any(thin for panel in panels for _, thin in panel.drawn):
+        keys.append(Key("thin: earlier repeats", {"color": "#555555", "linewidth": 0.4}))
+    return keys
+
+
+def _title_block(plotted: Plotted, panels: Sequence[Panel]) -> list[list[Cell]]:
+    """Rows of the title block: one for each session, and one for what was drawn."""
+    rows = []
+    for session in plotted.found.sessions:
+        of = [one for one in plotted.found.circles if one.session == session.name]
+        if not of:
+            continue
+        said = dict(conditions(session, of, ""))
+        rows += [
+            [
+                Cell("machine", said["machine"], 1.5),
+                Cell("serial number", said["serial number"]),
+                Cell("operator", said["operator"], 1.5),
+                Cell("plan", said["plan"], 1.5),
+            ],
+            [Cell("session", session.name), Cell("measured", said["measured"], 1.6), Cell("bar", _bar(said), 2.4)],
+        ]
+    left_out = sum(panel.not_drawn for panel in panels)
+    notes = [f"{left_out} earlier repeats are not drawn"] if left_out else []
+    notes += [
+        f"test {panel.test}: {_directions(panel.drawn)[0].upper()} only"
+        for panel in panels
+        if len(_directions(panel.drawn)) == 1
+    ]
+    notes += [f"{one.entry.label} shows no circle" for one in plotted.found.circles if one.problem]
+    rows.append(
+        [
+            Cell("filter of G", plotted.chosen.words, 1.0),
+            Cell("notes", "; ".join(notes) or "none", 3.5),
+            Cell("program", plotted.program, 1.2),
+        ]
+    )
+    return rows
+
+
+def _bar(said: dict[str, str]) -> str:
+    if "bar calibrated" not in said:
+        return said["bar"]
+    return f"{said['bar']}, {said['bar calibrated']}"
+
+
+def _name(plotted: Plotted, panel: Panel) -> str:
+    return f"{panel.session}: test {panel.test}" if len(plotted.found.sessions) > 1 else f"test {panel.test}"
+
+
+def _directions(drawn: Sequence[Drawn]) -> list[str]:
+    return list(dict.fromkeys(str(one.entry.direction) for one, _ in drawn))
+
+
+def _reach_um(drawn: Sequence[Drawn]) -> float:
+    return max(float(abs(one.analysis.residual_um).max()) for one, _ in drawn if one.analysis is not None)
+
+
+def _numbers_of(one: MeasuredCircle) -> dict[str, Any]:
+    """Figures of a run that stand on the sheet."""
+    if one.analysis is None:
+        return {}
+    x, y = one.analysis.centre_mm
+    return {
+        "session": one.session,
+        "test": one.entry.test,
+        "direction": str(one.entry.direction),
+        "repeat": one.entry.repeat,
+        "g_um": one.analysis.g_um,
+        "u_g_um": budgets(one.analysis, one.known)[Quantity.G].u_um,
+        "centre_um": {"x": 1e3 * x, "y": 1e3 * y},
+    }

@@ -1,0 +1,199 @@
+"""Panels of a sheet: both directions of one test, polar, over the angle, and as undulations."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from matplotlib.patches import Circle as Ring
+
+from dbbstation.circles.spectrum import FIRST, spectrum_of
+from dbbstation.plan.circle import FULL_TURN_DEG, Direction
+from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
+from dbbstation.report.label_places import Box
+from dbbstation.report.polar import CIRCLE, REACH, SIZE, step_of, thinned
+from dbbstation.report.sheet import TEXT_PT, line_in, wrapped
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from matplotlib.axes import Axes
+
+    from dbbstation.circled import MeasuredCircle
+    from dbbstation.circles.analysis import CircleAnalysis
+    from dbbstation.report.sheet import Sheet
+
+Drawn: TypeAlias = "tuple[MeasuredCircle, bool]"
+"""A run, and whether it is drawn thin."""
+
+SMALL_PT = 7.0
+
+CAPTION_IN = line_in(TEXT_PT) + line_in(SMALL_PT)
+"""Height of a panel's two lines [inch]."""
+
+_SIDE_IN, _FOOT_IN = 0.55, 0.42
+"""Room for the numbers of the axes, at the left and below [inch]."""
+
+
+def draw_polar(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn], reach_um: float | None = None) -> None:
+    """Draw traces about their least-squares circles; rings are one division apart.
+
+    Args:
+        sheet: to draw on.
+        box: to draw in.
+        name: of the panel.
+        drawn: runs with figures.
+        reach_um: deviation that reaches as far as a trace may; None for the greatest of these [µm].
+    """
+    found = [(one.analysis, thin) for one, thin in drawn if one.analysis is not None]
+    most_um = reach_um or max(float(np.abs(analysis.residual_um).max()) for analysis, _ in found)
+    scale, step_um = REACH / max(most_um, 1e-3), step_of(most_um)
+    lines = [name, f"G {_figures(drawn)} µm; one division {step_um:g} µm"]
+    top = _caption(sheet, box, lines)
+    side = min(box.width, top - box.bottom)
+    axes = sheet.axes(Box(box.left + 0.5 * (box.width - side), top - side, side, side))
+    axes.set_axis_off()
+    half = SIZE / 2.0
+    axes.set_xlim(-half, half)
+    axes.set_ylim(-half, half)
+    for ends in (((-half + 14, half - 14), (0, 0)), ((0, 0), (-half + 14, half - 14))):
+        axes.plot(*ends, color="#c4c4c4", linewidth=0.5)
+    for um in (-step_um, 0.0, step_um):
+        style: Any = {"color": "#c4c4c4", "linewidth": 0.5} if um else {"color": "#555555", "linewidth": 0.7}
+        axes.add_patch(Ring((0.0, 0.0), CIRCLE + scale * um, fill=False, **style))
+    for analysis, thin in found:
+        theta_deg, deviation = thinned(analysis.path.theta_deg, analysis.residual_um)
+        theta, radius = (
+            np.radians(np.append(theta_deg, theta_deg[0])),
+            CIRCLE + scale * np.append(deviation, deviation[0]),
+        )
+        axes.plot(radius * np.cos(theta), radius * np.sin(theta), **_style(analysis, thin=thin))
+    units_per_in = SIZE / side
+    _written(axes, half - 14, 0.07 * units_per_in, "X", ha="right")
+    _written(axes, 0.1 * units_per_in, half - 14 - 0.05 * units_per_in, "Y", ha="left")
+    for um in (-step_um, 0.0, step_um):
+        label = f"{um:+g}" if um else "0"
+        # Below the path, to the right of the axis: the letters of the axes stand elsewhere.
+        _written(axes, 0.05 * units_per_in, -CIRCLE - scale * um, label, ha="left")
+
+
+def draw_deviation(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> None:
+    """Draw traces over the angle from +X towards +Y."""
+    axes = _chart(sheet, box, [name, f"G {_figures(drawn)} µm"], "deviation, µm")
+    for one, thin in drawn:
+        if one.analysis is not None:
+            axes.plot(
+                *thinned(one.analysis.path.theta_deg, one.analysis.residual_um), **_style(one.analysis, thin=thin)
+            )
+    _turn(axes)
+
+
+def draw_together(sheet: Sheet, box: Box, name: str, runs: Mapping[str, Sequence[MeasuredCircle]]) -> None:
+    """Draw the runs of several sessions over the angle, a colour for each session.
+
+    Args:
+        sheet: to draw on.
+        box: to draw in.
+        name: of the panel.
+        runs: by session.
+    """
+    axes = _chart(sheet, box, [name], "deviation, µm")
+    for colour, (session, of) in zip(_colours(len(runs)), runs.items(), strict=True):
+        for k, one in enumerate(of):
+            if one.analysis is None:
+                continue
+            style = _style(one.analysis, thin=False) | {"color": colour}
+            line = thinned(one.analysis.path.theta_deg, one.analysis.residual_um)
+            axes.plot(*line, **style, label=session if k == 0 else None)
+    _turn(axes)
+    # Above the lines, which get room for it.
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.22 * (high - low))
+    legend = axes.legend(loc="upper right", ncols=min(len(runs), 4), borderpad=0.1, handlelength=1.5)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+        text.set_text(wrapped(text.get_text(), TEXT_PT, 1.6, 1)[0])
+
+
+def draw_spectrum(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> None:
+    """Draw amplitudes by undulations per revolution, and what noise alone would show."""
+    spectra = [(one.analysis, spectrum_of(one.analysis), thin) for one, thin in drawn if one.analysis is not None]
+    noise = [each.noise_um for _, each, _ in spectra if np.isfinite(each.noise_um)]
+    noise_um = float(np.sqrt(np.mean(np.square(noise)))) if noise else float("nan")
+    told = f"noise alone {noise_um:.2g} µm, dotted" if noise else "noise not known: too few samples"
+    axes = _chart(sheet, box, [name, told], "amplitude, µm")
+    least = 1e-4  # a tenth of what bars resolve; zero has no place on this scale
+    for analysis, each, thin in spectra:
+        style = _style(analysis, thin=thin) | {"marker": "." if not thin else "", "markersize": 3.0}
+        axes.plot(each.undulations, np.maximum(each.amplitude_um, least), **style)
+    if noise:
+        axes.axhline(max(noise_um, least), color="#555555", linewidth=0.9, linestyle=":")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    highest = max((int(each.undulations[-1]) for _, each, _ in spectra if len(each.undulations)), default=FIRST)
+    axes.set_xlim(FIRST / 1.1, 1.1 * max(highest, FIRST + 1))
+    ticks = [k for k in (2, 3, 4, 6, 10, 20, 30, 60) if k <= max(highest, FIRST + 1)]
+    axes.set_xticks(ticks, [str(k) for k in ticks])
+    axes.set_xticks([], minor=True)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_yticks([], minor=True)
+    axes.set_xlabel("undulations per revolution", fontsize=SMALL_PT, labelpad=1.0)
+
+
+def _chart(sheet: Sheet, box: Box, lines: Sequence[str], unit: str) -> Axes:
+    """Axes with a caption above and room for numbers."""
+    top = _caption(sheet, box, lines)
+    axes = sheet.axes(
+        Box(box.left + _SIDE_IN, box.bottom + _FOOT_IN, box.width - _SIDE_IN - 0.12, top - box.bottom - _FOOT_IN - 0.05)
+    )
+    axes.tick_params(labelsize=SMALL_PT)
+    axes.set_ylabel(unit, fontsize=SMALL_PT, labelpad=1.0)
+    axes.grid(color="#e0e0e0", linewidth=0.5)
+    axes.set_axisbelow(True)
+    return axes
+
+
+def _turn(axes: Axes) -> None:
+    axes.set_xlim(0.0, FULL_TURN_DEG)
+    axes.set_xticks(QUARTERS)
+    axes.set_xlabel("angle from +X to +Y, °", fontsize=SMALL_PT, labelpad=1.0)
+
+
+def _caption(sheet: Sheet, box: Box, lines: Sequence[str]) -> float:
+    """Write lines at the top of a box; return where they end [inch]."""
+    y = box.bottom + box.height
+    for k, line in enumerate(lines):
+        size = SMALL_PT if k else TEXT_PT
+        (text,) = wrapped(line, size, box.width, 1)
+        sheet.text(box.left, y, text, size)
+        y -= line_in(size)
+    return y
+
+
+def _figures(drawn: Sequence[Drawn]) -> str:
+    """G of the last run of each direction, in words."""
+    last = [one for one, thin in drawn if not thin and one.analysis is not None]
+    return ", ".join(f"{one.analysis.g_um:.1f} {str(one.entry.direction).upper()}" for one in last if one.analysis)
+
+
+def _style(analysis: CircleAnalysis, *, thin: bool) -> dict[str, Any]:
+    ccw = analysis.raw.circle.direction is Direction.CCW
+    return {
+        "color": AFTER if ccw else BEFORE,
+        "linestyle": "-" if ccw else "--",
+        "linewidth": 0.35 if thin else 1.0,
+        "alpha": 0.7 if thin else 1.0,
+        "solid_joinstyle": "round",
+    }
+
+
+def _colours(count: int) -> list[str]:
+    """As many colours as are needed, none of a direction's; of more than there are some come again."""
+    free = [colour for colour in SET if colour not in {AFTER, BEFORE}]
+    return [free[k % len(free)] for k in range(count)]
+
+
+def _written(axes: Axes, x: float, y: float, text: str, ha: str) -> None:
+    """A small text that stays readable over lines."""
+    box: Any = {"facecolor": "white", "edgecolor": "none", "pad": 0.4, "alpha": 0.75}
+    axes.text(x, y, text, fontsize=6.0, ha=ha, va="center", bbox=box, parse_math=False)

@@ -429,3 +429,7 @@ REPORT_VERDICT: Mapping[str, str] = {
     "cannot tell": "CANNOT TELL: a limit lies within the uncertainty.",
     "none": "NO VERDICT: the shop's settings have no tolerances.",
 }
+
+SEATED = "seated"
+NOT_SEATED_SHORT = "{mm:.1f} mm short of feed-in"
+NOT_SEATED_LONG = "{mm:.1f} mm beyond feed-in"

@@ -15,6 +15,7 @@ from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.instrument.library import load_instrument, with_zero
 from dbbstation.plan.duration import circles_s
 from dbbstation.service.memory import Line
+from dbbstation.service.order import Order, ordered
 from dbbstation.station.assembly import Job
 from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
 from dbbstation.station.programs import load_programs
@@ -46,6 +47,8 @@ class Part(StrEnum):
     OPERATOR = "operator"
     SERIAL_NUMBER = "serial number"
     TEMPERATURE = "temperature"
+    ORDER = "order"
+    GATE = "drift gate"
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,8 @@ class Choice:
         operator: name.
         serial_number: of the machine.
         ambient_temp_c: temperature of the shop before [degC]; None: not read.
+        order: of the tests; a session that exists keeps its own.
+        gate: whether the first test is repeated at the end.
     """
 
     folder: Path | None = None
@@ -90,6 +95,8 @@ class Choice:
     operator: str = ""
     serial_number: str = ""
     ambient_temp_c: float | None = None
+    order: Order = Order.PLAN
+    gate: bool = False
 
     @property
     def goes_on(self) -> bool:
@@ -117,12 +124,14 @@ class Prepared:
         job: ready to be opened.
         protocol: of the instrument.
         line: instrument and port.
-        circles_s: time that all circles of the plan take at their planned feeds [s].
+        runs: of the whole plan.
+        circles_s: time that their circles take at their planned feeds [s].
     """
 
     job: Job
     protocol: Protocol
     line: Line
+    runs: int
     circles_s: float
 
 
@@ -164,7 +173,7 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
         check_bar_known(bar, domain, datetime.now(UTC), limits.largest_bar_age_h)
     every = [test.run(direction) for test in domain.tests.values() for direction in test.directions]
     again = [domain.tests[name].run(way) for name in domain.repeat_at_end for way in domain.tests[name].directions]
-    return Prepared(job, protocol, choice.line, circles_s([*every, *again]))
+    return Prepared(job, protocol, choice.line, len(every) + len(again), circles_s([*every, *again]))
 
 
 def _protocol(choice: Choice) -> Protocol:
@@ -187,7 +196,8 @@ def _read(choice: Choice, limits: Limits) -> tuple[Machine, InlinePlan, Path, di
         return machine, plan, session.plan_path, programs
     if choice.machine is None or choice.plan is None:
         raise ValueError("machine or plan is missing")
-    machine, plan = read_machine(choice.machine), read_inline_plan(choice.plan)
+    machine = read_machine(choice.machine)
+    plan = ordered(read_inline_plan(choice.plan), choice.order, gate=choice.gate)
     stated = plan.plan.largest_loss_percent is not None
     if limits.largest_loss_percent is not None and (limits.loss_over_plan or not stated):
         plan = replace(plan, plan=plan.plan.model_copy(update={"largest_loss_percent": limits.largest_loss_percent}))

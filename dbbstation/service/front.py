@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
-from dbbstation.instrument.library import known_instruments, load_instrument, with_zero
+from dbbstation.files.recordings.session import read_session
+from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
 from dbbstation.service.after import JOINT, KINEMATIC, After
+from dbbstation.service.bar_calibration import BarCalibration, Stated
 from dbbstation.service.candidates import Kind, candidates
 from dbbstation.service.choice import Choice, Limits, Part, Prepared, prepare
 from dbbstation.service.memory import VIRTUAL, Line, Memory
@@ -17,9 +21,10 @@ from dbbstation.service.port_probe import Answer, ports, probe
 from dbbstation.service.runner import Runner
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.virtual_place import virtual_place
+from dbbstation.service.work import Progress, Work
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.model.identified import IdentifiedModel
@@ -56,7 +61,7 @@ class Front:
         limits: of the shop.
         observers: told of everything that happens in a sequence.
         model: that circles are judged by; None: the nominal machine.
-        given: what the command line or the shop's settings say of instrument and port; holds over what is remembered.
+        given: what the command line or the shop's settings say; holds over what is remembered.
         settings: file of the shop's settings where one was named.
     """
 
@@ -65,7 +70,7 @@ class Front:
     limits: Limits = field(default_factory=Limits)
     observers: Sequence[Observer] = ()
     model: IdentifiedModel | None = None
-    given: Line = field(default_factory=Line)
+    given: Choice = field(default_factory=Choice)
     settings: Path | None = None
     _open: ExitStack = field(default_factory=ExitStack)
 
@@ -77,7 +82,13 @@ class Front:
         """Return what was chosen last, for a new session: files that are gone are left out."""
         last = self.memory.read()
         line = self._with_given(last.line)
-        choice = Choice(line=line, operator=last.operator, serial_number=last.serial_number)
+        given = self.given
+        choice = replace(
+            given,
+            line=line,
+            operator=given.operator or last.operator,
+            serial_number=given.serial_number or last.serial_number,
+        )
         if last.machine is not None and last.machine.is_file():
             choice = replace(choice, machine=last.machine)
         if last.plan is not None and last.plan.is_file():
@@ -97,17 +108,16 @@ class Front:
 
     def new_folder(self, name: str = "session") -> Path:
         """Return a folder for a new session that is not there yet."""
-        numbered = (self.under / (name if k == 1 else f"{name}-{k}") for k in range(1, 10_000))
-        return next(path for path in numbered if not path.exists())
+        return _not_there(self.under, name)
 
     def files(self, part: Part) -> tuple[Path, ...]:
         """Return the files that can be chosen for a part."""
         kinds = {Part.MACHINE: Kind.MACHINE, Part.PLAN: Kind.PLAN, Part.BAR: Kind.BAR}
         return candidates(kinds[part], self.under)
 
-    def instruments(self) -> list[str]:
-        """Return the names of the instruments that are known."""
-        return known_instruments()
+    def instruments(self) -> list[tuple[str, str]]:
+        """Return name and profile of the instruments that are known, the usual profile of each first."""
+        return [(name, one.profile) for name in known_instruments() for one in load_variants(name)]
 
     def ports(self) -> list[tuple[str, str]]:
         """Return name and description of what can be chosen as port: those of the computer, and virtual machines."""
@@ -132,6 +142,70 @@ class Front:
     def prepare(self, choice: Choice) -> Prepared:
         """Read and check what was chosen; raises as `choice.prepare`."""
         return prepare(choice, self.limits, self.model)
+
+    def write_programs(self, choice: Choice) -> tuple[int, str]:
+        """Write nominal NC programs of all circles into a new folder beside the session; return how many, and where.
+
+        Raises:
+            StationError: what the command says.
+            ValueError: plan or machine is missing.
+        """
+        plan, machine = choice.plan, choice.machine
+        if choice.folder is not None and choice.goes_on:
+            session = read_session(choice.folder)
+            plan, machine = session.plan_path, session.machine_path
+        if plan is None or machine is None or choice.folder is None:
+            raise ValueError("plan, machine or folder is missing")
+        folder = _not_there(choice.folder.parent, f"{choice.folder.name}-programs")
+        names = ["--plan", str(plan.absolute()), "--machine", str(machine.absolute()), "--out", str(folder.absolute())]
+        work = Work(["program", *names], self.under)
+        try:
+            if work.wait() is not Progress.DONE:
+                raise StationError(work.failure())
+            return len(work.answer()["programs"]), str(folder)
+        finally:
+            work.close()
+
+    def bar_calibration(self, line: Line, values: Mapping[str, str]) -> BarCalibration:
+        """Begin to read the bar on its calibrator; close it whatever happens.
+
+        Args:
+            line: instrument and port.
+            values: what is stated, as `stated_bar` takes it; a relative instrument shows zero at the calibrator's length.
+
+        Raises:
+            StationError: no such instrument.
+            ValueError: a relative instrument, and the calibrator's length is no number.
+        """
+        protocol = load_instrument(line.instrument, line.profile or None)
+        zero_mm = line.zero_mm
+        if protocol.length.relative and zero_mm is None:
+            zero_mm = _number(values, "calibrator_mm")
+        protocol = with_zero(protocol, zero_mm if protocol.length.relative else None)
+        return BarCalibration(protocol, line.port, line.baud)
+
+    def stated_bar(self, values: Mapping[str, str]) -> Stated:
+        """Return what is stated of bar and calibrator.
+
+        Args:
+            values: texts by the names of `Stated`.
+
+        Raises:
+            ValueError: one that should be a number is none.
+        """
+        numbers = {name: _number(values, name) for name in ("calibrator_mm", "calibrator_u_um", "temp_c")}
+        return Stated(values["serial_number"], values["calibrator"], certified=values["certified"], **numbers)
+
+    def off_calibrator_um(self, length_mm: float, values: Mapping[str, str]) -> float | None:
+        """Return how much longer a reading is than the calibrator [µm]; None where its length is not stated yet."""
+        try:
+            return 1e3 * (length_mm - _number(values, "calibrator_mm"))
+        except ValueError:
+            return None
+
+    def new_bar_file(self) -> Path:
+        """Return a file for a calibration of the bar that is not there yet."""
+        return _not_there(self.under, f"bar-{datetime.now().astimezone():%Y-%m-%d}", ".yaml")
 
     def open(self, choice: Choice, prepared: Prepared) -> Opened:
         """Switch on what is virtual, remember the choice, and return what runs the sequence.
@@ -179,7 +253,7 @@ class Front:
         return max(found)[2] if found else None
 
     def _with_given(self, line: Line) -> Line:
-        given = {key: value for key, value in self.given.model_dump().items() if value not in {"", None}}
+        given = {key: value for key, value in self.given.line.model_dump().items() if value not in {"", None}}
         if "instrument" in given and given["instrument"] != line.instrument:
             line = line.model_copy(update={"profile": "", "zero_mm": None})
         return line.model_copy(update=given)
@@ -196,3 +270,20 @@ class Front:
             serial_number=choice.serial_number or last.serial_number,
         )
         self.memory.write(kept.with_session(choice.folder, choice.line))
+
+
+def _not_there(folder: Path, name: str, suffix: str = "") -> Path:
+    """Return a path of that name that does not exist, with a number where it has to."""
+    numbered = (folder / f"{name if k == 1 else f'{name}-{k}'}{suffix}" for k in range(1, 10_000))
+    return next(path for path in numbered if not path.exists())
+
+
+def _number(values: Mapping[str, str], name: str) -> float:
+    text = values.get(name, "").replace(",", ".")
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{name}: `{text}` is no number")
+    return number

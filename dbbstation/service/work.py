@@ -88,6 +88,11 @@ class Work:
         """Time since it began, until it ended [s]."""
         return (self._ended_s or time.monotonic()) - self._begun_s
 
+    def wait(self) -> Progress:
+        """Wait for its end; return how it ended."""
+        self._process.wait()
+        return self.progress
+
     def answer(self) -> dict[str, Any]:
         """Return what the command printed, once it is done."""
         self._answer.seek(0)

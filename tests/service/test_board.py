@@ -94,7 +94,7 @@ def test_marks_follow_the_verdicts() -> None:
     assert board.accepted == 1
     assert now(board) == (
         "The plan is through, 1 of 6 runs accepted; without an accepted run: t0 cw, t1 ccw, t1 cw, t2 ccw, t2 cw. "
-        "Q leaves."
+        "E works on the results, Q leaves."
     )
 
 

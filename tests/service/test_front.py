@@ -102,7 +102,7 @@ def test_choices_are_remembered(front: Front, session: Path, tmp_path: Path) -> 
     assert again.missing() == ()
     assert again.line == REAL
     # A port that the shop's settings name holds over the one of last time.
-    told = replace(front, given=Line(port="COM3"))
+    told = replace(front, given=Choice(line=Line(port="COM3")))
     assert told.goes_on_with(session).line == REAL.model_copy(update={"port": "COM3"})
     for number in range(2 * MOST):
         remembered = remembered.with_session(tmp_path / str(number), REAL)

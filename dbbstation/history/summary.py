@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from dbbstation.quality.conformity import Size, conformity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from dbbstation.history.record import SessionFigures
     from dbbstation.history.trend import Asked, MachineHistory, Trend
@@ -131,7 +134,7 @@ def _trend(trend: Trend, sessions: Sequence[SessionFigures], coverage_factor: fl
         "sessions_lacking": None if watched is None else watched.lacking,
         "watched_sessions": 0 if watched is None else watched.watched,
         "events": [] if watched is None else [_event(event, trend, sessions) for event in watched.events],
-        "values": [_value(trend, k, sessions) for k in range(len(trend.at))],
+        "values": _values(trend, sessions),
     }
 
 
@@ -145,18 +148,29 @@ def _event(event: Event, trend: Trend, sessions: Sequence[SessionFigures]) -> di
     }
 
 
-def _value(trend: Trend, k: int, sessions: Sequence[SessionFigures]) -> dict[str, Any]:
-    session, watched = sessions[trend.at[k]], trend.watched
-    return {
-        "session": session.name,
-        "started": _date(session),
-        "value": float(trend.values[k]),
-        "u": _number(trend.u[k]),
-        "level": None if watched is None else _number(watched.level[k]),
-        "z": None if watched is None else _number(watched.z[k]),
-        "cusum_high": None if watched is None else _number(watched.high[k]),
-        "cusum_low": None if watched is None else _number(watched.low[k]),
-    }
+def _values(trend: Trend, sessions: Sequence[SessionFigures]) -> list[dict[str, Any]]:
+    """Return every value of a trend with what the chart made of it."""
+    at, watched = trend.at.tolist(), trend.watched
+    columns: dict[str, list[float | None]] = {"value": trend.values.tolist(), "u": _numbers(trend.u)}
+    for name in ("level", "z", "high", "low"):
+        columns[name] = [None] * len(at) if watched is None else _numbers(getattr(watched, name))
+    return [
+        {
+            "session": sessions[k].name,
+            "started": _date(sessions[k]),
+            "value": value,
+            "u": u,
+            "level": level,
+            "z": z,
+            "cusum_high": high,
+            "cusum_low": low,
+        }
+        for k, value, u, level, z, high, low in zip(at, *columns.values(), strict=True)
+    ]
+
+
+def _numbers(values: NDArray[np.float64]) -> list[float | None]:
+    return [value if isfinite(value) else None for value in values.tolist()]
 
 
 def _date(session: SessionFigures) -> str | None:
@@ -164,7 +178,7 @@ def _date(session: SessionFigures) -> str | None:
 
 
 def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return float(value) if isfinite(value) else None
 
 
 TIDY = (

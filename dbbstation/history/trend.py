@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from math import sqrt
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -202,9 +204,9 @@ def _circle_series(sessions: Sequence[SessionFigures], asked: Asked) -> dict[Sub
             for place, figure in enumerate(repeats[0]):
                 one = found.setdefault(Subject(figure.name, test, direction, circle), _Series())
                 one.at.append(k)
-                one.values.append(float(np.mean([figures[place].value_um for figures in repeats])))
+                one.values.append(fmean(figures[place].value_um for figures in repeats))
                 # What repeats do not share averages out; what is stated holds mostly what they share.
-                one.u.append(float(np.sqrt(np.mean([figures[place].u_um ** 2 for figures in repeats]))))
+                one.u.append(sqrt(fmean(figures[place].u_um ** 2 for figures in repeats)))
     order = sorted(found, key=lambda s: (s.test, s.direction, s.of, _FIRST.get(s.figure, len(_FIRST))))
     return {subject: found[subject] for subject in order}
 

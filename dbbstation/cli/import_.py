@@ -84,7 +84,7 @@ def import_(
     from dbbstation.errors import OutputError
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.mapping import write_mapping
-    from dbbstation.imported.session import write_imported
+    from dbbstation.imported.session import staged
 
     if out.exists():
         raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
@@ -97,14 +97,14 @@ def import_(
     asker = Asker()
     found = _read(asker, files, of_mapping, (plan, machine), named, options, job, not_known)
     writes = (out, found.machine, found.plan, found.runs, found.details, found.more)
-    write_imported(*writes, dry=True)
-    if not as_json:
-        _show(found)
-    if not dry_run:
-        _confirm(asker, f"write {len(found.runs)} runs to {out}?", yes=yes)
-        write_imported(*writes, dry=False)
-        if remembered is not None:
-            write_mapping(remembered, found.mapping)
+    with staged(*writes, dry=dry_run) as put:
+        if not as_json:
+            _show(found)
+        if not dry_run:
+            _confirm(asker, f"write {len(found.runs)} runs to {out}?", yes=yes)
+            put()
+            if remembered is not None:
+                write_mapping(remembered, found.mapping)
     if as_json:
         _print_json(found, out, written=not dry_run)
     elif dry_run:

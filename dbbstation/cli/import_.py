@@ -163,7 +163,7 @@ def _read(
     for path, table in tables.items():
         runs += reader.read(table, told.get(path) or _asked_run(asker, reader, table, planned))
     reader.check()
-    statements = [*_statements(mapping, runs, job, not_known), *reader.left_out]
+    statements = [*_statements(mapping, runs, job, _unknown(options, job)), *reader.left_out]
     now = datetime.now(UTC).replace(microsecond=0)
     notes = tuple(Note(now, f"imported: {text}") for text in statements)
     details = replace(session_details(**options, stroke_mm=None), notes=notes)
@@ -220,6 +220,13 @@ def _conditions(
     return options, job
 
 
+def _unknown(options: Mapping[str, Any], job: str) -> list[str]:
+    """Conditions that nobody knows, whether that was said on the command line or by Enter."""
+    has_bar = options["bar_file"] is not None or options["bar_length_mm"] is not None
+    known = (options["ambient_temp_c"] is not None, bool(options["operator"]), bool(job), has_bar)
+    return [one for one, is_known in zip(CONDITIONS, known, strict=True) if not is_known]
+
+
 def _or(option: str, condition: str) -> str:
     return f"{option}, or --not-known {condition}"
 
@@ -259,7 +266,7 @@ def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) ->
         click.echo(f"the plan's tests: {', '.join(plan.tests)}; directions: ccw, cw", err=True)
 
 
-def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], job: str, not_known: Sequence[str]) -> list[str]:
+def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], job: str, unknown: Sequence[str]) -> list[str]:
     """What somebody who reads the session later has to know of it."""
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION
 
@@ -276,7 +283,7 @@ def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], job: str, not
             by_text.setdefault(text, []).append(one.name)
     for text, names in by_text.items():
         found.append(f"{text} ({'every run' if len(names) == len(runs) else ', '.join(names)})")
-    return [*found, *(f"nobody knows: {one}" for one in not_known)]
+    return [*found, *(f"nobody knows: {one}" for one in unknown)]
 
 
 def _show(found: _Import) -> None:

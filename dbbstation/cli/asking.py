@@ -11,11 +11,16 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+def on_terminal() -> bool:
+    """Whether somebody sees questions and can answer them."""
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
 class Asker:
     """Asks one thing after the other; where nobody can answer it gathers what is missing."""
 
     def __init__(self) -> None:
-        self.terminal = sys.stdin.isatty() and sys.stderr.isatty()
+        self.terminal = on_terminal()
         self._missing: list[str] = []
 
     def text(self, question: str, option: str, choices: Sequence[str] = (), default: str | None = None) -> str:

@@ -84,7 +84,7 @@ def import_(
     from dbbstation.errors import OutputError
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.mapping import write_mapping
-    from dbbstation.imported.session import write_imported
+    from dbbstation.imported.session import staged
 
     if out.exists():
         raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
@@ -97,14 +97,14 @@ def import_(
     asker = Asker()
     found = _read(asker, files, of_mapping, (plan, machine), named, options, job, not_known)
     writes = (out, found.machine, found.plan, found.runs, found.details, found.more)
-    write_imported(*writes, dry=True)
-    if not as_json:
-        _show(found)
-    if not dry_run:
-        _confirm(asker, f"write {len(found.runs)} runs to {out}?", yes=yes)
-        write_imported(*writes, dry=False)
-        if remembered is not None:
-            write_mapping(remembered, found.mapping)
+    with staged(*writes, dry=dry_run) as put:
+        if not as_json:
+            _show(found)
+        if not dry_run:
+            _confirm(asker, f"write {len(found.runs)} runs to {out}?", yes=yes)
+            put()
+            if remembered is not None:
+                write_mapping(remembered, found.mapping)
     if as_json:
         _print_json(found, out, written=not dry_run)
     elif dry_run:
@@ -163,7 +163,7 @@ def _read(
     for path, table in tables.items():
         runs += reader.read(table, told.get(path) or _asked_run(asker, reader, table, planned))
     reader.check()
-    statements = [*_statements(mapping, runs, job, not_known), *reader.left_out]
+    statements = [*_statements(mapping, runs, job, _unknown(options, job)), *reader.left_out]
     now = datetime.now(UTC).replace(microsecond=0)
     notes = tuple(Note(now, f"imported: {text}") for text in statements)
     details = replace(session_details(**options, stroke_mm=None), notes=notes)
@@ -220,6 +220,13 @@ def _conditions(
     return options, job
 
 
+def _unknown(options: Mapping[str, Any], job: str) -> list[str]:
+    """Conditions that nobody knows, whether that was said on the command line or by Enter."""
+    has_bar = options["bar_file"] is not None or options["bar_length_mm"] is not None
+    known = (options["ambient_temp_c"] is not None, bool(options["operator"]), bool(job), has_bar)
+    return [one for one, is_known in zip(CONDITIONS, known, strict=True) if not is_known]
+
+
 def _or(option: str, condition: str) -> str:
     return f"{option}, or --not-known {condition}"
 
@@ -259,7 +266,7 @@ def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) ->
         click.echo(f"the plan's tests: {', '.join(plan.tests)}; directions: ccw, cw", err=True)
 
 
-def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], job: str, not_known: Sequence[str]) -> list[str]:
+def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], job: str, unknown: Sequence[str]) -> list[str]:
     """What somebody who reads the session later has to know of it."""
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION
 
@@ -276,7 +283,7 @@ def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], job: str, not
             by_text.setdefault(text, []).append(one.name)
     for text, names in by_text.items():
         found.append(f"{text} ({'every run' if len(names) == len(runs) else ', '.join(names)})")
-    return [*found, *(f"nobody knows: {one}" for one in not_known)]
+    return [*found, *(f"nobody knows: {one}" for one in unknown)]
 
 
 def _show(found: _Import) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +19,7 @@ from dbbstation.files.recordings.session_writer import write_session
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.formats.plan import InlinePlan
@@ -55,7 +56,8 @@ def originals(
     return kept
 
 
-def write_imported(
+@contextmanager
+def staged(
     folder: Path,
     machine: Machine,
     plan: InlinePlan,
@@ -64,8 +66,8 @@ def write_imported(
     more: Mapping[str, str | bytes],
     *,
     dry: bool,
-) -> None:
-    """Write a session, read it as every command does, cut every accepted run, and only then put it in its place.
+) -> Iterator[Callable[[], None]]:
+    """Write a session beside its place, read it as every command does and cut every accepted run; give what puts it in its place.
 
     Args:
         folder: of the session.
@@ -74,7 +76,10 @@ def write_imported(
         runs: in order.
         details: what the session notes.
         more: further files by path in its folder.
-        dry: leave nothing behind.
+        dry: it is never put in its place: it is written where the system keeps what is temporary.
+
+    Yields:
+        What puts the session in its place; it is gone where that was not called.
 
     Raises:
         InputError: lengths, times or angles that no circle of the plan has, by the file that they come from.
@@ -91,12 +96,15 @@ def write_imported(
     except OSError as error:
         raise OutputError(f"cannot be written: {error.strerror}", where=str(folder), remedy="check the disk") from error
     try:
-        staged = made / folder.name
-        write_session(staged, machine, plan, [one.run for one in runs], details, more)
-        _try_out(staged, runs)
-        if not dry:
-            staged.rename(folder)
+        written = made / folder.name
+        write_session(written, machine, plan, [one.run for one in runs], details, more)
+        _try_out(written, runs)
+
+        def put() -> None:
+            written.rename(folder)
             sync_folder(folder.parent)
+
+        yield put
     finally:
         shutil.rmtree(made, ignore_errors=True)
 

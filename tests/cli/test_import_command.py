@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 
 import numpy as np
@@ -222,3 +223,27 @@ def test_other_faults_of_words_are_answered(run, tmp_path):
     again = imported(run, latin, tmp_path / "s", "--encoding", "cp1252")
     assert again.code == FAILED
     assert "the session folder exists already" in again.err
+
+
+def test_on_a_terminal_everything_that_is_missing_is_asked_for(run, tmp_path, monkeypatch):
+    """Answers as they are typed, a decimal comma, a test that is none, and Enter where nobody knows."""
+    rows = [f"{a:g},{d:g}" for a, d in zip(ANGLES, ellipse(), strict=True)]
+    file = table(tmp_path / "old.csv", rows, "Winkel,Abweichung [µm]")
+    answers = ["deg", "ccw", "0", "150", str(PLAN), str(MACHINE), "20,5", "Mori", "", "", "zz", "a-ccw", "y"]
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(answers) + "\n"))
+    monkeypatch.setattr("dbbstation.cli.asking.on_terminal", lambda: True)
+    done = run("import", file, "--out", tmp_path / "s")
+    assert done.code == DONE, done.err
+    session = read_session(tmp_path / "s")
+    assert (session.operator, session.ambient_temp_c, session.bar) == ("Mori", 20.5, None)
+    assert [one.label for one in session.runs] == ["a ccw 1"]
+    assert {note.text for note in session.notes} >= {"imported: nobody knows: job", "imported: nobody knows: bar"}
+    assert "the plan's tests: a, b" in done.err
+
+
+def test_what_is_not_confirmed_is_not_written(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO("n\n"))
+    monkeypatch.setattr("dbbstation.cli.asking.on_terminal", lambda: True)
+    done = run("import", *GERMAN, "--out", tmp_path / "s", *WHERE, *UNKNOWN, "--mapping", MAPPING)
+    assert done.code == FAILED
+    assert not list(tmp_path.glob("*s*"))

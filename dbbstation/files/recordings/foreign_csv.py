@@ -31,7 +31,7 @@ _LANGUAGES = (
 _SIGNS = ",;\t"
 
 _LOOKED_AT = 300
-"""Lines that tell how a table is written: text before it is a page at the most."""
+"""Lines that tell how a table is written, and in which it begins: text before it is some pages at the most."""
 
 
 _NAMES_WITHIN = 3
@@ -78,7 +78,7 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
         raise InputError(faults)
     lines = text.splitlines()
     chosen = language or _language(lines, str(path))
-    rows = [_cells(line, chosen, str(path), number) for number, line in enumerate(lines, start=1)]
+    rows = [_cells(line, chosen, str(path), number) for number, line in enumerate(lines[:_LOOKED_AT], start=1)]
     first = next((k for k in range(len(rows)) if _is_row(rows[k], chosen) and _goes_on(rows, k, chosen)), None)
     if first is None:
         remedy = f"check which file it is; {chosen.text}"

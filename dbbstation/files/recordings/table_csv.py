@@ -160,9 +160,12 @@ def _plain(cells: Sequence[str], values: NDArray[np.float64], language: NumberLa
 
 def _numbers(cells: Sequence[str], language: NumberLanguage) -> NDArray[np.float64]:
     """Numbers of cells; NaN for those that are none."""
-    if language.decimal == PLAIN.decimal:
+    plain: Sequence[str] = cells
+    if language.decimal != PLAIN.decimal and not any(PLAIN.decimal in cell for cell in cells):
+        plain = [cell.replace(language.decimal, PLAIN.decimal) for cell in cells]
+    if language.decimal == PLAIN.decimal or plain is not cells:
         try:
-            return np.array(cells, dtype=np.float64)
+            return np.array(plain, dtype=np.float64)
         except ValueError:
             pass  # a cell without a number, or with another sign: one by one
     return np.array([language.number(cell) for cell in cells])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from dbbstation.calibration.reporting.prediction import smooth_circularity_um
 from dbbstation.circles.budget import Quantity, budgets
 from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.quality.conformity import Conformity, Size, conformity
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
@@ -20,30 +20,6 @@ if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.circles.budget import Budget
     from dbbstation.plan.tolerance import Tolerance
-
-
-class Conformity(StrEnum):
-    """What a figure with an uncertainty says of a limit, by the decision rule of ISO 14253-1."""
-
-    WITHIN = "within"
-    """The limit is kept, whatever the figure is within U."""
-    EXCEEDED = "exceeded"
-    """The limit is passed, whatever the figure is within U."""
-    UNDECIDED = "cannot tell"
-    """The limit lies within U of the figure."""
-
-
-@dataclass(frozen=True)
-class Size:
-    """A figure of one circle as measured.
-
-    Attributes:
-        um: its size [µm].
-        u_um: its standard uncertainty [µm].
-    """
-
-    um: float
-    u_um: float
 
 
 @dataclass(frozen=True)
@@ -124,20 +100,6 @@ def _sizes(one: CircleAnalysis, known: Mapping[Quantity, Budget]) -> dict[Circle
         CircleFigure.CENTRE_DEVIATION: Size(measured.centre_deviation_um, float(np.linalg.norm(along * u_centre))),
         CircleFigure.MEAN_RADIAL_ERROR: Size(abs(measured.mean_radial_error_um), known[Quantity.RADIUS].u_um),
     }
-
-
-def conformity(size: Size, largest_um: float, coverage_factor: float) -> Conformity:
-    """Hold a figure against a limit.
-
-    Args:
-        size: the figure.
-        largest_um: the limit [µm].
-        coverage_factor: k of U = k u.
-    """
-    expanded = coverage_factor * size.u_um
-    if size.um + expanded <= largest_um:
-        return Conformity.WITHIN
-    return Conformity.EXCEEDED if size.um - expanded > largest_um else Conformity.UNDECIDED
 
 
 def held_against(

@@ -1,8 +1,8 @@
-"""Make the picture of the station's screen that README and `docs/screen.md` show.
+"""Make the pictures of the station's screens that README and `docs/screen.md` show.
 
-    python docs/station_picture.py [docs/images/station.svg]
+    python docs/station_picture.py [docs/images]
 
-A simulated machine with small kinematic errors and play in one strut runs the ten-minute check; the picture stands
+A simulated machine with small kinematic errors and play in one strut runs the ten-minute check; the pictures stand
 still in the middle of the second circle, whose direction shows the play against the first.
 """
 
@@ -78,9 +78,13 @@ def happened() -> tuple[Shown, list[Event | SequenceOpened]]:
     return Shown(plan.name, inline.jig.bores, tests=plan.tests), events
 
 
-def picture() -> str:
-    """Return the screen as SVG, the same each time."""
-    svg = asyncio.run(still_svg(*happened()))
+SCREENS = {"station": (), "station-overview": ("o",), "station-large": ("f",)}
+"""Keys that are pressed for each picture."""
+
+
+def picture(screen: str = "station") -> str:
+    """Return a screen as SVG, the same each time."""
+    svg = asyncio.run(still_svg(*happened(), press=SCREENS[screen]))
     # Names that Rich makes from a hash of the content, so that two pictures can stand in one page.
     svg = re.sub(r"terminal-\d+-", "station-", svg)
     return _BLANKS_FIRST.sub(_moved, svg)
@@ -98,6 +102,7 @@ def _moved(text: re.Match[str]) -> str:
 
 
 if __name__ == "__main__":
-    target = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parent / "images" / "station.svg")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_text(picture(), encoding="utf-8")
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parent / "images")
+    target.mkdir(parents=True, exist_ok=True)
+    for screen in SCREENS:
+        (target / f"{screen}.svg").write_text(picture(screen), encoding="utf-8")

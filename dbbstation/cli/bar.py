@@ -9,7 +9,8 @@ import click
 
 from dbbstation.cli.instrument_options import chosen_protocol, instrument_options
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.patience import driver_patience
+from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
+from dbbstation.service.patience import driver_patience
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -17,13 +18,6 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.bar import BarFile
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.trace.steady import Steady
-
-USUAL_TEMP_UNCERTAINTY_K = 0.3
-"""A thermometer of class B may be off by 0.4 K at 20 degC [IEC 60751]; as a rectangular distribution that is 0.23 K, and the bar is
-not quite as warm as it [K]."""
-
-STEEL_BAR_UM_M_K = 11.5
-"""Thermal expansion of unalloyed steel [µm/(m K)]."""
 
 
 @click.command()
@@ -51,7 +45,9 @@ STEEL_BAR_UM_M_K = 11.5
     show_default="11.5, steel",
     help="Thermal expansion of the bar [µm/(m K)].",
 )
-@click.option("--count", type=click.IntRange(20, 1_000_000), default=200, show_default=True, help="Readings.")
+@click.option(
+    "--count", type=click.IntRange(20, 1_000_000), default=USUAL_READINGS, show_default=True, help="Readings."
+)
 @click.option(
     "--resolution-um", type=Finite(0.0001, 100), help="Last digit of the display  [default: as readings show]."
 )
@@ -97,6 +93,7 @@ def bar(
     from dbbstation.cli.output import print_json
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.bar import write_bar
+    from dbbstation.service.bar_reading import DRIFT
 
     refuse_existing(out, force=force)
     protocol = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=calibrator_mm)
@@ -117,7 +114,7 @@ def bar(
             "certificate": certificate,
         },
         instrument,
-        datetime.now(UTC).replace(microsecond=0),
+        datetime.now(UTC),
     )
     write_bar(out, file, force=force)
     long_um, u_um = 1e3 * (found.mean_mm - file.length_mm), 1e3 * file.uncertainty_mm
@@ -128,13 +125,9 @@ def bar(
         return
     click.echo(f"{found.count} readings, mean {found.mean_mm:.5f} mm, scatter {1e3 * found.scatter_mm:.2f} µm")
     click.echo(f"the bar reads {long_um:+.2f} µm long on its calibrator, standard uncertainty {u_um:.2f} µm")
-    if abs(found.drift_mm) > _DRIFT * file.uncertainty_mm:
+    if abs(found.drift_mm) > DRIFT * file.uncertainty_mm:
         click.echo(f"note: it drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: give it time to cool down", err=True)
     click.echo(f"{out}: `dbbstation measure --bar {out} …` takes it")
-
-
-_DRIFT = 2.0
-"""A drift that is greater than the expanded uncertainty (k = 2) matters."""
 
 
 def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:
@@ -144,26 +137,14 @@ def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolutio
         InstrumentError: the line, or too many readings that are no length.
         click.UsageError: the resolution cannot be told.
     """
-    import numpy as np
-
-    from dbbstation.errors import InstrumentError
     from dbbstation.instrument.driver import Instrument
-    from dbbstation.trace.steady import steady
+    from dbbstation.service.bar_reading import read_on_calibrator
 
-    lengths: list[float] = []
     with Instrument(protocol, port, baud=baud, **driver_patience(1.0)) as source:
-        for reading in source.readings(2 * count):
-            if reading.length_mm is not None and reading.status == "ok":
-                lengths.append(reading.length_mm)
-            if len(lengths) == count:
-                break
-        else:
-            what = f"only {len(lengths)} of {2 * count} readings are a length"
-            raise InstrumentError(what, where=source.where, remedy="put the bar on the calibrator, check its cable")
-    try:
-        return steady(np.array(lengths), None if resolution_um is None else 1e-3 * resolution_um)
-    except ValueError as error:
-        raise click.UsageError(f"{error}: say with --resolution-um what the display's last digit is") from error
+        try:
+            return read_on_calibrator(source, count, resolution_um)
+        except ValueError as error:
+            raise click.UsageError(f"{error}: say with --resolution-um what the display's last digit is") from error
 
 
 def _file(
@@ -176,24 +157,10 @@ def _file(
     """
     from pydantic import ValidationError
 
-    from dbbstation.files.formats.bar import BarFile
+    from dbbstation.service.bar_reading import bar_file
 
-    readings = {
-        "instrument": instrument,
-        "count": found.count,
-        "mean_mm": found.mean_mm,
-        "uncertainty_um": 1e3 * found.uncertainty_mm,
-        "scatter_um": 1e3 * found.scatter_mm,
-        "resolution_um": 1e3 * found.resolution_mm,
-    }
-    data = {
-        **of_bar,
-        "calibrated": now.isoformat().replace("+00:00", "Z"),
-        "calibrator": calibrator,
-        "readings": readings,
-    }
     try:
-        return BarFile.model_validate({"format": "dbb-bar/1", **data})
+        return bar_file(found, of_bar, calibrator, instrument, now)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise click.UsageError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error

@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 
-RECONNECT_S = 30.0
-"""How long a measurement waits for an adapter whose cable was pulled out: time to see it and to put it back [s]."""
-
-
 def protocol_options(*, required: bool) -> Callable[[_Function], _Function]:
     """Give a command `--instrument`, `--profile` and `--zero-mm`; the first required unless the shop has set it."""
     return _given(

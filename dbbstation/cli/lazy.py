@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import keyword
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -19,7 +20,7 @@ class LazyGroup(click.Group):
 
     Args:
         table: name and one line of help of every command.
-        package: where each is a module with a command of its name, hyphens as underscores.
+        package: where each is a module with a command of its name, hyphens as underscores, an underscore behind a word of Python.
         more: as `click.Group` takes it.
     """
 
@@ -37,6 +38,7 @@ class LazyGroup(click.Group):
         if cmd_name not in self._table:
             return None
         name = cmd_name.replace("-", "_")
+        name += "_" if keyword.iskeyword(name) else ""
         module = importlib.import_module(f"{self._package}.{name}")
         command: click.Command = getattr(module, name)
         # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.

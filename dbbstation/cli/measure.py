@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
+from dbbstation.service.patience import RECONNECT_S, driver_patience
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,6 +52,7 @@ _AUTO_PATIENCE_S = 60.0
 @click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")
 @spy_option
 @loss_option
+@judging_model_options
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
 def measure(
@@ -70,6 +72,8 @@ def measure(
     rate_hz: float | None,
     largest_loss_percent: float | None,
     largest_bar_age_h: float | None,
+    model_file: Path | None,
+    source_files: tuple[Path, ...],
     as_json: bool,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> None:
@@ -109,6 +113,7 @@ def measure(
         time_scale=time_scale,
         rate_hz=protocol.fastest_hz(baud),
         range_mm=protocol.length.range_mm,
+        model=judging_model(model_file, source_files),
     )
     job.check(str(plan_file))
     say_sampling(plan.to_domain(), protocol, baud)

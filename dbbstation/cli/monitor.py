@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.provenance import provenance
+from dbbstation.service.patience import RECONNECT_S
 
 if TYPE_CHECKING:
     from dbbstation.instrument.reading import Reading

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 PROGRAM = f"dbbstation {__version__}"
 
-_NO_CONTENT = frozenset({"out", "pdf", "figure", "log", "force", "as_json", "jobs"})
+_NO_CONTENT = frozenset({"out", "page", "pdf", "rebuild", "figure", "log", "force", "as_json", "jobs"})
 """Parameters that say where and in which form results go, or how fast: their content is the same without them. Left out, so
 that the same inputs give the same bytes under every name."""
 

@@ -48,21 +48,27 @@ _OF_BAR = (
     click.option(
         "--bar", "bar_file", type=click.Path(path_type=Path), help="Calibration of the bar, from `dbbstation bar`."
     ),
-    shop_option(
-        "--largest-bar-age-h",
-        setting="limits.largest_bar_age_h",
-        type=Finite(0.1, 10_000),
-        help="A calibration of the bar that is older is refused [h]  [default: 24].",
-    ),
     click.option("--bar-waiver", default="", help="Why it is measured without a fresh calibration of the bar."),
 )
 
+_AGE = shop_option(
+    "--largest-bar-age-h",
+    setting="limits.largest_bar_age_h",
+    type=Finite(0.1, 10_000),
+    help="A calibration of the bar that is older is refused [h]  [default: 24].",
+)
 
-def session_options(function: _Function) -> _Function:
-    """Give a command these options; it takes them as keywords and passes them to `session_details`."""
+
+def noted_options(function: _Function) -> _Function:
+    """Give a command the options of what a session notes; it takes them as keywords and passes them to `session_details`."""
     for option in reversed((*_OPTIONS, *_OF_BAR)):
         function = option(function)
     return function
+
+
+def session_options(function: _Function) -> _Function:
+    """Give a command the same for a session that is measured now: a bar whose calibration is too old is refused."""
+    return noted_options(_AGE(function))
 
 
 def session_details(

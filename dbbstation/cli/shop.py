@@ -24,6 +24,9 @@ _SESSIONS = ("sessions", "folder", "a")
 _MADE = frozenset({"measure", "station", "simulate"})
 """Commands whose `--out` is a session."""
 
+_OF_FOLDERS = frozenset({"history"})
+"""Commands whose folder holds sessions, and is none."""
+
 _KEPT, _TAKEN, _LEFT = "dbbstation.settings", "dbbstation.settings.taken", "dbbstation.settings.left"
 """Keys of click's notes about one call: the settings, the options that took one, how many options are still to come."""
 
@@ -117,6 +120,8 @@ def folder_of_sessions(command: str | None, values: Mapping[str, Any]) -> Path |
     if not isinstance(given, str | Path):
         return None
     path = Path(given).absolute()
+    if command in _OF_FOLDERS:
+        return path
     return path.parent.parent if path.name == "session.yaml" else path.parent
 
 

@@ -12,21 +12,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.instrument_options import RECONNECT_S, chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.patience import driver_patience
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
-from dbbstation.cli.shop import from_settings
+from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from types import FrameType
 
-    from dbbstation.instrument.bytelog import ByteLog
-    from dbbstation.instrument.protocol import Protocol
-    from dbbstation.service.runner import Opener, OpenStation
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.service.choice import Choice, Limits
+    from dbbstation.service.memory import Line
+    from dbbstation.service.runner import Opener
     from dbbstation.station.assembly import Job
     from dbbstation.station.events import Observer
     from dbbstation.tui.app import StationApp
@@ -53,6 +54,7 @@ _DEMO_SEED = 3
 )
 @spy_option
 @loss_option
+@judging_model_options
 @session_options
 def station(
     *,
@@ -69,14 +71,18 @@ def station(
     time_scale: float,
     largest_loss_percent: float | None,
     largest_bar_age_h: float | None,
+    model_file: Path | None,
+    source_files: tuple[Path, ...],
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
 
-    Records what `dbbstation measure` records. Quitting loses nothing; the same command continues the session.
+    Without options it begins with the sessions there are, and what a new one needs. Records what `dbbstation measure`
+    records. Quitting loses nothing; the same command continues the session.
 
     \b
     Examples:
+      dbbstation station                               choose on the screen what is measured
       dbbstation station --virtual                     try it without hardware
       dbbstation station --virtual --time-scale 10     the same, ten times faster
       dbbstation station --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
@@ -85,13 +91,22 @@ def station(
     # The shop's instrument stands elsewhere: a virtual one brings its own line.
     port = None if virtual and from_settings("port") else port
     baud = None if virtual and from_settings("baud") else baud
+    if not virtual and time_scale == 1.0 and plan_file is None and machine_file is None and out is None:
+        _check_terminal()
+        return _begin(
+            _given(_line(instrument, profile, port, baud, zero_mm), spy, told),
+            _limits(largest_loss_percent, largest_bar_age_h),
+            judging_model(model_file, source_files),
+        )
     _check_options(
         virtual=virtual, time_scale=time_scale, baud=baud, needed=(plan_file, machine_file, instrument, port, out)
     )
     _check_terminal()
+    from dbbstation.cli.measure_talk import Log
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.shipped import shipped_folder
+    from dbbstation.service.opening import opener
     from dbbstation.station.assembly import Job
 
     def demo(what: str) -> Path:
@@ -106,7 +121,15 @@ def station(
     details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
     folder = out or Path(tempfile.mkdtemp(prefix="dbbstation-")) / "session"
     with ExitStack() as stack:
-        job = Job(machine, plan, folder, details, rate_hz=protocol.fastest_hz(baud), range_mm=protocol.length.range_mm)
+        job = Job(
+            machine,
+            plan,
+            folder,
+            details,
+            rate_hz=protocol.fastest_hz(baud),
+            range_mm=protocol.length.range_mm,
+            model=judging_model(model_file, source_files),
+        )
         job.check(str(plan_file))
         if not virtual:
             require_bar(job, largest_bar_age_h)
@@ -114,7 +137,7 @@ def station(
         if virtual:
             from dataclasses import replace
 
-            from dbbstation.cli.station_virtual import virtual_place
+            from dbbstation.service.virtual_place import virtual_place
 
             click.echo("switching on the virtual machine …", err=True)
             place = stack.enter_context(
@@ -123,7 +146,9 @@ def station(
             job, port, helper = replace(job, clock=place.clock, time_scale=time_scale), place.port, place.helper
         say_sampling(plan.to_domain(), protocol, baud)
         log = stack.enter_context(spying(spy, protocol, str(port)))
-        return _run(job, opener(job, protocol, str(port), baud=baud, helper=helper, time_scale=time_scale, log=log))
+        observers: list[Observer] = [Log(), *([] if helper is None else [helper])]
+        opened = opener(job, protocol, str(port), baud=baud, observers=observers, time_scale=time_scale, log=log)
+        return _run(job, opened)
 
 
 def _check_options(
@@ -154,50 +179,6 @@ def _check_terminal() -> None:
         raise click.UsageError("the screen needs a terminal; `dbbstation measure` does the same without one")
 
 
-def opener(
-    job: Job,
-    protocol: Protocol,
-    port: str,
-    *,
-    baud: int | None = None,
-    helper: Observer | None = None,
-    time_scale: float = 1.0,
-    log: ByteLog | None = None,
-) -> Opener:
-    """Return what opens instrument and session, each time anew.
-
-    Args:
-        job: what is measured.
-        protocol: of the instrument.
-        port: where it is.
-        baud: where it is not set to the usual rate.
-        helper: told of everything after storage, before the screen.
-        time_scale: of the job's clock.
-        log: where every byte is written down.
-    """
-    from dbbstation.cli.measure_talk import Log
-    from dbbstation.instrument.driver import Instrument
-    from dbbstation.service.runner import OpenStation
-    from dbbstation.station.assembly import assemble
-
-    @contextmanager
-    def opened() -> Iterator[OpenStation]:
-        patience = driver_patience(time_scale)
-        with Instrument(
-            protocol, port, baud=baud, clock=job.clock, log=log, reconnect_s=RECONNECT_S, **patience
-        ) as source:
-            workplace = assemble(job, source, source.unreadable)
-            workplace.station.subscribe(Log())
-            if helper is not None:
-                workplace.station.subscribe(helper)
-            try:
-                yield OpenStation(workplace.station, workplace.schedule, str(job.folder), workplace.judge.known())
-            finally:
-                workplace.close()
-
-    return opened
-
-
 def _run(job: Job, open_station: Opener) -> int:
     """Show the screen until it is closed; return the exit code.
 
@@ -211,13 +192,83 @@ def _run(job: Job, open_station: Opener) -> int:
 
     runner = Runner(open_station)
     shown = Shown(job.plan.plan.name, job.plan.jig.bores, tests=job.plan.to_domain().tests)
-    app = StationApp(shown, runner)
+    return _shown(StationApp(shown, runner))
+
+
+def _begin(given: Choice, limits: Limits, model: IdentifiedModel | None) -> int:
+    """Show the start screen until it is closed; arguments as of `Front`, errors as of `_run`."""
+    from dbbstation.cli.measure_talk import Log
+    from dbbstation.service.front import Front
+    from dbbstation.service.memory import Memory
+    from dbbstation.tui.app import StationApp
+
+    named = click.get_current_context().find_root().params.get(SETTINGS_OPTION)
+    front = Front(
+        Path.cwd(), Memory(), limits, [Log()], model, given, None if named is None else Path(named).absolute()
+    )
+    return _shown(StationApp(None, None, front=front))
+
+
+def _line(
+    instrument: str | None, profile: str | None, port: str | None, baud: int | None, zero_mm: float | None
+) -> Line:
+    """Return what options and settings say of instrument and port."""
+    from dbbstation.service.memory import Line
+
+    return Line(instrument=instrument or "", profile=profile or "", port=port or "", baud=baud, zero_mm=zero_mm)
+
+
+def _given(line: Line, spy: Path | None, told: Mapping[str, Any]) -> Choice:
+    """Return what options and settings say of a session that is chosen on the screen.
+
+    Args:
+        line: instrument and port.
+        spy: file of `--spy`.
+        told: the session's options.
+
+    Raises:
+        click.UsageError: an option that the start screen has no place for.
+    """
+    from dbbstation.service.choice import Choice
+
+    of_bar = ("bar_serial_number", "bar_length_mm", "bar_uncertainty_um", "bar_temp_c")
+    lost = ["spy"] if spy is not None else []
+    lost += [name for name in of_bar if told[name] not in {"", None} and not from_settings(name)]
+    if lost:
+        names = ", ".join(f"--{name.replace('_', '-')}" for name in lost)
+        raise click.UsageError(f"{names} goes with --plan, --machine, --instrument, --port and --out")
+    return Choice(
+        line=line,
+        bar=told["bar_file"],
+        bar_waiver=told["bar_waiver"].strip(),
+        operator=told["operator"],
+        serial_number=told["serial_number"],
+        ambient_temp_c=told["ambient_temp_c"],
+    )
+
+
+def _limits(largest_loss_percent: float | None, largest_bar_age_h: float | None) -> Limits:
+    """Return what the shop allows."""
+    from dbbstation.service.choice import Limits
+    from dbbstation.station.bar_known import USUAL_AGE_H
+
+    over_plan = not from_settings("largest_loss_percent")
+    return Limits(largest_bar_age_h or USUAL_AGE_H, largest_loss_percent, over_plan)
+
+
+def _shown(app: StationApp) -> int:
+    """Show the screen until it is closed; return the exit code.
+
+    Raises:
+        StationError: the fault that ended the sequence, where nothing was done about it.
+        click.Abort: a signal ended it.
+    """
     with _stopped_politely(app) as stopped:
         app.run()
-    if runner.crash is not None:
-        raise runner.crash
+    if app.crash is not None:
+        raise app.crash
     if app.board.tasks:
-        click.echo(f"{job.folder}: {app.board.accepted} of {len(app.board.tasks)} runs accepted", err=True)
+        click.echo(f"{app.board.session}: {app.board.accepted} of {len(app.board.tasks)} runs accepted", err=True)
     if app.board.fault is not None:
         raise app.board.fault.error
     if stopped.is_set():

@@ -9,8 +9,8 @@ import numpy as np
 
 from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.stray_balls import beside
-from dbbstation.diagnosis.explain import SURE, explain
-from dbbstation.diagnosis.findings import Diagnosis, Unexplained
+from dbbstation.diagnosis.explain import SURE, explain, without
+from dbbstation.diagnosis.findings import Diagnosis, Unexplained, Verdict
 from dbbstation.diagnosis.left_out import found_again, predicted
 from dbbstation.diagnosis.locate import locations_of
 from dbbstation.diagnosis.next_test import next_tests
@@ -18,7 +18,7 @@ from dbbstation.diagnosis.shifts import shifts_between
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.unexplained_curve import curve_of
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
-from dbbstation.diagnosis.verdicts import judge
+from dbbstation.diagnosis.verdicts import EVEN, judge
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
 from dbbstation.sources.laws.by_temperature import not_given
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.diagnosis.explain import Explained, Settled
+    from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.remainder import Remainder
     from dbbstation.machine.geometry import Machine
@@ -59,10 +60,15 @@ def diagnose(
     """
     runs = [thinned(observation) for observation in observations]
     explained = explain(machine, runs, sources, progress)
-    settled, before, outliers = explained.settled, explained.before, explained.outliers
-    after, members = settled.after, settled.members
     progress("verdicts")
     findings = judge(explained)
+    given_up: set[str] = set()
+    while rather_not := doubtful(explained, findings):
+        given_up |= rather_not
+        explained = without(explained, given_up)
+        findings = judge(explained)
+    settled, before, outliers = explained.settled, explained.before, explained.outliers
+    after, members = settled.after, settled.members
     again = found_again(explained, [f.name for f in sorted(findings, key=lambda f: -f.gain)[:RIVALS]])
     findings = tuple(replace(f, stability=again.get(f.name)) for f in findings)
     rest = _unexplained(explained, settled.left)
@@ -88,6 +94,18 @@ def diagnose(
         second_start_agrees=settled.second_start_agrees(),
         next_tests=next_tests(explained, findings, elsewhere),
     )
+
+
+def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str]:
+    """Named causes of the most probable set that are rather not there than there; a model is better off without them.
+
+    The most probable of many sets may have a small probability. Of all single models the one of what is rather there than
+    not predicts best [Barbieri and Berger, Annals of Statistics 32 (2004) 870]. A cause that is ambiguous stays: it or
+    one of its like is there.
+    """
+    members = {member.cause.name for member in explained.settled.members}
+    doubted = {f.name for f in findings if f.verdict is Verdict.NOT_TESTABLE and f.probability < EVEN}
+    return members & doubted
 
 
 def _unexplained(explained: Explained, left: Misfit) -> Unexplained:

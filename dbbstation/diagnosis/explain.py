@@ -22,7 +22,7 @@ from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
 from dbbstation.inference.model_comparison import SCALES
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -132,6 +132,14 @@ def explain(
         if len(staying) < len(outliers):
             return _with_set_up(fit, fit(belonging), staying, sources, progress)
     return explained
+
+
+def without(explained: Explained, names: Collection[str]) -> Explained:
+    """Return it with the most probable hypothesis that has none of these causes, and the joint fit of that one."""
+    settled = explained.settled
+    posterior = settled.posterior
+    best = next((h for h in posterior.hypotheses if not h.names.intersection(names)), Hypothesis((), 0.0))
+    return replace(explained, settled=_fitted_as_named(explained.channel, replace(settled, best=best)))
 
 
 def _with_set_up(

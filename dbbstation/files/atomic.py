@@ -12,7 +12,7 @@ import os
 import shutil
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 from dbbstation.errors import OutputError
 from dbbstation.files.inputs import was_read
@@ -57,6 +57,38 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
             raise
         sync_folder(path.parent)
     _LOG.info("wrote %s", path)
+
+
+@contextlib.contextmanager
+def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
+    """Open a file that is written piece by piece, and put it in its place once all is written.
+
+    Args:
+        path: of the file.
+        force: replace a file that exists.
+
+    Yields:
+        The file to write to.
+
+    Raises:
+        OutputError: as `write_bytes`; the old file is untouched then, as after any other error while it is written.
+    """
+    refuse_existing(path, force=force)
+    _refuse_input(path)
+    target = path.resolve()
+    with _told(path):
+        temporary = _temporary(target)
+        try:
+            with temporary.open("wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        sync_folder(target.parent)
+    _LOG.info("wrote %s", target)
 
 
 def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool = False) -> None:

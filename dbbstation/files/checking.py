@@ -10,6 +10,7 @@ from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.every_format import SCHEMAS
 from dbbstation.files.formats.jig import parse_jig
 from dbbstation.files.formats.machine import parse_machine
+from dbbstation.files.formats.mapping import parse_mapping
 from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.settings import read_settings
@@ -89,6 +90,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         "dbb-model": lambda: _model(checked, known_sources),
         "dbb-settings": lambda: _settings(checked),
         "dbb-bar": lambda: _bar(checked),
+        "dbb-mapping": lambda: _mapping(checked),
     }
     name = str(given).partition("/")[0]
     if name in by_name:
@@ -140,6 +142,12 @@ def _bar(checked: Checked) -> None:
     if bar is not None:
         long_um, u_um = 1e3 * (bar.readings.mean_mm - bar.length_mm), 1e3 * bar.uncertainty_mm
         checked.summary = f"bar {bar.serial_number}: reads {long_um:+.2f} µm long, standard uncertainty {u_um:.2f} µm"
+
+
+def _mapping(checked: Checked) -> None:
+    mapping = parse_mapping(checked.path, checked.problems)
+    if mapping is not None:
+        checked.summary = f"mapping of {_count(len(mapping.columns), 'column')}"
 
 
 def _run(checked: Checked) -> None:

@@ -73,6 +73,14 @@ def note_input(path: Path, data: bytes) -> None:
         book.note(path, digest)
 
 
+def note_known(path: Path, digest: str) -> None:
+    """Note a file whose content is known from an earlier reading."""
+    book = _BOOK.get()
+    if book is not None:
+        book.note(path, digest)
+        book.note_read(path)
+
+
 def note_read(path: Path) -> None:
     """Note that a file was read, so that no output takes its place."""
     book = _BOOK.get()

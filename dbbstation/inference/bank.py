@@ -191,17 +191,20 @@ class Bank:
         return -len(target) * float(np.log(innovation)) - uneven - squares - float(np.log(seen).sum())
 
     def _spread_of(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Spread of each kept row that makes whitened rows most probable: a constant part, and one that grows as the channel says."""
-        channel = self.channel
-        if channel.grows is None:
+        """Spread of each kept row that makes whitened rows most probable: a constant part, and those that grow as the channel says."""
+        grows = self.channel.grows
+        if grows is None:
             return self.spread
-        size = channel.grows[channel.kept]
-        size = size / max(float(np.sqrt(np.mean(size**2))), 1e-300)
+        squares = np.square(grows[self.channel.kept].reshape(len(left), -1))
+        squares = squares / np.maximum(np.mean(squares, axis=0), 1e-300)
         powers = np.square(left * self.spread)
-        tried = 1.0 + np.square(GROWN)[:, None] * size**2
-        costs = 0.5 * np.sum(np.log(tried), axis=1) + 0.5 * len(left) * np.log(np.mean(powers / tried, axis=1))
-        costs[1:] += 0.5 * np.log(len(left))  # one parameter [Schwarz 1978]
-        best = tried[int(costs.argmin())]
+        every = np.array(list(product(GROWN, repeat=squares.shape[1])))
+        costs = []
+        for parts in every:
+            tried = 1.0 + squares @ np.square(parts)
+            costs.append(0.5 * np.sum(np.log(tried)) + 0.5 * len(left) * np.log(np.mean(powers / tried)))
+        parameters = np.count_nonzero(every, axis=1)  # [Schwarz 1978]
+        best = 1.0 + squares @ np.square(every[int(np.argmin(costs + 0.5 * np.log(len(left)) * parameters))])
         return np.asarray(np.sqrt(best / np.mean(best)))
 
     def _colour_of(
@@ -387,7 +390,7 @@ def _alike(one: Coloured, other: Coloured) -> bool:
     return all(abs(a - b) < SETTLED * max(a, b) for a, b in pairs)
 
 
-GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0])
+GROWN = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
 
 NOISE_ROUNDS = 5

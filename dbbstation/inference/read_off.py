@@ -37,7 +37,7 @@ EVEN = 0.5
 
 EQUIVALENT = 0.999
 """Cosine between the effects of two causes, beside base and other causes, from which on nothing measured here tells one from the
-other: what is left of one beside the other is 4.5 % of it."""
+other, unless it is so large that even this decides: what is left of one beside the other is 4.5 % of it."""
 
 MOST_ALTERNATIVES = 6
 """Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
@@ -326,9 +326,15 @@ class _Judge:
         found = [member.cause.name]
         for cause in rivals:
             same = [v for v in cause.variants if len(v.columns) == size]
-            if any(self._same(member.variant.columns, variant.columns, others) for variant in same):
+            alike = any(self._same(member.variant.columns, variant.columns, others) for variant in same)
+            if alike and not self._is_decided(member, cause, others):
                 found.append(cause.name)
         return tuple(found)
+
+    def _is_decided(self, member: Member, rival: Cause, others: tuple[Member, ...]) -> bool:
+        """Whether the rows decide between a member and a cause in its place: a thousandth of a very large effect is seen, too."""
+        in_place = self._settled.comparison.scan(others, [rival])
+        return self._best.log_factor(member.cause.name) - float(in_place.log_factor.max(initial=-np.inf)) > NEGLIGIBLE
 
     def _same(self, one: NDArray[np.int64], other: NDArray[np.int64], others: tuple[Member, ...]) -> bool:
         """Whether two causes of as many amplitudes span the same effects beside base and others."""

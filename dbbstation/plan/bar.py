@@ -9,6 +9,16 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from datetime import datetime
 
+USUAL_TEMP_UNCERTAINTY_K = 0.3
+"""A thermometer of class B may be off by 0.4 K at 20 degC [IEC 60751]; as a rectangular distribution that is 0.23 K, and the bar is
+not quite as warm as it [K]."""
+
+STEEL_BAR_UM_M_K = 11.5
+"""Thermal expansion of unalloyed steel [µm/(m K)]."""
+
+USUAL_READINGS = 200
+"""Readings on the calibrator that are averaged: of a display twenty seconds."""
+
 
 @dataclass(frozen=True)
 class Bar:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.circled import circled_summary
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.quality.conformity import Conformity
 from dbbstation.report.conditions import conditions, when_measured
 from dbbstation.report.model_part import not_visible, parameters
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
 from dbbstation.report.verdict import verdict_of
-from dbbstation.tolerated import Conformity, held_against, tolerated_circles
+from dbbstation.tolerated import held_against, tolerated_circles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

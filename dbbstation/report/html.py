@@ -1,4 +1,4 @@
-"""A report as one HTML file: everything that is not markup is escaped by the template engine."""
+"""Pages as one HTML file: everything that is not markup is escaped by the template engine."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import jinja2
 
+from dbbstation.history.words import DASH, rounded
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-DASH = "–"
-"""Stands where there is no number."""
 
 
 def report_html(content: Mapping[str, Any]) -> bytes:
@@ -25,7 +24,15 @@ def report_html(content: Mapping[str, Any]) -> bytes:
     Args:
         content: what `content_of` returns.
     """
-    environment = jinja2.Environment(
+    script = files("dbbstation.report").joinpath("templates", "polar.js").read_text("utf-8").strip()
+    digest = b64encode(sha256(script.encode()).digest()).decode()
+    page = environment().get_template("report.html")
+    return page.render(content, script=script, script_sha256=digest).encode()
+
+
+def environment() -> jinja2.Environment:
+    """Return the template engine of every page: what a text holds is escaped, a name that is not given is an error."""
+    made = jinja2.Environment(
         loader=jinja2.PackageLoader("dbbstation.report"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
@@ -33,11 +40,9 @@ def report_html(content: Mapping[str, Any]) -> bytes:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["um"] = _um
-    script = files("dbbstation.report").joinpath("templates", "polar.js").read_text("utf-8").strip()
-    digest = b64encode(sha256(script.encode()).digest()).decode()
-    page = environment.get_template("report.html")
-    return page.render(content, script=script, script_sha256=digest).encode()
+    made.filters["um"] = _um
+    made.filters["figure"] = rounded
+    return made
 
 
 def _um(value: float | None, decimals: int = 1) -> str:

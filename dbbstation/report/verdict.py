@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.tolerated import Conformity
+from dbbstation.quality.conformity import Conformity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

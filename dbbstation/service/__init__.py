@@ -1,1 +1,1 @@
-"""What a screen needs of a running station: it runs, its events become a state that can be drawn, nothing of it knows a screen."""
+"""What a screen needs: sessions, choices and ports before, a running sequence and its state, work afterwards. Nothing of it knows a screen."""

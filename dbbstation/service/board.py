@@ -7,18 +7,22 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from dbbstation.service.live_trace import LiveTrace
+from dbbstation.plan.circle import Direction
+from dbbstation.service.live_trace import LiveTrace, View, difference
 from dbbstation.service.messages import Message, Weight, message_of
 from dbbstation.service.reading_rate import ReadingRate
 from dbbstation.station import events
-from dbbstation.station.states import State
+from dbbstation.station.states import RECORDING, State
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from dbbstation.plan.circle import Circle, Direction
+    from dbbstation.plan.circle import Circle
+    from dbbstation.service.live_trace import Derived
     from dbbstation.station.commands import Command
+    from dbbstation.station.judging import JudgedRun
     from dbbstation.station.schedule import Task
+    from dbbstation.trace.analysis import CircleFigures
 
 _MESSAGES = 50
 
@@ -51,13 +55,13 @@ class SequenceOpened:
         tasks: runs that the plan asks for, in their order.
         open: those without an accepted recording.
         session: where the recordings are.
-        known: what accepted runs of the session say.
+        known: what judged runs of the session say, in the order they were recorded.
     """
 
     tasks: tuple[Task, ...]
     open: tuple[Task, ...]
     session: str
-    known: tuple[events.RunCompleted, ...] = ()
+    known: tuple[JudgedRun, ...] = ()
 
 
 _RUN_MARKS = {
@@ -88,10 +92,12 @@ class Board:
         lost: samples that the line lost during the run that goes on, or went on last.
         swept_deg: travelled since the feed-in [deg].
         traces: of the test that was started last, by direction.
+        difference: of their directions; None before both are complete.
         running: direction of the run that is on its circle; None where none is.
         results: what completed runs say, the last ones.
-        latest: the last run that showed its circle, by test and direction, also of earlier sittings.
-        verdicts: on runs that were judged here, by their names.
+        runs: every run that was recorded whole, also in earlier sittings, by its name.
+        verdicts: on them, by their names.
+        reasons: why some do not count, by their names.
         completed: the run that waits for a verdict, or waited last.
         fault: what ended the sequence.
         finished: the end of the plan.
@@ -109,10 +115,12 @@ class Board:
     lost: int = 0
     swept_deg: float = 0.0
     traces: dict[Direction, LiveTrace] = field(default_factory=dict)
+    difference: Derived | None = None
     running: Direction | None = None
     results: deque[events.RunCompleted] = field(default_factory=lambda: deque(maxlen=2))
-    latest: dict[tuple[str, Direction], events.RunCompleted] = field(default_factory=dict)
+    runs: dict[str, events.RunCompleted] = field(default_factory=dict)
     verdicts: dict[str, Verdict] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
     completed: events.RunCompleted | None = None
     fault: events.Fault | None = None
     finished: events.SessionFinished | None = None
@@ -125,6 +133,19 @@ class Board:
         return next((trace.circle for trace in self.traces.values()), announced)
 
     @property
+    def views(self) -> dict[View, Mapping[Direction, LiveTrace | Derived]]:
+        """What there is to be drawn: traces as measured always, others once they are complete; never beside a circle that runs."""
+        views: dict[View, Mapping[Direction, LiveTrace | Derived]] = {View.MEASURED: self.traces}
+        if self.state in RECORDING:
+            return views
+        centred = {way: trace.centred for way, trace in self.traces.items() if trace.centred is not None}
+        if centred:
+            views[View.CENTRED] = centred
+        if self.difference is not None:
+            views[View.DIFFERENCE] = {Direction.CCW: self.difference}
+        return views
+
+    @property
     def accepted(self) -> int:
         """Planned runs that have an accepted recording."""
         return self.marks.count(Mark.ACCEPTED)
@@ -133,6 +154,20 @@ class Board:
     def left(self) -> tuple[Task, ...]:
         """Planned runs without an accepted recording."""
         return tuple(task for task, mark in zip(self.tasks, self.marks, strict=True) if mark is not Mark.ACCEPTED)
+
+    def runs_of(self, test: str, direction: Direction) -> tuple[events.RunCompleted, ...]:
+        """Return the runs of a test in a direction, in the order they were recorded."""
+        mine = [one for one in self.runs.values() if (one.run.test, one.run.direction) == (test, direction)]
+        return tuple(sorted(mine, key=lambda one: one.run.repeat))
+
+    def figures_of(self, test: str, direction: Direction) -> CircleFigures | None:
+        """Return the figures of the last run of a test in a direction that shows a circle and was not rejected."""
+        standing = [
+            one.figures
+            for one in self.runs_of(test, direction)
+            if one.figures is not None and self.verdicts.get(one.run.label) is not Verdict.REJECTED
+        ]
+        return standing[-1] if standing else None
 
     def take(self, event: events.Event | SequenceOpened) -> None:  # noqa: C901, PLR0912 - a line per event, nothing nested
         """Note what happened."""
@@ -158,7 +193,7 @@ class Board:
             case events.RunAccepted():
                 self._judge(event.run, Verdict.ACCEPTED)
             case events.RunRejected():
-                self._judge(event.run, Verdict.REJECTED)
+                self._judge(event.run, Verdict.REJECTED, event.reason)
             case events.SessionFinished():
                 self.finished = event
             case events.Fault():
@@ -172,9 +207,9 @@ class Board:
         self.tasks, self.session = opened.tasks, opened.session
         self.marks = [Mark.OPEN if task in opened.open else Mark.ACCEPTED for task in opened.tasks]
         for known in opened.known:
-            self.verdicts[known.run.label] = Verdict.ACCEPTED
-            if known.figures is not None:
-                self.latest[known.run.test, known.run.direction] = known
+            label = known.completed.run.label
+            self.runs[label], self.reasons[label] = known.completed, known.reason
+            self.verdicts[label] = Verdict.ACCEPTED if known.accepted else Verdict.REJECTED
         if self.fault is not None:
             # What is over does not stay red.
             past = [replace(message, weight=Weight.NOTE) for message in self.messages]
@@ -220,20 +255,22 @@ class Board:
             if direction is not run.direction and trace.run.mounting == run.mounting
         }
         self.traces[run.direction] = LiveTrace(run, self.announced.circle)
-        self.lost, self.swept_deg = 0, 0.0
+        self.lost, self.swept_deg, self.difference = 0, 0.0, None
 
     def _complete(self, completed: events.RunCompleted) -> None:
-        self.completed = completed
+        self.completed = self.runs[completed.run.label] = completed
         if completed.figures is not None:
             self.results.append(completed)
-            self.latest[completed.run.test, completed.run.direction] = completed
             trace = self.traces.get(completed.run.direction)
             if trace is not None:
                 trace.centre()
+            both = (self.traces.get(way) for way in (Direction.CCW, Direction.CW))
+            ccw, cw = (None if one is None else one.centred for one in both)
+            self.difference = None if ccw is None or cw is None else difference(ccw, cw)
 
-    def _judge(self, run: events.RunId, verdict: Verdict) -> None:
+    def _judge(self, run: events.RunId, verdict: Verdict, reason: str = "") -> None:
         """Note a verdict; on the announced run as its mark, on an earlier one wherever its task stands."""
-        self.verdicts[run.label] = verdict
+        self.verdicts[run.label], self.reasons[run.label] = verdict, reason
         announced = self.announced.run if self.announced else None
         if announced is not None and announced.label == run.label:
             if verdict is Verdict.ACCEPTED:
@@ -244,6 +281,7 @@ class Board:
             trace = self.traces.get(run.direction)
             if trace is not None and trace.run.label == run.label:
                 del self.traces[run.direction]
+                self.difference = None
 
     def _mark_earlier(self, run: events.RunId, verdict: Verdict) -> None:
         mine = [k for k, task in enumerate(self.tasks) if (task.test, task.direction) == (run.test, run.direction)]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from dbbstation.station.commands import Command
     from dbbstation.station.engine import Station
-    from dbbstation.station.events import RunCompleted
+    from dbbstation.station.judging import JudgedRun
     from dbbstation.station.schedule import Schedule
 
 _JOIN_S = 10.0
@@ -34,13 +34,13 @@ class OpenStation:
         station: the engine.
         schedule: what is left to do.
         session: where the recordings are.
-        known: what accepted runs of the session say, from disk.
+        known: what judged runs of the session say, from disk.
     """
 
     station: Station
     schedule: Schedule
     session: str
-    known: tuple[RunCompleted, ...] = ()
+    known: tuple[JudgedRun, ...] = ()
 
 
 Opener: TypeAlias = "Callable[[], AbstractContextManager[OpenStation]]"

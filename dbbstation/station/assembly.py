@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.recordings.bar_reach import unlike_bar
 from dbbstation.files.recordings.session_details import SessionDetails
+from dbbstation.machine.difference import check_model_is_of
 from dbbstation.station.detector import Patience
 from dbbstation.station.engine import Station
 from dbbstation.station.judging import RunJudge
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.plan import InlinePlan
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.machine.geometry import Machine
+    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Direction
     from dbbstation.station.engine import ReadingSource
     from dbbstation.station.programs import RunProgram
@@ -46,6 +48,7 @@ class Job:
         time_scale: how much faster than real time that goes; other than 1 for a virtual machine only.
         rate_hz: readings per second that the instrument brings; None: not known.
         range_mm: lowest and highest length that it reads; None: not known.
+        model: of the machine, which says where circles are expected; None: its nominal geometry does.
     """
 
     machine: Machine
@@ -58,14 +61,18 @@ class Job:
     time_scale: float = 1.0
     rate_hz: float | None = None
     range_mm: tuple[float, float] | None = None
+    model: IdentifiedModel | None = None
 
     def check(self, plan_file: str) -> None:
         """Dry-run the plan; to be done before an instrument is opened.
 
         Raises:
             InputError: a test that readings cannot follow, or that bar or instrument cannot reach.
+            ModelError: the model is of another machine.
             TravelError: a circle leaves the machine's travel.
         """
+        if self.model is not None:
+            check_model_is_of(self.machine, self.model.model.machine)
         plan = self.plan.to_domain()
         bar = self.details.bar
         fault = None if bar is None else unlike_bar(bar.calibrated_length_mm, bar.stroke_mm, plan)
@@ -124,7 +131,7 @@ def assemble(job: Job, source: ReadingSource, unreadable: Callable[[], Mapping[s
     # Real runs bear the computer's time, so that they fit what thermometers log.
     now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
     storage = Storage(writer, now, kept, unreadable)
-    judge = RunJudge(writer, kept)
+    judge = RunJudge(writer, kept, job.model)
     sequencer = Sequencer(
         plan,
         schedule,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from dbbstation.files.recordings.entries import Program
     from dbbstation.files.recordings.session_writer import SessionWriter
+    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.circle import Direction
     from dbbstation.quality.finding import Finding
     from dbbstation.quality.knowledge import Seen
@@ -24,44 +26,75 @@ if TYPE_CHECKING:
     from dbbstation.trace.recording import Recording
 
 
+@dataclass(frozen=True)
+class JudgedRun:
+    """What a run of the session says, and the verdict on it.
+
+    Attributes:
+        completed: figures and findings.
+        accepted: whether it counts.
+        reason: why it does not; empty where it does.
+    """
+
+    completed: events.RunCompleted
+    accepted: bool
+    reason: str = ""
+
+
 class RunJudge:
     """Judges runs beside those that count; an observer of the station, which learns of verdicts.
 
     Args:
-        writer: of the session; its accepted runs are read and analysed now.
+        writer: of the session; its accepted and rejected runs are read and analysed now.
         programs: NC program by test and direction.
+        model: of the machine, which says where circles are expected; None: the nominal machine does.
     """
 
-    def __init__(self, writer: SessionWriter, programs: Mapping[tuple[str, Direction], Program] | None = None) -> None:
+    def __init__(
+        self,
+        writer: SessionWriter,
+        programs: Mapping[tuple[str, Direction], Program] | None = None,
+        model: IdentifiedModel | None = None,
+    ) -> None:
         self._writer = writer
         self._programs = programs or {}
+        self._model = model
         self._counting: dict[tuple[str, Direction, int], Seen] = {}
         self._waiting: dict[tuple[str, Direction, int], Seen] = {}
+        self._rejected: dict[tuple[str, Direction, int], Seen] = {}
+        kept = {RunState.ACCEPTED: self._counting, RunState.REJECTED: self._rejected}
         for entry in writer.runs:
-            if entry.state is RunState.ACCEPTED:
-                self._read(entry)
+            if entry.state in kept:
+                self._read(entry, kept[entry.state])
 
     def __call__(self, event: Event) -> None:
         """Learn which runs count."""
+        if not isinstance(event, events.RunAccepted | events.RunRejected):
+            return
+        key = _key(event.run)
         if isinstance(event, events.RunAccepted):
-            key = _key(event.run)
-            if key in self._waiting:
-                self._counting[key] = self._waiting.pop(key)
-        elif isinstance(event, events.RunRejected):
+            for known in (self._waiting, self._rejected):
+                if key in known:
+                    self._counting[key] = known.pop(key)
+        else:
             for known in (self._counting, self._waiting):
-                known.pop(_key(event.run), None)
+                if key in known:
+                    # Kept: a verdict may be taken back.
+                    self._rejected[key] = known.pop(key)
 
-    def known(self) -> tuple[events.RunCompleted, ...]:
-        """Return what accepted runs say, from disk: figures and findings of each beside the others."""
+    def known(self) -> tuple[JudgedRun, ...]:
+        """Return what judged runs say, from disk: figures and findings of each beside those that count."""
         together = SessionRuns(list(self._counting.values()))
-        mountings = {_key(entry): entry.mounting or 0 for entry in self._writer.runs}
         found = []
-        for key, one in self._counting.items():
+        for entry in self._writer.runs:
+            one = self._counting.get(_key(entry)) or self._rejected.get(_key(entry))
+            if one is None:
+                continue
             shown = None if one.analysis is None else figures(one.analysis.raw)
-            run = events.RunId(*key, mountings[key])
-            samples = len(one.run.recording)
+            run = events.RunId(*_key(entry), entry.mounting or 0)
             findings = () if shown is None else together.judge(one).findings
-            found.append(events.RunCompleted(run, samples, one.lost[0], shown, one.problem, findings))
+            completed = events.RunCompleted(run, len(one.run.recording), one.lost[0], shown, one.problem, findings)
+            found.append(JudgedRun(completed, entry.state is RunState.ACCEPTED, entry.reason))
         return tuple(found)
 
     def judge(self, run: RunId, recording: Recording) -> tuple[Finding, ...]:
@@ -84,19 +117,19 @@ class RunJudge:
             program=self._programs.get((run.test, run.direction)),
             centre_mm=None,
         )
-        (one,) = runs_of(self._writer.session, [(entry, recording)])
+        (one,) = runs_of(self._writer.session, [(entry, recording)], self._model)
         self._waiting[_key(run)] = new = seen(one)
         others = [known for key, known in self._counting.items() if key != _key(run)]
         return SessionRuns([*others, new]).judge(new).findings
 
-    def _read(self, entry: RunEntry) -> None:
+    def _read(self, entry: RunEntry, into: dict[tuple[str, Direction, int], Seen]) -> None:
         """Take in a run that was recorded before; one that cannot be read is told of by who reads it for its figures."""
         try:
             recording = self._writer.session.load(entry).recording
         except InputError:
             return
-        (one,) = runs_of(self._writer.session, [(entry, recording)])
-        self._counting[_key(entry)] = seen(one)
+        (one,) = runs_of(self._writer.session, [(entry, recording)], self._model)
+        into[_key(entry)] = seen(one)
 
 
 def _key(run: RunId | RunEntry) -> tuple[str, Direction, int]:

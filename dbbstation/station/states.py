@@ -115,6 +115,9 @@ TRANSITIONS: Mapping[State, Mapping[Cause, State]] = MappingProxyType(
 RECORDING = frozenset({State.DWELLING, State.TURNING, State.LEAVING})
 """States in which every reading is written down."""
 
+VERDICT = frozenset({State.COMPLETE, State.FLAWED})
+"""A run has ended and waits for what somebody decides about it."""
+
 FINAL = frozenset(state for state, ways in TRANSITIONS.items() if not ways)
 """States that nothing leads out of."""
 

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from textual.app import App, SystemCommand
 from textual.binding import Binding
 from textual.screen import ModalScreen
 
+from dbbstation.errors import StationError
+from dbbstation.service.after import After
+from dbbstation.service.background import Background
 from dbbstation.service.board import Board
 from dbbstation.station.commands import Command, Quit
-from dbbstation.station.states import FINAL, RECORDING, State
+from dbbstation.station.states import FINAL, RECORDING, VERDICT
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
+from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.help_screen import HelpScreen
 from dbbstation.tui.large_screen import LargeScreen
 from dbbstation.tui.measure_screen import MeasureScreen
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import GiveUpQuestion
+from dbbstation.tui.results_screen import ResultsScreen
+from dbbstation.tui.row_screen import RowScreen
 from dbbstation.tui.shown import Shown
+from dbbstation.tui.start_screen import StartScreen
 from dbbstation.tui.texts import HELP
 
 if TYPE_CHECKING:
@@ -28,6 +36,8 @@ if TYPE_CHECKING:
     from textual.screen import Screen
 
     from dbbstation.service.board import SequenceOpened
+    from dbbstation.service.choice import Choice, Prepared
+    from dbbstation.service.front import Front, Opened
     from dbbstation.station.events import Event
 
 __all__ = ["DARK", "LIGHT", "LOOK_S", "Sequence", "Shown", "StationApp"]
@@ -37,9 +47,6 @@ LOOK_S = 0.1
 
 _TALL_ROWS = 32
 """From so many rows on there is room for more than the necessary."""
-
-_VERDICT = {State.COMPLETE, State.FLAWED}
-"""States that ask for a verdict: the bell rings when one begins."""
 
 DARK, LIGHT = "textual-dark", "textual-light"
 
@@ -72,9 +79,10 @@ class StationApp(App[None]):
     """Screens on one board.
 
     Args:
-        shown: plan and plate.
-        runner: runs the sequence; started when the screen stands.
+        shown: plan and plate; None: the start screen says what is measured.
+        runner: runs the sequence; started when the screen stands; None where `front` opens it.
         clock: real time, for telling an old reading [s].
+        front: finds sessions and opens jobs; None: there is only what `runner` runs.
     """
 
     TITLE = "dbbstation"
@@ -84,6 +92,8 @@ class StationApp(App[None]):
         ("o", "overview", "Tests"),
         ("f", "large", "Large"),
         ("c", "connect", "Connect again"),
+        # The sentence at the end of the plan names it; until then the footer has no room.
+        Binding("e", "results", "Results", show=False),
         Binding("d", "brightness", "Dark/light", show=False),
         ("f1,question_mark", "explain", "Help"),
         ("q", "leave", "Quit"),
@@ -91,39 +101,140 @@ class StationApp(App[None]):
         Binding("ctrl+c,ctrl+q", "leave", show=False, priority=True),
     ]
 
-    def __init__(self, shown: Shown, runner: Sequence, *, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        shown: Shown | None,
+        runner: Sequence | None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        front: Front | None = None,
+    ) -> None:
         super().__init__()
         self._clock = clock
         self.board = Board()
-        self._show = shown
+        self._show = shown or Shown("")
         self._runner = runner
-        self._leaving = False
+        self._front = front
+        self._leaving = self._opening = False
+        self._works: list[tuple[Background[Any], Callable[[Any], None], Callable[[Exception], None]]] = []
+        self._after: dict[Path, After] = {}
 
-    def get_default_screen(self) -> MeasureScreen:
+    def get_default_screen(self) -> MeasureScreen | StartScreen:
         """Return the screen at the bottom of the stack."""
+        if self._runner is None and self._front is not None:
+            return StartScreen(self, self._front)
         return MeasureScreen(self, self._show, clock=self._clock)
 
     def on_ready(self) -> None:
         """Begin to measure, and to look, once every part stands."""
-        self._runner.start()
+        if self._runner is not None:
+            self._runner.start()
         self.set_interval(LOOK_S, self.look)
 
     def on_unmount(self) -> None:
-        """Whatever closed the screen, the sequence ends in order."""
-        self._runner.close()
+        """Whatever closed the screen, the sequence and all work end in order."""
+        if self._runner is not None:
+            self._runner.close()
+        for after in self._after.values():
+            after.close()
+        for work, _, _ in self._works:
+            work.wait()
+        if self._front is not None:
+            self._front.close()
 
     def look(self) -> None:
-        """Take the mail and draw what changed."""
+        """Take in what was done elsewhere, take the mail, draw what changed."""
+        if self.screen_stack:  # none: the last look may come while it closes
+            self._finish_works()
+        for screen in reversed(self.screen_stack):
+            if isinstance(screen, ExplainedScreen) and screen.is_mounted:
+                screen.look()
+                break
+        if self._runner is not None:
+            self._take_mail(self._runner)
+
+    def _take_mail(self, runner: Sequence) -> None:
         before = self.board.state
-        alive = self._runner.alive  # asked before its mail is taken: what it sends last is then shown
-        for event in self._runner.mail():
+        alive = runner.alive  # asked before its mail is taken: what it sends last is then shown
+        for event in runner.mail():
             self.board.take(event)
-        if self.board.state in _VERDICT and before not in _VERDICT:
+        if self.board.state in VERDICT and before not in VERDICT:
             self.bell()
         self._drop_stale_question()
         self.draw()
-        if self._runner.crash is not None or (self._leaving and not alive):
+        if runner.crash is not None:
             self.exit()
+        elif self._leaving and not alive:
+            self._end()
+
+    @property
+    def crash(self) -> Exception | None:
+        """What ended the sequence and should not have: a mistake in the program."""
+        return None if self._runner is None else self._runner.crash
+
+    def _finish_works(self) -> None:
+        """Pass on what was done in the background."""
+        done = [one for one in self._works if one[0].done]
+        self._works = [one for one in self._works if not one[0].done]
+        for work, then, failed in done:
+            try:
+                outcome = work.outcome()
+            except (StationError, OSError, ValueError) as error:
+                failed(error)
+            else:
+                then(outcome)
+
+    def do(self, work: Callable[[], Any], then: Callable[[Any], None], failed: Callable[[Exception], None]) -> None:
+        """Do work of some seconds in the background; as `Reception` has it."""
+        self._works.append((Background(work), then, failed))
+
+    def open(self, choice: Choice, prepared: Prepared | None, failed: Callable[[Exception], None]) -> None:
+        """Open a job in the background, and show the screen beside the machine; one at a time."""
+        front = self._front
+        if front is None or self._opening:
+            return
+        self._opening = True
+
+        def begin() -> Opened:
+            return front.open(choice, prepared or front.prepare(choice))
+
+        def refused(error: Exception) -> None:
+            self._opening = False
+            failed(error)
+
+        self.do(begin, self._measure, refused)
+
+    def _measure(self, opened: Opened) -> None:
+        """Show the screen beside the machine over the start screen, and begin."""
+        self._opening = False
+        plan = opened.prepared.job.plan
+        self._show = Shown(plan.plan.name, plan.jig.bores, tests=plan.to_domain().tests)
+        self.board, self._runner, self._leaving = Board(), opened.runner, False
+        self._back_to_start()
+        self.push_screen(MeasureScreen(self, self._show, clock=self._clock))
+        opened.runner.start()
+
+    def _back_to_start(self) -> None:
+        while not isinstance(self.screen, StartScreen):
+            self.pop_screen()
+
+    def _end(self) -> None:
+        """Close what was measured: back to the start screen where there is one."""
+        self._leaving = False
+        start = self.screen_stack[0] if self.screen_stack else None
+        if self._front is None or self._runner is None or not isinstance(start, StartScreen):
+            self.exit()
+            return
+        self._front.close()
+        self._runner, self.board = None, Board()
+        self._back_to_start()
+        start.search()
+
+    def show_results(self, folder: Path) -> None:
+        """Show what can be done with a session that is measured; what was done before still stands there."""
+        if folder not in self._after:
+            self._after[folder] = After(folder) if self._front is None else self._front.after(folder)
+        self.push_screen(ResultsScreen(self._after[folder]))
 
     @property
     def drawn(self) -> BoardScreen | None:
@@ -138,7 +249,8 @@ class StationApp(App[None]):
 
     def send(self, command: Command) -> None:
         """Pass a command on to the sequence."""
-        self._runner.send(command)
+        if self._runner is not None:
+            self._runner.send(command)
 
     def _drop_stale_question(self) -> None:
         """Take a question back whose circle has ended meanwhile: an answer to it would hit something else."""
@@ -148,19 +260,27 @@ class StationApp(App[None]):
             if not running or self.board.announced is None or self.board.announced.run.label != question.run:
                 question.dismiss(result=False)
 
+    @property
+    def _measuring(self) -> bool:
+        """Whether the screen on top belongs to the machine, and not to what comes before or after."""
+        top = self.screen_stack[-1] if self.screen_stack else None  # none while it closes
+        return self._runner is not None and not isinstance(top, RowScreen)
+
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Only keys that mean something now stand in the footer and do something."""
         if action == "connect":
-            return self.board.fault is not None
+            return self.board.fault is not None and self._measuring
+        if action == "results":
+            return self._measuring and bool(self.board.session) and self.board.state not in RECORDING
         if action == "command_palette":
-            return not isinstance(self.screen, ModalScreen)
+            return bool(self.screen_stack) and not isinstance(self.screen_stack[-1], ModalScreen)
         if action in {"overview", "large"}:
-            return not isinstance(self.drawn, OverviewScreen)
+            return self._measuring and not isinstance(self.drawn, OverviewScreen)
         return super().check_action(action, parameters)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
         """Offer what the keys of a screen do now, with the sentence that help has for each."""
-        if not isinstance(screen, BoardScreen):
+        if not isinstance(screen, ExplainedScreen):
             return
         for key, active in screen.active_bindings.items():
             sentence = HELP[screen.help_name].keys.get(key, HELP["everywhere"].keys.get(key))
@@ -184,12 +304,18 @@ class StationApp(App[None]):
 
     def action_explain(self) -> None:
         """Say what the screen shows and what each key does."""
-        if self.drawn is not None:
-            self.push_screen(HelpScreen(self.drawn.help_name))
+        explained = next((each for each in reversed(self.screen_stack) if isinstance(each, ExplainedScreen)), None)
+        if explained is not None and not isinstance(self.screen, ModalScreen):
+            self.push_screen(HelpScreen(explained.help_name))
 
     def action_connect(self) -> None:
         """Open instrument and session again after a fault."""
-        self._runner.start()
+        if self._runner is not None:
+            self._runner.start()
+
+    def action_results(self) -> None:
+        """Show what can be done with what is measured so far."""
+        self.show_results(Path(self.board.session))
 
     def action_brightness(self) -> None:
         """Change between dark and light."""
@@ -197,7 +323,9 @@ class StationApp(App[None]):
 
     def action_leave(self) -> None:
         """Quit, after a question where a circle is being recorded."""
-        if self.board.state in RECORDING and self.drawn is not None:
+        if self._runner is None:
+            self.exit()
+        elif self.board.state in RECORDING and self.drawn is not None:
             ask_to_give_up(self.drawn, "Quit", self.leave)
         else:
             self.leave(sure=True)
@@ -206,6 +334,9 @@ class StationApp(App[None]):
         """End the sequence, if they are sure; the screen closes when it has ended."""
         if not sure:
             return
+        if self._runner is None:
+            self.exit()
+            return
         self._leaving = True
         if not self._runner.send(Quit()) or self.board.state in FINAL:
-            self.exit()
+            self._end()

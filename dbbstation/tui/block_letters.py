@@ -1,12 +1,17 @@
-"""Large letters from blocks: a font of three to five by five, each of its points two columns wide."""
+"""Large letters from blocks: a font of three to five by five points, each point some columns wide and some rows high."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 HIGH = 5
 """Points of a letter from top to bottom."""
 
-_WIDE = 2
-"""Columns of a point: a terminal's cell is about twice as high as wide."""
+_FLATTEST = 3
+"""Columns of a point for each of its rows, at the most; a terminal's cell is about twice as high as wide."""
 
 _FONT = {
     "0": "### #.# #.# #.# ###",
@@ -53,22 +58,31 @@ _FONT = {
 }
 
 
-def columns(text: str) -> int:
-    """Return how many columns a text takes at scale 1."""
-    return len(_points(text)[0]) * _WIDE
+def largest(texts: Sequence[str], width: int, height: int) -> tuple[int, int]:
+    """Return columns and rows of a point with which each of some texts fits into a width, below a height.
+
+    Args:
+        texts: each in one line of its own, all of one size.
+        width: columns there are.
+        height: rows there are for one text.
+    """
+    points = max(len(_points(text)[0]) for text in texts)
+    wide, high = max(width // points, 1), max(height // HIGH, 1)
+    return min(wide, _FLATTEST * high), min(high, wide)
 
 
-def block_rows(text: str, scale: int) -> list[str]:
+def block_rows(text: str, wide: int, high: int) -> list[str]:
     """Return the rows of a text in large letters; what the font does not have is a question mark.
 
     Args:
         text: letters, digits and `.-+?`; small letters become large ones.
-        scale: how many times larger, at least 1.
+        wide: columns of a point, at least 1.
+        high: rows of a point, at least 1.
     """
     rows = []
     for points in _points(text):
-        row = "".join(("█" if point == "#" else " ") * (_WIDE * scale) for point in points)
-        rows += [row] * scale
+        row = "".join(("█" if point == "#" else " ") * wide for point in points)
+        rows += [row] * high
     return rows
 
 

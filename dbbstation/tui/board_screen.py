@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
-from textual.screen import Screen
-
 from dbbstation.station.commands import Accept, Command, Pause, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import RECORDING
+from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.panel import Panel
 from dbbstation.tui.question import GiveUpQuestion
 
@@ -45,15 +44,12 @@ class Desk(Protocol):
         """Draw the screen on top."""
 
 
-class BoardScreen(Screen[None]):
+class BoardScreen(ExplainedScreen):
     """Panels and whatever else is made from the board.
 
     Args:
         desk: has the board, and takes commands.
     """
-
-    help_name: ClassVar[str] = ""
-    """Under which the texts of help have it."""
 
     def __init__(self, desk: Desk) -> None:
         super().__init__()

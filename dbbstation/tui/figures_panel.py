@@ -13,7 +13,13 @@ if TYPE_CHECKING:
     from dbbstation.service.board import Board
     from dbbstation.station.events import RunCompleted
 
-_NAME = 13
+_NAME = 12
+
+_WIDE = 46
+"""From so many columns on X and Y of the centre stand beside its distance."""
+
+_DISTANCE, _MEAN = (8, 7), (7, 6)
+"""Columns of a centre's distance and of a mean: with room to spare, and beside X and Y."""
 
 
 class FiguresPanel(Panel):
@@ -23,18 +29,22 @@ class FiguresPanel(Panel):
 
     def text(self, board: Board) -> Content:
         """Return titles and rows."""
-        titles = f"{'figures [µm]':{_NAME}}{'centre':>8}{'mean':>8}{'circul.':>8}"
-        rows = [_row(result, board.verdicts.get(result.run.label, Verdict.NONE)) for result in board.results]
+        wide = self.content_size.width >= _WIDE
+        centre = f"{'X':>7}{'Y':>7}" if wide else ""
+        titles = f"{'figures [µm]':{_NAME}}{centre}{'centre':>{_DISTANCE[wide]}}{'mean':>{_MEAN[wide]}}{'circul.':>8}"
+        rows = [_row(result, board.verdicts.get(result.run.label, Verdict.NONE), wide=wide) for result in board.results]
         empty = Content.styled("of the finished runs stand here", "dim")
         return lines(Content.styled(titles, "dim"), *(rows or [empty]))
 
 
-def _row(completed: RunCompleted, verdict: Verdict) -> Content:
+def _row(completed: RunCompleted, verdict: Verdict, *, wide: bool) -> Content:
     figures = completed.figures
     name = f"{_short(completed.run.label):{_NAME}}"
     if figures is None:
         return Content(f"{name}no circle")
-    row = f"{name}{figures.centre_deviation_um:8.1f}{figures.mean_radial_error_um:+8.1f}{figures.circularity_um:8.1f}"
+    centre = "".join(f"{1e3 * part:+7.1f}" for part in figures.centre_mm) if wide else ""
+    sizes = f"{figures.centre_deviation_um:{_DISTANCE[wide]}.1f}{figures.mean_radial_error_um:+{_MEAN[wide]}.1f}{figures.circularity_um:8.1f}"
+    row = f"{name}{centre}{sizes}"
     return Content.styled(f"{row} x", "dim strike") if verdict is Verdict.REJECTED else Content(row)
 
 

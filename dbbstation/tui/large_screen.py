@@ -9,7 +9,7 @@ from textual.content import Content
 from textual.widgets import Footer
 
 from dbbstation.station.states import RECORDING
-from dbbstation.tui.block_letters import HIGH, block_rows, columns
+from dbbstation.tui.block_letters import HIGH, block_rows, largest
 from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.now_line import NowLine
 from dbbstation.tui.panel import Panel, lines
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 NO_LENGTH = "---.----"
 _WIDEST = "hands off"
+_TEXTS = 3
 
 
 class LargeFigures(Panel):
@@ -49,15 +50,14 @@ class LargeFigures(Panel):
         state, action = LARGE_WORDS[board.state]
         length = self._length(board)
         # One size for all states: letters that change their size are harder to read than small ones.
-        widest = max(columns(text) for text in (length, NO_LENGTH, _WIDEST))
         room = self.content_size
-        scale = max(min(room.width // widest, room.height // (3 * HIGH + 2)), 1)
-        gap = max((room.height - 3 * HIGH * scale) // 2, 0)
+        wide, high = largest((length, NO_LENGTH, _WIDEST), room.width, (room.height - _TEXTS + 1) // _TEXTS)
+        gap = min(max((room.height - _TEXTS * HIGH * high) // (_TEXTS - 1), 0), HIGH * high)
         rows: list[Content] = []
         styles = ("bold", "$text-primary", "$text-warning" if board.state in RECORDING else "$text-success")
         for text, style in zip((length, state, action), styles, strict=True):
-            rows += [Content.styled(row, style) for row in block_rows(text, scale)]
-            rows += [Content("")] * min(gap, scale)
+            rows += [Content.styled(row, style) for row in block_rows(text, wide, high)]
+            rows += [Content("")] * gap
         return lines(*rows)
 
     def _length(self, board: Board) -> str:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, ClassVar
 
-from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Footer
 
+from dbbstation.service.live_trace import View
+from dbbstation.station.states import VERDICT
 from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.figures_panel import FiguresPanel
+from dbbstation.tui.findings_panel import FindingsPanel
 from dbbstation.tui.jig_map import JigMap
 from dbbstation.tui.message_lines import MessageLines
 from dbbstation.tui.now_line import NowLine
@@ -23,13 +25,11 @@ from dbbstation.tui.title_line import TitleLine
 from dbbstation.tui.trace_view import TraceView
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from textual.app import ComposeResult
     from textual.binding import BindingType
 
-    from dbbstation.plan.circle import Direction
-    from dbbstation.service.live_trace import Centred, LiveTrace
     from dbbstation.tui.board_screen import Desk
     from dbbstation.tui.shown import Shown
 
@@ -45,7 +45,7 @@ class MeasureScreen(RunScreen):
 
     help_name = "measure"
 
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("v", "view", "View", show=False)]
+    BINDINGS: ClassVar[list[BindingType]] = [("v", "view", "View")]
 
     DEFAULT_CSS = """
     MeasureScreen {
@@ -54,7 +54,13 @@ class MeasureScreen(RunScreen):
         #side { width: 40%; min-width: 38; max-width: 52; padding: 0 1 0 0; }
         #side > * { margin-bottom: 1; }
         #table { height: 5; }
+        FindingsPanel { display: none; }
         &.-low StepsPanel { display: none; }
+        &.-verdict {
+            FindingsPanel { display: block; }
+            #table, StepsPanel { display: none; }
+        }
+        &.-low.-verdict RunList { display: none; }
     }
     """
 
@@ -62,7 +68,7 @@ class MeasureScreen(RunScreen):
         super().__init__(desk)
         self._clock = clock
         self._show = shown
-        self._centred = False
+        self._view = View.MEASURED
 
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""
@@ -77,6 +83,7 @@ class MeasureScreen(RunScreen):
                     yield JigMap(self._show.bores, id="map")
                 yield StepsPanel(id="steps")
                 yield FiguresPanel(id="figures")
+                yield FindingsPanel(id="findings")
                 yield RunList(id="runs")
         yield ProgressLine(id="progress")
         yield MessageLines(id="messages")
@@ -86,17 +93,26 @@ class MeasureScreen(RunScreen):
         """Draw panels and trace."""
         super().draw()
         board = self.desk.board
-        for view in self.query(TraceView):
-            view.show(board.circle, self._shown_traces(), None if self._centred else board.running)
+        views = board.views
+        view = self._view if self._view in views else View.MEASURED
+        for trace in self.query(TraceView):
+            trace.show(board.circle, views[view], board.running if view is View.MEASURED else None)
+        judged = board.state in VERDICT and board.completed is not None and bool(board.completed.findings)
+        self.set_class(judged, "-verdict")
 
-    def _shown_traces(self) -> Mapping[Direction, LiveTrace | Centred]:
-        """Traces as measured, or those of complete circles about their own centre."""
-        traces = self.desk.board.traces
-        if not self._centred:
-            return traces
-        return {way: trace.centred for way, trace in traces.items() if trace.centred is not None}
+    def keys(self) -> object:
+        """Return what decides which keys mean something: also what there is to be seen."""
+        return super().keys(), len(self.desk.board.views)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Only keys that mean something now stand in the footer and do something."""
+        if action == "view":
+            return len(self.desk.board.views) > 1
+        return super().check_action(action, parameters)
 
     def action_view(self) -> None:
-        """Change between the circle as measured and its form about its own centre."""
-        self._centred = not self._centred
+        """Show the next of the views that there are."""
+        views = list(self.desk.board.views)
+        at = views.index(self._view) if self._view in views else 0
+        self._view = views[(at + 1) % len(views)]
         self.draw()

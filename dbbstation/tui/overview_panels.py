@@ -9,8 +9,11 @@ from textual.content import Content
 
 from dbbstation.plan.duration import circles_s
 from dbbstation.service.board import Mark, Verdict
+from dbbstation.service.messages import problem_alone
 from dbbstation.station.commands import GoTo
 from dbbstation.tui import texts
+from dbbstation.tui.findings_panel import STYLES as FINDING_STYLES
+from dbbstation.tui.findings_panel import against_limit
 from dbbstation.tui.panel import Panel, lines
 from dbbstation.tui.run_list import SIGNS
 
@@ -19,6 +22,7 @@ if TYPE_CHECKING:
 
     from dbbstation.plan.circle import Direction
     from dbbstation.service.board import Board
+    from dbbstation.station.events import RunCompleted
     from dbbstation.station.schedule import Task
     from dbbstation.tui.shown import Shown
 
@@ -42,11 +46,13 @@ class Choice:
         tests: names in the plan's order.
         at: place of the chosen one.
         way: 0 for its first direction, 1 for its second.
+        back: 0 for its last run, 1 for the one before, and so on.
     """
 
     tests: Sequence[str]
     at: int = 0
     way: int = 0
+    back: int = 0
 
     @property
     def test(self) -> str:
@@ -57,6 +63,15 @@ class Choice:
         """Return the chosen direction; the only one where the test has one."""
         directions = shown.tests[self.test].directions
         return directions[min(self.way, len(directions) - 1)]
+
+    def runs(self, board: Board, shown: Shown) -> tuple[RunCompleted, ...]:
+        """Return the runs of the chosen test and direction, in the order they were recorded."""
+        return board.runs_of(self.test, self.direction(shown)) if self.tests else ()
+
+    def run(self, board: Board, shown: Shown) -> RunCompleted | None:
+        """Return the chosen run; None where none was recorded."""
+        runs = self.runs(board, shown)
+        return runs[-1 - min(self.back, len(runs) - 1)] if runs else None
 
 
 class LeftLine(Panel):
@@ -80,7 +95,7 @@ class LeftLine(Panel):
 
 
 class PlateMap(Panel):
-    """Bores where they are, under each its tests with a sign per direction."""
+    """Bores where they are, under each its tests with a sign per direction and, where there is room, the greatest circularity."""
 
     DEFAULT_CSS = "PlateMap { height: 1fr; padding: 0 1; }"
 
@@ -97,10 +112,12 @@ class PlateMap(Panel):
         ys = sorted({y for _, y in bores.values()}, reverse=True)
         width = max(self.content_size.width // max(len(xs), 1), _CELL)
         gap = max((self.content_size.height - _rows_needed(self._show)) // max(len(ys), 1), 0)
+        # Rows stand no further apart than columns: a cell of the terminal is about twice as high as wide.
+        gap = min(gap, width // 2 - 1)
         rows: list[Content] = []
         for y in ys:
             in_row = {x: number for number, (x, at) in bores.items() if at == y}
-            cells = [self._bore(in_row.get(x), signs, width) for x in xs]
+            cells = [self._bore(in_row.get(x), board, signs, width) for x in xs]
             deepest = max(len(cell) for cell in cells)
             empty = Content(" " * width)
             rows += [Content("").join([cell[k] if k < len(cell) else empty for cell in cells]) for k in range(deepest)]
@@ -108,26 +125,30 @@ class PlateMap(Panel):
         elsewhere = [name for name, test in self._show.tests.items() if test.ball.bore not in bores]
         if elsewhere:
             rows.append(Content.styled(texts.NO_BORE, "dim"))
-            rows += [self._test(name, signs, width) for name in elsewhere]
+            rows += [self._test(name, board, signs, width) for name in elsewhere]
         return lines(*rows)
 
-    def _bore(self, number: int | None, signs: dict[str, list[Mark]], width: int) -> list[Content]:
+    def _bore(self, number: int | None, board: Board, signs: dict[str, list[Mark]], width: int) -> list[Content]:
         if number is None:
             return []
         mine = [name for name, test in self._show.tests.items() if test.ball.bore == number]
         title = texts.BORE.format(number=number)
         return [
             Content.styled(f"{title:{width}}", "bold" if mine else "dim"),
-            *(self._test(name, signs, width) for name in mine),
+            *(self._test(name, board, signs, width) for name in mine),
         ]
 
-    def _test(self, name: str, signs: dict[str, list[Mark]], width: int) -> Content:
+    def _test(self, name: str, board: Board, signs: dict[str, list[Mark]], width: int) -> Content:
         chosen = name == self._choice.test
         room = _CELL - 7
         parts = [
             Content.styled(f"{'▸' if chosen else ' '}{_cut(name, room):{room}} ", "reverse bold" if chosen else "")
         ]
         parts += [Content.styled(*SIGNS[mark]) for mark in signs.get(name, [])]
+        figures = [board.figures_of(name, way) for way in self._show.tests[name].directions]
+        known = [one.circularity_um for one in figures if one is not None]
+        if known and width >= _CELL + _FIGURE:
+            parts.append(Content(f"{max(known):6.1f} µm"[: _FIGURE + 1]))
         text = Content("").join(parts)
         return text + Content(" " * max(width - len(text.plain), 0))
 
@@ -172,9 +193,9 @@ class TestList(Panel):
 
 
 class ChosenRun(Panel):
-    """The last run of the chosen test and direction: figures and verdict."""
+    """The chosen run: figures, verdict with its reason, what was found wrong; which of how many it is."""
 
-    DEFAULT_CSS = "ChosenRun { height: 2; padding: 0 1; background: $surface; text-style: bold; }"
+    DEFAULT_CSS = "ChosenRun { height: 3; padding: 0 1; background: $surface; text-style: bold; }"
 
     def __init__(self, shown: Shown, choice: Choice, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -182,23 +203,42 @@ class ChosenRun(Panel):
         self._choice = choice
 
     def text(self, board: Board) -> Content:
-        """Return the sentence."""
+        """Return the sentences."""
         if not self._choice.tests:
             return Content("")
-        test, direction = self._choice.test, self._choice.direction(self._show)
-        completed = board.latest.get((test, direction))
-        if completed is None or completed.figures is None:
-            return Content(f"{texts.NO_RUN.format(test=test, direction=direction)}\n{texts.CHOOSE}")
-        x, y = (1e3 * part for part in completed.figures.centre_mm)
-        said = texts.LAST_RUN.format(
-            run=completed.run.label,
-            x=x,
-            y=y,
-            mean=completed.figures.mean_radial_error_um,
-            circularity=completed.figures.circularity_um,
-            verdict=board.verdicts.get(completed.run.label, Verdict.NONE).value or texts.NO_VERDICT,
+        completed = self._choice.run(board, self._show)
+        if completed is None:
+            direction = self._choice.direction(self._show)
+            nothing = texts.NO_RUN.format(test=self._choice.test, direction=direction)
+            return lines(Content(nothing), Content(""), Content(texts.CHOOSE))
+        count = len(self._choice.runs(board, self._show))
+        place = count - min(self._choice.back, count - 1)
+        which = texts.CHOOSE_RUN.format(place=place, count=count) if count > 1 else texts.CHOOSE
+        return lines(Content(_figures(completed)), _decided(board, completed), Content(which))
+
+
+def _figures(completed: RunCompleted) -> str:
+    label, figures = completed.run.label, completed.figures
+    if figures is None:
+        return texts.NO_CIRCLE.format(run=label, problem=problem_alone(completed))
+    x, y = (1e3 * part for part in figures.centre_mm)
+    mean, circularity = figures.mean_radial_error_um, figures.circularity_um
+    return texts.RUN_FIGURES.format(run=label, x=x, y=y, mean=mean, circularity=circularity)
+
+
+def _decided(board: Board, completed: RunCompleted) -> Content:
+    """Verdict and reason, then each finding that is wrong with number and limit."""
+    label = completed.run.label
+    verdict = board.verdicts.get(label, Verdict.NONE).value or texts.NO_VERDICT
+    reason = board.reasons.get(label, "")
+    parts = [Content(f"{verdict}: {reason}" if reason else verdict)]
+    parts += [
+        Content.assemble(
+            f"{finding.name.value} {against_limit(finding)} ", (finding.verdict.value, FINDING_STYLES[finding.verdict])
         )
-        return Content(f"{said}\n{texts.CHOOSE}")
+        for finding in completed.wrong
+    ]
+    return Content(" · ").join(parts)
 
 
 def _signs(board: Board) -> dict[str, list[Mark]]:
@@ -220,9 +260,8 @@ def _run(board: Board, task: Task, mark: Mark, *, marked: bool, wide: bool) -> C
     )
     if not wide:
         return cell
-    completed = board.latest.get((task.test, task.direction)) if task.occurrence == 1 else None
-    known = completed is not None and completed.figures is not None and mark is not Mark.RUNNING
-    figure = f"{completed.figures.circularity_um:5.1f} µm" if known and completed and completed.figures else ""
+    known = board.figures_of(task.test, task.direction) if task.occurrence == 1 else None
+    figure = "" if known is None or mark is Mark.RUNNING else f"{known.circularity_um:5.1f} µm"
     return cell + Content(f"{figure:{_FIGURE}}")
 
 

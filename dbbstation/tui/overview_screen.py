@@ -45,6 +45,7 @@ class OverviewScreen(BoardScreen):
         Binding("left", "turn(0)", "First direction", show=False),
         Binding("right", "turn(1)", "Second direction", show=False),
         ("enter", "go_to", "Go to"),
+        ("e", "earlier", "Earlier run"),
         ("x", "take_back", "Does not count"),
         ("a", "accept_again", "Counts again"),
         ("o,escape", "back", "Back"),
@@ -53,7 +54,7 @@ class OverviewScreen(BoardScreen):
     DEFAULT_CSS = """
     OverviewScreen {
         #plate-and-tests { height: 1fr; }
-        #plate { width: 45%; min-width: 38; }
+        #plate { width: 55%; min-width: 38; }
         #tests { width: 1fr; min-width: 40; }
     }
     """
@@ -82,30 +83,39 @@ class OverviewScreen(BoardScreen):
         """Return what decides which keys mean something: also the choice, and the verdict on it."""
         run = self._run()
         verdict = self.desk.board.verdicts.get(run.run.label) if run else None
-        return super().keys(), self.choice.at, self.choice.way, verdict
+        return super().keys(), self.choice.at, self.choice.way, verdict, len(self._runs())
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Only keys that mean something now stand in the footer and do something."""
         board = self.desk.board
         if action == "go_to":
             return GoTo in board.allowed and bool(self.choice.tests)
+        if action == "earlier":
+            return len(self._runs()) > 1
         if action in _VERDICT_BEFORE:
             run = self._run()
             return (
                 Judge in board.allowed
                 and run is not None
+                and (run.figures is not None or action == "take_back")
                 and board.verdicts.get(run.run.label) is _VERDICT_BEFORE[action]
             )
         return super().check_action(action, parameters)
 
     def action_choose(self, steps: int) -> None:
         """Choose a test above or below."""
+        self.choice.back = 0
         self.choice.at = min(max(self.choice.at + steps, 0), max(len(self.choice.tests) - 1, 0))
         self.draw()
 
     def action_turn(self, way: int) -> None:
         """Choose a direction."""
-        self.choice.way = way
+        self.choice.way, self.choice.back = way, 0
+        self.draw()
+
+    def action_earlier(self) -> None:
+        """Choose the run before; behind the first comes the last again."""
+        self.choice.back = (self.choice.back + 1) % max(len(self._runs()), 1)
         self.draw()
 
     def action_go_to(self) -> None:
@@ -142,5 +152,8 @@ class OverviewScreen(BoardScreen):
     def _direction(self) -> Direction:
         return self.choice.direction(self._show)
 
+    def _runs(self) -> tuple[RunCompleted, ...]:
+        return self.choice.runs(self.desk.board, self._show)
+
     def _run(self) -> RunCompleted | None:
-        return self.desk.board.latest.get((self.choice.test, self._direction())) if self.choice.tests else None
+        return self.choice.run(self.desk.board, self._show)

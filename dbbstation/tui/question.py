@@ -51,3 +51,20 @@ class GiveUpQuestion(ModalScreen[bool]):
     def action_answer(self, answer: bool) -> None:  # noqa: FBT001 - called by a key's action string
         """Close with the answer."""
         self.dismiss(answer)
+
+
+class YesQuestion(GiveUpQuestion):
+    """Returns whether to do what the text asks.
+
+    Args:
+        text: the question; what each answer does stands in it.
+    """
+
+    def __init__(self, text: str) -> None:
+        super().__init__("", "")
+        self._text = text
+
+    def compose(self) -> ComposeResult:
+        """Ask."""
+        with Vertical():
+            yield Static(self._text, markup=False)

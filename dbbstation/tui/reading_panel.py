@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from dbbstation.service.seated import seat
 from dbbstation.station.states import State
 from dbbstation.tui.panel import Panel, lines
+from dbbstation.tui.texts import NOT_SEATED_LONG, NOT_SEATED_SHORT, SEATED
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from dbbstation.plan.circle import Circle
     from dbbstation.service.board import Board
     from dbbstation.station.events import Sample
 
@@ -21,6 +24,9 @@ _STALE_S = 1.5
 
 _WITHOUT_BAR = {None, State.BETWEEN, State.ANNOUNCED, State.PAUSED}
 """States in which no bar need be in its place."""
+
+_BEFORE_RUN = {State.ANNOUNCED, State.ARMED}
+"""States in which the bar is put in at the feed-in point."""
 
 _FAR_UM = 9_999.9
 """Further from the nominal length a deviation in µm says nothing."""
@@ -80,10 +86,20 @@ def _length(sample: Sample, *, stale: bool) -> Content:
 def _deviation(sample: Sample, board: Board) -> Content:
     if sample.length_mm is None or board.announced is None:
         return Content("")
+    if board.state in _BEFORE_RUN:
+        return _seat(sample.length_mm, board.announced.circle)
     deviation_um = 1e3 * (sample.length_mm - board.announced.circle.bar_mm)
     if abs(deviation_um) > _FAR_UM:
         return Content("far off the circle")
     return Content(f"{deviation_um:+9.1f} µm")
+
+
+def _seat(length_mm: float, circle: Circle) -> Content:
+    found = seat(length_mm, circle)
+    if found.seated:
+        return Content.styled(SEATED, "bold $text-success")
+    form = NOT_SEATED_SHORT if found.long_mm < 0.0 else NOT_SEATED_LONG
+    return Content.styled(form.format(mm=abs(found.long_mm)), "bold $text-warning")
 
 
 def _quality(sample: Sample, board: Board, old_s: float | None) -> list[Content]:

@@ -90,7 +90,7 @@ def _finished(board: Board) -> str:
     finished = board.finished
     missing = ", ".join(finished.missing) if finished else ""
     rest = f"without an accepted run: {missing}" if missing else "nothing is missing"
-    return f"The plan is through, {board.accepted} of {len(board.tasks)} runs accepted; {rest}. Q leaves."
+    return f"The plan is through, {board.accepted} of {len(board.tasks)} runs accepted; {rest}. E works on the results, Q leaves."
 
 
 def _fault(board: Board) -> str:

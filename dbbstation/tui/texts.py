@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from dbbstation.service.after import Step
+from dbbstation.service.choice import Part
+from dbbstation.service.work import Progress
 from dbbstation.station.states import State
 
 if TYPE_CHECKING:
@@ -49,10 +52,16 @@ HELP = {
                 "On the right: the live reading, the set-up with a map of the plate, the figures of the last two runs, all runs of "
                 "the plan with a sign and a word each. At the bottom: progress, messages, keys."
             ),
+            (
+                "While a run waits for its verdict, its findings stand on the right: number, limit, and good, cannot tell or wrong. "
+                "What is wrong comes first."
+            ),
         ),
         {
             **_RUN_KEYS,
-            "v": "The circle as measured, or complete circles about their own centre on a scale of their own.",
+            "v": (
+                "As measured; complete circles about their own centre on a scale of their own; the form counter-clockwise less that clockwise."
+            ),
         },
     ),
     "large": Help(
@@ -71,10 +80,11 @@ HELP = {
         (
             (
                 "The map shows the plate from above, X to the right and Y up. Under each bore stand its tests with a sign for each "
-                "direction. The list has the same signs with a word."
+                "direction and, where there is room, the greatest circularity. The list has the same signs with a word."
             ),
             (
-                "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict."
+                "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict with its "
+                "reason, findings that are wrong with number and limit. E shows the runs before it, rejected ones too."
             ),
             "The time left is that of the circles at their planned feeds. Putting up balls comes on top.",
         ),
@@ -84,10 +94,111 @@ HELP = {
             "left": "The first direction of the test.",
             "right": "The second direction of the test.",
             "enter": "The chosen test and direction is measured next; the plan goes on from there.",
+            "e": "An earlier run of the test and direction; behind the first comes the last again.",
             "x": "The accepted run does not count any more; the station asks for the reason.",
             "a": "The rejected run counts again.",
             "o": "Back.",
             "escape": "Back.",
+        },
+    ),
+    "start": Help(
+        "Start",
+        (
+            (
+                "The list has the sessions under the working folder and those that were open lately, the last first: how many runs "
+                "are accepted, and how long the circles take that are left. Plan and machine of a session lie in its folder; the "
+                "instrument is that of last time."
+            ),
+            "A session with faults is listed with what is wrong with it; `dbbstation check` tells all of it.",
+        ),
+        {
+            "enter": "Go on with the session where it was left.",
+            "n": "A new session: machine, plan, instrument, port.",
+            "i": "Go on with the session by another instrument or port.",
+            "e": "Results of the session: calibrate, diagnose, programs, report. No instrument is needed.",
+            "v": "Try everything on a virtual machine, without hardware.",
+            "up": "The session above.",
+            "down": "The session below.",
+        },
+    ),
+    "new": Help(
+        "What is measured",
+        (
+            "A row for each thing that a session needs. The sentence at the top says what is still missing.",
+            (
+                "Machines, plans and calibrations of bars are looked for in the working folder; examples come with the program. "
+                "The port list has the ports of this computer, and virtual machines to try everything on."
+            ),
+        ),
+        {
+            "enter": "Change the row: choose from a list, or type.",
+            "b": "Begin: read and check everything, then the checklist.",
+            "t": "Ask the port what answers there.",
+            "delete": "Empty the row.",
+            "up": "The row above.",
+            "down": "The row below.",
+            "escape": "Back to the sessions.",
+        },
+    ),
+    "bar": Help(
+        "The bar on its calibrator",
+        (
+            "Put the bar on its calibrator, a block of known length, and wait until both have the temperature of the shop.",
+            (
+                "The readings are averaged, and a file of the calibration is written. What the bar reads too long is noted and "
+                "never taken off a recording."
+            ),
+        ),
+        {
+            "enter": "Change the row.",
+            "b": "Read the bar.",
+            "up": "The row above.",
+            "down": "The row below.",
+            "escape": "Back; readings that are being taken are given up.",
+        },
+    ),
+    "prepare": Help(
+        "Checklist",
+        (
+            (
+                "The upper part has what the program checked: every circle within the travel, the time that the circles take, "
+                "the bar, the temperature."
+            ),
+            "The lower part has what only a person can see at the machine. Each is confirmed once before the session begins.",
+        ),
+        {
+            "enter": "Confirm, or take it back.",
+            "y": "Confirm all.",
+            "w": "Write the nominal NC programs of all circles into a folder beside the session.",
+            "b": "Begin to measure.",
+            "up": "The line above.",
+            "down": "The line below.",
+            "escape": "Back to what is measured.",
+        },
+    ),
+    "results": Help(
+        "Results",
+        (
+            (
+                "Four steps on the accepted runs. Each is a command of the program in a process of its own, so that it can be ended; "
+                "what it wrote before stays. Files go into a new folder beside the session."
+            ),
+            (
+                "Calibrate fits the kinematic parameters and says what the plan could not see. Diagnose looks for causes that the "
+                "calibration leaves out. Programs are compensated with the best model there is. The report holds the circles "
+                "against the shop's tolerances, with their uncertainty: whether a calibration is due."
+            ),
+        ),
+        {
+            "a": "All four steps, one behind the other.",
+            "c": "Calibrate.",
+            "d": "Diagnose.",
+            "p": "Write compensated NC programs.",
+            "r": "Write the report: the verdict against the shop's tolerances.",
+            "x": "End the step that is being done.",
+            "up": "The step above; its result stands below the list.",
+            "down": "The step below.",
+            "escape": "Back. A step that is being done is ended, after a question.",
         },
     ),
     "everywhere": Help(
@@ -96,6 +207,7 @@ HELP = {
             "o": "All tests of the plan on a map of the plate.",
             "f": "Large figures for two metres, and back.",
             "c": "After a fault: open instrument and session again.",
+            "e": "Results of the session: calibrate, diagnose, programs, report.",
             "d": "Dark or light.",
             "f1": "This help.",
             "question_mark": "This help.",
@@ -116,6 +228,7 @@ KEY_NAMES = {
     "question_mark": "?",
     "f1": "F1",
     "ctrl+p": "Ctrl-P",
+    "delete": "Delete",
 }
 """How keys are called that are no letter."""
 
@@ -155,9 +268,178 @@ TIME_LEFT = (
 )
 NOTHING_LEFT = "All {count} runs of the plan are accepted."
 NOT_NOW = "While the station is {state}, tests are looked at here; going to another and other verdicts have to wait."
-NO_RUN = "{test} {direction}: no run with a circle yet."
-LAST_RUN = "{run}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularity {circularity:.1f} µm; {verdict}."
+NO_RUN = "{test} {direction}: no run yet."
+RUN_FIGURES = "{run}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularity {circularity:.1f} µm."
+NO_CIRCLE = "{run}: no circle; {problem}"
 NO_VERDICT = "waits for its verdict"
 NO_BORE = "in no bore"
 BORE = "bore {number}"
 CHOOSE = "Arrow keys choose test and direction."
+CHOOSE_RUN = "Run {place} of {count} of this test and direction: E shows an earlier one. Arrow keys choose another."
+
+START_LOOKS = "Looking for sessions …"
+START_NONE = "No session yet. N begins a new one, V tries everything on a virtual machine, without hardware."
+START_SOME = "Enter goes on with the chosen session, N begins a new one, V tries everything without hardware."
+START_OPENS = "Opening {folder} …"
+START_BROKEN = "{folder} cannot be gone on with: {problem}"
+START_COMPLETE = "complete"
+START_RUNS = "{accepted} of {planned} runs"
+START_LEFT = ", {time} left"
+START_UNJUDGED = ", {count} to judge"
+START_WHAT = "{folder}\nplan {plan}, machine {machine}"
+START_BY = "by {instrument} at {port}"
+START_NO_LINE = "no instrument yet: I chooses one"
+QUIT_OPENS = "The virtual machine is being switched on; a moment."
+
+PARTS: Mapping[Part, str] = {
+    Part.MACHINE: "machine",
+    Part.PLAN: "plan",
+    Part.INSTRUMENT: "instrument",
+    Part.PORT: "port",
+    Part.BAR: "bar",
+    Part.FOLDER: "folder",
+    Part.PROGRAMS: "NC programs",
+    Part.OPERATOR: "operator",
+    Part.SERIAL_NUMBER: "serial number",
+    Part.TEMPERATURE: "temperature",
+    Part.ORDER: "order of tests",
+    Part.GATE: "drift gate",
+}
+"""Names of the rows of a new session."""
+
+MISSING_PARTS: Mapping[Part, str] = {
+    Part.MACHINE: "the machine's file",
+    Part.PLAN: "the plan",
+    Part.INSTRUMENT: "the instrument",
+    Part.PORT: "the port it is connected to",
+    Part.BAR: "the calibration of the bar, or why it is measured without",
+    Part.FOLDER: "a folder for the session",
+}
+NEW_MISSING = "Still missing: {parts}. Enter changes a row."
+NEW_COMPLETE = "Nothing is missing: B begins. T asks the port what answers."
+NEW_CHECKS = "Reading and checking …"
+NEW_ASKS = "Asking {port} for a reading of {instrument} …"
+NEW_ANSWERS = "{port} answers: {text}."
+NEW_SILENT = "{port}: {text}"
+NEW_KEPT = "of the session"
+NEW_EMPTY: Mapping[Part, str] = {
+    Part.BAR: "not measured: Enter chooses, measures or says why not",
+    Part.PROGRAMS: "none: plain circles, started at the control",
+    Part.OPERATOR: "not noted",
+    Part.SERIAL_NUMBER: "not noted",
+    Part.TEMPERATURE: "not read",
+}
+NOT_CHOSEN = "not chosen"
+WITHOUT_BAR = "without: {reason}"
+VIRTUAL_BAR = "not needed: a virtual bar has the length of the plan"
+GATE_WORDS = {True: "the first test is repeated at the end", False: "as the plan has it"}
+TYPED = "type it, then Enter; Esc goes back"
+TYPE_ANOTHER = "type another …"
+TYPE_REASON = "without a calibration: type why …"
+MEASURE_BAR = "measure it now, on its calibrator …"
+CHOOSE_TITLE = "Choose {part}: arrow keys, Enter; Esc goes back."
+NO_NUMBER = "{text} is no temperature between -30 and 80 °C."
+NO_PROFILE = "usual"
+
+CONFIRMED: Mapping[str, str] = {
+    "bar": "The bar, its cable and both balls are clean; the magnets hold.",
+    "holder": "The holder of every test fits its bore, and the bar swings clear of it.",
+    "jig": "The plate is clamped, and the tool stays clear of it at every tilt.",
+    "spindle": "The spindle is locked and oriented; nobody starts it.",
+}
+"""What only a person can see, by a name that is not shown."""
+
+CHECK_TRAVEL = "Every circle and its feed-in lie within the travel of axes, angles and struts."
+CHECK_TIME = "{runs} runs; their circles take {time} at the planned feeds, putting up balls comes on top."
+CHECK_PROGRAMS = "{count} NC programs run the circles that they are named after."
+CHECK_NO_PROGRAMS = "The control runs plain circles; W writes NC programs of them."
+CHECK_BAR = "The bar {serial} was on its calibrator, at {when}."
+CHECK_WAIVED = "The bar is not calibrated: {reason}"
+CHECK_VIRTUAL = "Machine, bar and instrument are virtual."
+CHECK_OLD = "The session keeps bar and shop as it has noted them."
+CHECK_TEMPERATURE = "Temperature of the shop before: {temp:g} °C."
+CHECK_NO_TEMPERATURE = "The temperature of the shop was not read; what the bar grows by is not known then."
+CHECK_WHO = "Machine {serial}, operator {operator}."
+CHECK_WROTE = "{count} NC programs written to {folder}."
+CHECK_OPEN = "Still to be confirmed: {count} of {all}. Enter confirms one, Y all."
+CHECK_READY = "Everything is confirmed: B begins."
+CHECK_WRITES = "Writing NC programs …"
+UNNAMED = "not noted"
+
+BAR_ROWS: Mapping[str, str] = {
+    "serial_number": "bar, serial number",
+    "calibrator": "calibrator, serial number",
+    "calibrator_mm": "its length at 20 °C [mm]",
+    "calibrator_u_um": "its standard uncertainty [µm]",
+    "certified": "certified, YYYY-MM-DD",
+    "temp_c": "temperature of the bar [°C]",
+}
+BAR_MISSING = "Still missing: {rows}. Enter changes a row."
+BAR_READY = "Put the bar on the calibrator, wait until it is as warm as the shop; then B reads it."
+BAR_LIVE = "now {length:.4f} mm, {off:+.1f} µm against the calibrator"
+BAR_NO_BAR = "no length yet: {said}"
+BAR_READS = "Reading: {done} of {of}. Leave the bar alone."
+BAR_DONE = "The bar reads {long:+.2f} µm long, standard uncertainty {u:.2f} µm. Written to {path}. Esc takes it."
+BAR_DRIFTED = " It drifted by {drift:+.2f} µm meanwhile: give it time to cool down, then B reads it again."
+
+STEPS: Mapping[Step, tuple[str, str]] = {
+    Step.CALIBRATE: ("C", "Calibrate: fit the kinematic parameters"),
+    Step.DIAGNOSE: ("D", "Diagnose: what the calibration leaves out"),
+    Step.PROGRAMS: ("P", "Programs: compensated NC programs of the circles"),
+    Step.REPORT: ("R", "Report: verdict against the shop's tolerances"),
+}
+STEP_WORDS: Mapping[Progress | None, str] = {
+    None: "not yet",
+    Progress.RUNNING: "{stage} ({passed})",
+    Progress.DONE: "done in {passed}",
+    Progress.FAILED: "failed",
+    Progress.CANCELLED: "ended",
+}
+STEP_SIGNS: Mapping[Progress | None, str] = {
+    None: "·",
+    Progress.RUNNING: "▶",
+    Progress.DONE: "✓",
+    Progress.FAILED: "✗",
+    Progress.CANCELLED: "-",
+}
+STEP_BEGINS = "beginning"
+RESULTS_IDLE = "A does all steps, X ends one; results go to {folder}."
+RESULTS_BUSY = "Working; X ends the step, Esc goes back."
+RESULTS_NO_MODEL = "Programs need a model: C calibrates, D diagnoses."
+RESULTS_EMPTY = "Nothing yet."
+RESULTS_CANCELLED = "Ended before it was done; nothing of it was written."
+RESULTS_LEAVE = (
+    "A step is being done. End it and go back?\n\nWhat is done already stays.\n\nY  end it      N or Esc  go on"
+)
+
+FITTED = (
+    "{count} parameters are identified. The nominal machine leaves {nominal:.1f} µm rms of the readings, the model {left:.2f} µm, "
+    "within each mounting {within:.2f} µm; one reading has {noise:.2f} µm of noise."
+)
+PHYSICS_MISSING = "What is left exceeds noise and mountings by {rms:.2f} µm rms: physics is missing, D looks for it."
+OUTLIER = "Outlier, kept out of the fit: {text}"
+UNSEEN = "The plan could not see: {text}"
+GAP = "What helps: {text}"
+ALL_SEEN = "The plan sees every parameter."
+TOO_FEW = "{tests} tests are too few to check themselves: {left} degrees of freedom are left. A small residual proves nothing."
+MISMATCH = "The recordings differ from the kinematic model by {rms:.2f} µm rms beyond a noise of {noise:.2f} µm."
+NO_MISMATCH = "The recordings agree with the kinematic model; noise {noise:.2f} µm."
+VERDICT_WORDS: Mapping[str, str] = {
+    "identified": "Identified causes",
+    "ambiguous": "Ambiguous",
+    "not-testable": "These tests cannot tell",
+}
+CAUSES = "{verdict}: {names}"
+MEASURE_NEXT = "Measure next: {text}"
+PROGRAMMED = "{count} programs for {dialect}, all within the machine's travel."
+CORRECTED = "The greatest correction is {most:.1f} µm."
+REPORT_VERDICT: Mapping[str, str] = {
+    "within": "PASS: no calibration is due.",
+    "exceeded": "FAIL: a calibration is due.",
+    "cannot tell": "CANNOT TELL: a limit lies within the uncertainty.",
+    "none": "NO VERDICT: the shop's settings have no tolerances.",
+}
+
+SEATED = "seated"
+NOT_SEATED_SHORT = "{mm:.1f} mm short of feed-in"
+NOT_SEATED_LONG = "{mm:.1f} mm beyond feed-in"

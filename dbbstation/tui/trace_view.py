@@ -12,7 +12,7 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from dbbstation.plan.circle import Direction
-from dbbstation.service.live_trace import Centred
+from dbbstation.service.live_trace import Derived, View
 from dbbstation.tui import braille
 from dbbstation.tui.polar import (
     BAND_SHARE,
@@ -71,8 +71,8 @@ class TraceView(Widget):
     def __init__(self, *, cell_aspect: float = CELL_ASPECT, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._cell_aspect = cell_aspect
-        self._traces: dict[Direction, LiveTrace | Centred] = {}
-        self._drawn: dict[Direction, tuple[LiveTrace | Centred, int]] = {}
+        self._traces: dict[Direction, LiveTrace | Derived] = {}
+        self._drawn: dict[Direction, tuple[LiveTrace | Derived, int]] = {}
         self._head: Direction | None = None
         self._circle: Circle | None = None
         self._scale_um = SMALLEST_SCALE_UM
@@ -89,7 +89,7 @@ class TraceView(Widget):
         return self._scale_um
 
     def show(
-        self, circle: Circle | None, traces: Mapping[Direction, LiveTrace | Centred], head: Direction | None = None
+        self, circle: Circle | None, traces: Mapping[Direction, LiveTrace | Derived], head: Direction | None = None
     ) -> None:
         """Draw what has come since the last call.
 
@@ -220,12 +220,21 @@ class TraceView(Widget):
             return "no circle yet"
         times = self._dial.magnification(self._scale_um, self._circle.radius_mm)
         tests = dict.fromkeys(trace.run.test for trace in self._traces.values())
-        centred = " centred" if any(isinstance(trace, Centred) for trace in self._traces.values()) else ""
-        return f"{' '.join(tests)} {'+'.join(self._traces)}{centred} · ring ±{self._scale_um:g} µm · ×{_rounded(times)}"
+        what = {View.MEASURED: "+".join(self._traces), View.CENTRED: f"{'+'.join(self._traces)} centred"}
+        return (
+            f"{' '.join(tests)} {what.get(self._view, self._view)} · ring ±{self._scale_um:g} µm · ×{_rounded(times)}"
+        )
+
+    @property
+    def _view(self) -> View:
+        """What the traces are."""
+        return next((one.view for one in self._traces.values() if isinstance(one, Derived)), View.MEASURED)
 
     def _legend(self, wide: int) -> Strip:
         base, styles = self.rich_style, self._styles()
         parts = [("━━ ccw, thick", _CCW), ("   ", 0), ("── cw, thin", _CW), ("   ", 0), ("·· nominal", _SCALE)]
+        if self._view is View.DIFFERENCE:
+            parts = [("━━ ccw less cw", _CCW), ("   ", 0), ("·· none", _SCALE)]
         segments = [Segment(text, base + styles[member]) for text, member in parts]
         return Strip(segments).adjust_cell_length(wide, base)
 

@@ -5,6 +5,7 @@ STUDIES = {
     "concealed-gravity": "Gravity hidden in a kinematic calibration: found, named, modelled.",
     "coverage": "Do the stated 95 % intervals hold the truth?",
     "gravity": "Gravity identified after the kinematics, as in the paper, and with them.",
+    "history": "False alarms and delays of what watches a machine over its sessions.",
     "platform-joints": "The hard case: joint errors hidden to 99 %, from cannot tell to a name.",
     "table-iii": "The paper's three ways to calibrate, on many random machines.",
 }

@@ -21,6 +21,7 @@ SMALL = shipped_folder("fixtures") / "sessions" / "small"
 NO_JSON = {"station": "draws a screen; `measure --json` does the same without one"}
 
 NO_FORCE = {
+    "import": "makes a session; one that exists is never replaced, nor is a mapping",
     "demo": "makes a new folder with everything of one demonstration; recordings are never replaced",
     "measure": "continues the session in its folder; nothing recorded is replaced",
     "simulate": "makes a session; one that exists is never replaced",
@@ -29,6 +30,7 @@ NO_FORCE = {
 
 NO_TESTS = {
     "emulate": "is told at its control address which test to run",
+    "import": "takes the files that are given",
     "measure": "the operator skips tests with a key, and the session says which are missing",
     "station": "as measure",
     "session list": "lists all",

@@ -11,13 +11,14 @@ import click
 import pytest
 
 from dbbstation.cli import COMMANDS, DONE, cli
+from dbbstation.cli.jig import jig
 from dbbstation.cli.session import session
 from dbbstation.cli.study import STUDIES
 
 HEAVY = ("numba", "scipy", "textual", "matplotlib", "pydantic", "numpy")
 
 
-GROUPS = {"study": STUDIES, "session": session.commands}
+GROUPS = {"study": STUDIES, "session": session.commands, "jig": jig.commands}
 LINES = [name for name in sorted(COMMANDS) if name not in GROUPS]
 LINES += [f"{group} {name}" for group, names in GROUPS.items() for name in sorted(names)]
 """Everything that can be called."""

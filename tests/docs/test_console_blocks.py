@@ -19,9 +19,17 @@ from tests.cli.conftest import call
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record
+from tests.sessions_over_time import sessions_over_time
 
 HERE = Path(__file__).resolve().parents[2]
-DOCUMENTS = ["README.md", *sorted(str(path.relative_to(HERE)) for path in (HERE / "docs").glob("*.md"))]
+DOCUMENTS = [
+    "README.md",
+    *sorted(
+        path.relative_to(HERE).as_posix()
+        for place in (".", "shop-floor")
+        for path in (HERE / "docs" / place).glob("*.md")
+    ),
+]
 ANYTHING = "…"
 
 EXEMPT = {
@@ -87,7 +95,27 @@ def commands_of(document: str) -> list[Command]:
     return found
 
 
+def lines_of(document: str) -> list[Command]:
+    """Command lines in blocks without output: those of a shell, or with no language."""
+    found: list[Command] = []
+    in_block, continued = False, False
+    for number, line in enumerate((HERE / document).read_text(encoding="utf-8").splitlines(), start=1):
+        bare = line.strip()
+        if bare.startswith("```"):
+            in_block = not in_block and bare in {"```", "```sh"}
+            continued = False
+        elif in_block and continued:
+            found[-1].text += " " + bare.removesuffix("\\")
+            continued = bare.endswith("\\")
+        elif in_block and bare.startswith("dbbstation "):
+            # What stands beside it, two spaces on, is its explanation.
+            found.append(Command(document, number, bare.partition("   ")[0].removesuffix("\\")))
+            continued = bare.endswith("\\")
+    return found
+
+
 COMMANDS = [command for document in DOCUMENTS for command in commands_of(document)]
+LINES = [command for document in DOCUMENTS for command in lines_of(document)]
 COMPARED = [command for command in COMMANDS if command.shown and command.kind not in EXEMPT]
 
 
@@ -165,13 +193,16 @@ def test_a_command_prints_what_is_shown(command, workshop, monkeypatch):
     assert words[0] == "dbbstation"
     if words[1:4] == ["compare", "before", "after"]:
         record_before_and_after(workshop)
+    if words[1:3] == ["history", "sessions"]:
+        sessions_over_time(workshop / "sessions", 16, seed=1, step_at=13, step_um=8.0)
+        monkeypatch.setenv("XDG_CACHE_HOME", str(workshop / "cache"))
     outcome = call(*words[1:])
     # On a terminal both streams are seen; which comes first depends on the command.
     printed = [outcome.out, outcome.err + outcome.out, outcome.out + outcome.err]
     assert any(is_shown_by(command.shown, one.splitlines()) for one in printed), "\n".join(printed)
 
 
-@pytest.mark.parametrize("command", [pytest.param(c, id=str(c)) for c in COMMANDS])
+@pytest.mark.parametrize("command", [pytest.param(c, id=str(c)) for c in COMMANDS + LINES])
 def test_a_command_exists_with_its_options(command):
     words = words_of(command)
     if words[0] == "dbbstation":
@@ -180,7 +211,13 @@ def test_a_command_exists_with_its_options(command):
             name, *words = words[1:] if words[0] == "dbbstation" else words
             group = group.get_command(context, name)
             assert group is not None, name
-        group.make_context(group.name, [word for word in words if word != ANYTHING], resilient_parsing=True)
+        # The parser refuses what the command does not know; it opens no file and asks for none.
+        parser = group.make_parser(click.Context(group, info_name=group.name))
+        for option in cli.params:  # they may stand anywhere on the line
+            parser.add_option(option, option.opts, option.name, nargs=0 if option.is_flag else 1)
+        _, left, _ = parser.parse_args([word for word in words if word != ANYTHING])
+        takes = sum(1 if one.nargs > 0 else len(words) for one in group.params if isinstance(one, click.Argument))
+        assert len(left) <= takes, f"{group.name} takes no {left}"
     elif words[:2] == ["python", "-m"]:
         place = HERE.joinpath(*words[2].split("."))
         assert place.with_suffix(".py").exists() or (place / "__main__.py").exists()

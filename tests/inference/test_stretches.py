@@ -85,3 +85,27 @@ def test_noise_that_is_the_same_everywhere_does_not_grow(rng):
     bank = Bank(made(rng.normal(0.0, 0.1, ROWS), grows=np.abs(np.sin(np.arange(ROWS) / 20.0))))
     bank.measure_noise()
     assert np.ptp(bank.spread) == 0.0
+
+
+def test_the_likelihood_of_uneven_noise_is_that_of_its_covariance(rng):
+    """Differences between spreads and levels, against the restricted likelihood written out with dense matrices."""
+    rows = 60
+    residual = rng.normal(0.0, 0.3, rows)
+    channel = made(residual)
+
+    def dense(spread, level):
+        covariance = np.diag((level * spread) ** 2)
+        inverse = np.linalg.inv(covariance)
+        base = channel.base.samples
+        across = base.T @ inverse @ base
+        rest = residual - base @ np.linalg.solve(across, base.T @ inverse @ residual)
+        return -0.5 * (np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(across)[1] + rest @ inverse @ rest)
+
+    cases = [(np.ones(rows), 0.3), (np.linspace(0.5, 1.5, rows), 0.3), (np.linspace(2.0, 0.4, rows), 0.2)]
+    found = []
+    for spread, level in cases:
+        bank = Bank(channel)
+        bank._take(bank.noise.with_innovation(level), spread)
+        found.append(bank.log_likelihood())
+    wanted = [dense(spread, level) for spread, level in cases]
+    assert np.diff(found) == pytest.approx(np.diff(wanted), rel=1e-6)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,10 +12,12 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.plan import Plan
-from dbbstation.service.board import Mark, SequenceOpened, Verdict
+from dbbstation.service.board import Board, Mark, SequenceOpened, Verdict
+from dbbstation.service.live_trace import LiveTrace, View, difference
 from dbbstation.service.messages import Weight
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Judge, Quit, Reject, Repeat, Skip, Start
+from dbbstation.station.judging import JudgedRun
 from dbbstation.station.states import State
 from dbbstation.tui.figures_panel import FiguresPanel
 from dbbstation.tui.reading_panel import ReadingPanel
@@ -90,7 +94,7 @@ def test_marks_follow_the_verdicts() -> None:
     assert board.accepted == 1
     assert now(board) == (
         "The plan is through, 1 of 6 runs accepted; without an accepted run: t0 cw, t1 ccw, t1 cw, t2 ccw, t2 cw. "
-        "Q leaves."
+        "E works on the results, Q leaves."
     )
 
 
@@ -207,3 +211,61 @@ def test_a_verdict_that_is_taken_back_opens_its_task() -> None:
     assert "t0-ccw-1 does not count" in board.messages[-1].text
     happening.command(Judge("t0", Direction.CCW, 1, accepted=True))
     assert happening.board().marks[:3] == [Mark.ACCEPTED, Mark.ACCEPTED, Mark.NEXT]
+
+
+def test_runs_of_earlier_sittings_are_known_rejected_ones_too() -> None:
+    happening = Happening().circle("t0", Direction.CCW)
+    (completed,) = happening.board().runs.values()
+    figures = completed.figures
+    assert figures is not None
+    later = replace(
+        completed,
+        run=replace(completed.run, repeat=2),
+        figures=replace(figures, circularity_um=figures.circularity_um + 1),
+    )
+    board = Board()
+    known = (JudgedRun(later, accepted=False, reason="a chip"), JudgedRun(completed, accepted=True))
+    board.take(SequenceOpened(happening.schedule.tasks, (), "session-7", known))
+    assert board.runs_of("t0", Direction.CCW) == (completed, later)
+    assert board.runs_of("t0", Direction.CW) == ()
+    assert (board.verdicts["t0-ccw-2"], board.reasons["t0-ccw-2"]) == (Verdict.REJECTED, "a chip")
+    # The figures of a test are those of its last run that may count.
+    assert board.figures_of("t0", Direction.CCW) == figures
+    board.take(events.RunAccepted(later.run))
+    assert board.figures_of("t0", Direction.CCW) == later.figures
+
+
+def test_the_difference_of_both_directions_is_the_form_that_one_has_more() -> None:
+    traces = []
+    for direction in (Direction.CCW, Direction.CW):
+        circle = make_plan().tests["t0"].run(direction)
+        trace = LiveTrace(events.RunId("t0", direction, 1, 1), circle)
+        phi_deg = np.arange(0.25, 360.0, 0.5)
+        theta = np.radians(circle.theta_deg(phi_deg))
+        more_um = 5.0 * np.cos(3.0 * theta) if direction is Direction.CW else 0.0
+        length_mm = circle.bar_mm + (12.0 * np.cos(2.0 * theta) + 0.1 * np.cos(theta) + more_um) / 1e3
+        trace.add(
+            [
+                events.Sample(k / 10, float(one), phi_deg=float(phi))
+                for k, (phi, one) in enumerate(zip(phi_deg, length_mm, strict=True))
+            ]
+        )
+        trace.centre()
+        assert trace.centred is not None
+        traces.append(trace.centred)
+    shown = difference(*traces)
+    assert shown is not None
+    # A straight line over half a degree of three lobes is off by 5 µm · (3 · 0.5°)² / 8 = 0.4 nm.
+    np.testing.assert_allclose(shown.deviation_um, -5.0 * np.cos(3.0 * np.radians(shown.theta_deg)), atol=2e-3)
+    assert shown.largest_um == pytest.approx(5.0, abs=2e-3)
+
+
+def test_the_difference_is_there_as_long_as_both_circles_count() -> None:
+    happening = Happening().circle("t0", Direction.CCW)
+    assert set(happening.board().views) == {View.MEASURED, View.CENTRED}
+    happening.command(Accept()).circle("t0", Direction.CW, share=0.5)
+    assert set(happening.board().views) == {View.MEASURED}
+    happening = Happening().circle("t0", Direction.CCW).command(Accept()).circle("t0", Direction.CW)
+    assert set(happening.board().views) == set(View)
+    happening.command(Reject())
+    assert View.DIFFERENCE not in happening.board().views

@@ -164,8 +164,18 @@ def test_fifteen_tests_with_every_mishap(tmp_path: Path, seed: int) -> None:
     assert found == {}
     again = assemble(shop.job, shop)
     again.close()
-    from_disk = {one.run.label: one for one in again.judge.known()}
+    known = again.judge.known()
+    from_disk = {one.completed.run.label: one.completed for one in known if one.accepted}
     assert len(from_disk) == 30
+    assert {one.completed.run.label for one in known if not one.accepted} == {
+        "b-ccw-1",
+        "d-cw-1",
+        "e-ccw-1",
+        "g-cw-1",
+        "h-ccw-1",
+        "i-cw-1",
+    }
+    assert all(one.reason for one in known if not one.accepted)
     # Figures and findings are those that were told when the runs were measured.
     assert {label: [str(f.name) for f in one.wrong] for label, one in from_disk.items() if one.wrong} == {}
     for label, one in from_disk.items():

@@ -7,9 +7,10 @@ import numpy as np
 from dbbstation.instrument.reading import Reading
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.plan import Ball, Plan, PlannedTest
+from dbbstation.quality.finding import Finding
 from dbbstation.service.board import Board, SequenceOpened
 from dbbstation.station.commands import Start
-from dbbstation.station.events import Event
+from dbbstation.station.events import Event, RunStarted
 from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
@@ -56,11 +57,12 @@ def lengths_mm(circle: Circle, t_s: np.ndarray) -> np.ndarray:
 class Happening:
     """Runs a sequencer on made-up readings and keeps what it says."""
 
-    def __init__(self, plan: Plan | None = None) -> None:
+    def __init__(self, plan: Plan | None = None, findings: tuple[Finding, ...] = ()) -> None:
         self.plan = plan or make_plan()
-        self.schedule = Schedule(self.plan, lambda _test, _direction: 1)
-        self.sequencer = Sequencer(self.plan, self.schedule, recording_of)
-        self.events: list[Event | SequenceOpened] = [
+        self.schedule = Schedule(self.plan, self._next_repeat)
+        self.sequencer = Sequencer(self.plan, self.schedule, recording_of, judge=lambda _run, _recording: findings)
+        self.events: list[Event | SequenceOpened] = []
+        self.events += [
             SequenceOpened(self.schedule.tasks, self.schedule.open, "session-7"),
             *self.sequencer.begin(),
         ]
@@ -84,6 +86,10 @@ class Happening:
         self.events += self.sequencer.readings(readings)
         self._now_s += whole_s
         return self
+
+    def _next_repeat(self, test: str, direction: Direction) -> int:
+        started = [event.run for event in self.events if isinstance(event, RunStarted)]
+        return 1 + sum((run.test, run.direction) == (test, direction) for run in started)
 
     def board(self) -> Board:
         board = Board()

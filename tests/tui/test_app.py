@@ -5,12 +5,26 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
-from dbbstation.station.commands import Quit
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dbbstation.plan.circle import Direction
+from dbbstation.station.commands import Accept, GoTo, Judge, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
-from tests.tui.happenings import Happening
+from dbbstation.tui.overview_panels import ChosenRun
+from dbbstation.tui.overview_screen import OverviewScreen
+from dbbstation.tui.reason_question import ReasonQuestion
+from dbbstation.tui.texts import HELP
+from dbbstation.tui.trace_view import TraceView
+from tests.tui.happenings import Happening, make_plan
 
 if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from textual.pilot import Pilot
+
     from dbbstation.service.board import SequenceOpened
     from dbbstation.station.commands import Command
     from dbbstation.station.events import Event
@@ -62,3 +76,220 @@ def test_what_a_sequence_says_last_is_shown_before_the_screen_closes() -> None:
 
     asyncio.run(quit_it())
     assert app.board.state is State.STOPPED
+
+
+class Waits:
+    """A sequence that waits for ever where it stands, and notes what it is told."""
+
+    alive = True
+    crash: Exception | None = None
+
+    def __init__(self, events: list[Event | SequenceOpened]) -> None:
+        self.sent: list[Command] = []
+        self._mail = list(events)
+
+    def start(self) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def send(self, command: Command) -> bool:
+        """Note the command."""
+        self.sent.append(command)
+        return True
+
+    def mail(self) -> list[Event | SequenceOpened]:
+        """Return what has not been taken."""
+        came, self._mail = self._mail, []
+        return came
+
+
+def announced() -> Happening:
+    return Happening()
+
+
+def turning() -> Happening:
+    return Happening().circle("t0", Direction.CCW, share=0.5)
+
+
+def complete() -> Happening:
+    return Happening().circle("t0", Direction.CCW)
+
+
+def finished() -> Happening:
+    happening = Happening(make_plan(tests=1))
+    for direction in (Direction.CCW, Direction.CW):
+        happening.circle("t0", direction).command(Accept())
+    return happening
+
+
+STATES = [announced, turning, complete, finished]
+
+
+def played(happening: Happening, play: Callable[[Pilot[None], StationApp], Awaitable[None]]) -> Waits:
+    """Play on a screen that shows what happened, and return what was sent."""
+    runner = Waits(happening.events)
+    app = StationApp(happening.shown(), runner, clock=lambda: 0.0)
+
+    async def run() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            app.look()
+            await pilot.pause()
+            await play(pilot, app)
+
+    asyncio.run(run())
+    return runner
+
+
+@pytest.mark.parametrize(("screen", "key"), [("measure", ""), ("large", "f"), ("overview", "o")])
+def test_every_key_of_a_screen_has_its_sentence_and_every_sentence_its_key(screen: str, key: str) -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        if key:
+            await pilot.press(key)
+        assert app.drawn is not None
+        assert app.drawn.help_name == screen
+        bound = {one for each in (app.drawn, app) for one in each._bindings.key_to_bindings}
+        explained = {**HELP["everywhere"].keys, **HELP[screen].keys}
+        unseen = {"ctrl+c", "ctrl+q", "tab", "shift+tab", "super+c"}  # quits as Q does; moves a focus that nothing has
+        assert bound - unseen - set(explained) == set()
+        assert set(explained) - bound - {"ctrl+p"} == set()
+        assert all(sentence.endswith(".") for sentence in explained.values())
+
+    played(announced(), play)
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_the_palette_offers_what_keys_do_now_and_does_the_same(state: Callable[[], Happening]) -> None:
+    async def offered(pilot: Pilot[None], app: StationApp) -> None:
+        commands = {one.title: one for one in app.get_system_commands(app.screen)}
+        footer = {
+            one.binding.description for one in app.screen.active_bindings.values() if one.enabled and one.binding.show
+        }
+        assert footer <= set(commands)
+        explained = {**HELP["everywhere"].keys, **HELP["measure"].keys}
+        assert {one.help for one in commands.values()} <= set(explained.values())
+        commands["Tests"].callback()
+        await pilot.pause()
+        assert isinstance(app.screen, OverviewScreen)
+
+    played(state(), offered)
+
+
+def test_a_command_of_the_palette_is_sent_as_by_its_key() -> None:
+    async def by_key(pilot: Pilot[None], _app: StationApp) -> None:
+        await pilot.press("s")
+
+    async def by_name(pilot: Pilot[None], app: StationApp) -> None:
+        next(one for one in app.get_system_commands(app.screen) if one.title == "Skip").callback()
+        await pilot.pause()
+
+    assert played(announced(), by_key).sent == played(announced(), by_name).sent == [Skip()]
+
+
+def test_the_bell_rings_once_when_a_run_waits_for_its_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+    rung = []
+    monkeypatch.setattr(StationApp, "bell", lambda _self: rung.append(1))
+
+    async def look_again(pilot: Pilot[None], app: StationApp) -> None:
+        app.look()
+        app.look()
+        await pilot.pause()
+
+    played(announced(), look_again)
+    played(turning(), look_again)
+    assert rung == []
+    played(complete(), look_again)
+    assert rung == [1]
+
+
+def test_a_reason_is_typed_and_an_empty_one_is_none() -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("o", "up", "left", "x")
+        assert isinstance(app.screen, ReasonQuestion)
+        await pilot.press("t", "enter")
+        assert isinstance(app.screen, ReasonQuestion)
+        await pilot.press(*"a chip", "enter")
+        assert isinstance(app.screen, OverviewScreen)
+
+    happening = complete().command(Accept())
+    (judged,) = played(happening, play).sent
+    assert isinstance(judged, Judge)
+    assert (judged.reason, judged.accepted) == ("a chip", False)
+
+
+def twice() -> Happening:
+    """The same run rejected, measured again and accepted."""
+    happening = Happening().circle("t0", Direction.CCW).command(Repeat("the bar slipped"))
+    return happening.circle("t0", Direction.CCW).command(Accept())
+
+
+def test_a_rejected_run_before_the_last_is_seen_and_counts_again() -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("o", "left")
+        chosen = app.screen.query_one(ChosenRun)
+        assert str(chosen.text(app.board)).startswith("t0-ccw-2: centre")
+        await pilot.press("a")  # it counts already
+        await pilot.press("e")
+        figures, verdict, which = str(chosen.text(app.board)).splitlines()
+        assert figures.startswith("t0-ccw-1: centre X +10.8 Y +16.8")  # 20 µm towards 1 rad
+        assert verdict == "rejected: the bar slipped"
+        assert which.startswith("Run 1 of 2")
+        await pilot.press("x")  # it does not count already
+        assert isinstance(app.screen, OverviewScreen)
+        await pilot.press("a", "e", "x", "1")
+
+    again, taken_back = played(twice(), play).sent
+    assert again == Judge("t0", Direction.CCW, 1, accepted=True, reason="")
+    assert (taken_back.repeat, taken_back.accepted) == (2, False)
+
+
+def test_views_are_those_there_is_something_for() -> None:
+    async def views(pilot: Pilot[None], app: StationApp) -> list[str]:
+        seen = []
+        for _ in range(4):
+            seen.append(app.screen.query_one(TraceView)._caption().split(" · ")[0])
+            await pilot.press("v")
+        return seen
+
+    async def running(pilot: Pilot[None], app: StationApp) -> None:
+        assert await views(pilot, app) == ["t0 ccw"] * 4
+
+    async def one(pilot: Pilot[None], app: StationApp) -> None:
+        assert await views(pilot, app) == ["t0 ccw", "t0 ccw centred"] * 2
+
+    async def both(pilot: Pilot[None], app: StationApp) -> None:
+        assert await views(pilot, app) == ["t0 ccw+cw", "t0 ccw+cw centred", "t0 ccw − cw centred", "t0 ccw+cw"]
+
+    played(turning(), running)
+    played(complete(), one)
+    played(complete().command(Accept()).circle("t0", Direction.CW), both)
+
+
+KEYS = (
+    *"abcdefghijklmnopqrstuvwxyz0123456789?",
+    "enter",
+    "escape",
+    "up",
+    "down",
+    "left",
+    "right",
+    "tab",
+    "f1",
+    "ctrl+c",
+)
+
+
+@settings(max_examples=12, deadline=None)
+@given(state=st.sampled_from(STATES), keys=st.lists(st.sampled_from(KEYS), max_size=12))
+def test_wrong_keys_do_no_harm_on_any_screen(state: Callable[[], Happening], keys: list[str]) -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        for key in keys:
+            if app.is_running:
+                await pilot.press(key)
+        assert app._exception is None
+
+    happening = state()
+    sent = played(happening, play).sent
+    # Nothing is sent that means nothing to the sequence now; a quit goes through in every state.
+    assert {type(command) for command in sent} <= {*happening.board().allowed, Quit, Judge, GoTo}

@@ -20,6 +20,8 @@ def test_the_script_makes_the_picture() -> None:
     assert len(svg) < 150_000
 
 
-def test_the_picture_is_shown() -> None:
-    assert (DOCS / "images" / "station.svg").read_text("utf-8").startswith("<svg")
-    assert "images/station.svg" in (DOCS / "screen.md").read_text("utf-8")
+def test_the_pictures_are_shown() -> None:
+    text = (DOCS / "screen.md").read_text("utf-8")
+    for name in ("station", "station-overview", "station-large"):
+        assert (DOCS / "images" / f"{name}.svg").read_text("utf-8").startswith("<svg")
+        assert f"images/{name}.svg" in text

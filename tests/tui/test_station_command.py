@@ -33,7 +33,8 @@ def test_help_has_examples() -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ([], "missing --plan, --machine, --instrument, --port, --out; or --virtual"),
+        ([], "the screen needs a terminal"),
+        (["--plan", "p.yaml"], "missing --machine, --instrument, --port, --out; or --virtual"),
         (REAL[:-2], "missing --out"),
         (["--virtual", "--port", "COM3"], "leave out --port"),
         (["--virtual", "--baud", "9600"], "leave out --port and --baud"),

@@ -18,6 +18,7 @@ import pytest
 
 from dbbstation.errors import InstrumentError
 from dbbstation.plan.circle import Direction
+from dbbstation.quality.finding import Name, found, untold
 from dbbstation.station.commands import Accept
 from dbbstation.tui.app import DARK, LIGHT
 from dbbstation.tui.still import still_svg
@@ -42,6 +43,15 @@ def verdict() -> Happening:
     return Happening().circle("t0", Direction.CCW).command(Accept()).circle("t0", Direction.CW)
 
 
+def findings() -> Happening:
+    told = (
+        found(Name.NOISE, 0.31, 0.61, "µm", "sound", "noisy"),
+        untold(Name.REPEAT, "there is no other run of this test"),
+        found(Name.CLOSURE, 4.1, 1.95, "µm", "sound", "the ends are 4.1 µm apart; was the ball touched?"),
+    )
+    return Happening(findings=told).circle("t0", Direction.CCW)
+
+
 def fault() -> Happening:
     happening = Happening().circle("t0", Direction.CCW, 0.5)
     error = InstrumentError(
@@ -53,7 +63,7 @@ def fault() -> Happening:
     return happening
 
 
-STATES = [set_up, second_circle, verdict, fault]
+STATES = [set_up, second_circle, verdict, findings, fault]
 
 
 def drawn(svg: str) -> tuple[str, str]:
@@ -117,6 +127,27 @@ def test_the_colours_are_as_they_were(theme: str) -> None:
     if KEEP:
         kept.write_text(colours, encoding="utf-8")
     assert colours.splitlines() == kept.read_text(encoding="utf-8").splitlines()
+
+
+@pytest.mark.parametrize("state", STATES, ids=lambda state: state.__name__)
+def test_without_colours_every_word_is_there(state: Callable[[], Happening], monkeypatch: pytest.MonkeyPatch) -> None:
+    happening = state()
+    coloured, _ = drawn(asyncio.run(still_svg(happening.shown(), list(happening.events), size=(80, 24))))
+    monkeypatch.setenv("NO_COLOR", "1")
+    plain, styles = drawn(asyncio.run(still_svg(happening.shown(), list(happening.events), size=(80, 24))))
+    assert plain == coloured
+    hues = set(re.findall(r"fill: #(\w{6})", styles))
+    assert hues
+    assert all(colour[:2] == colour[2:4] == colour[4:] for colour in hues)
+
+
+def test_what_is_wrong_stands_first_with_number_limit_and_word() -> None:
+    happening = findings()
+    text, _ = drawn(asyncio.run(still_svg(happening.shown(), happening.events, size=(80, 24))))
+    rows = [" ".join(row.split()) for row in text.splitlines()]
+    (wrong,) = (k for k, row in enumerate(rows) if row.endswith("closure 4.10 of 1.95 µm wrong"))
+    assert rows[wrong + 1].endswith("repeat cannot tell")
+    assert rows[wrong + 2].endswith("noise 0.31 of 0.61 µm good")
 
 
 def test_a_still_is_the_same_each_time() -> None:

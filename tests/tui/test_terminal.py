@@ -87,8 +87,9 @@ class Terminal:
 
 
 @pytest.fixture
-def terminal(tmp_path: Path) -> Iterator[Terminal]:
-    opened = Terminal("--virtual", "--time-scale", "3", "--out", str(tmp_path / "session"))
+def terminal(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Terminal]:
+    time_scale = getattr(request, "param", "3")
+    opened = Terminal("--virtual", "--time-scale", time_scale, "--out", str(tmp_path / "session"))
     yield opened
     opened.close()
 
@@ -99,6 +100,24 @@ def test_quit_leaves_the_terminal_as_it_was(terminal: Terminal, tmp_path: Path) 
     assert terminal.exit_code() == 0
     assert terminal.restored()
     assert f"{tmp_path / 'session'}: 0 of 6 runs accepted" in terminal.shown
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("terminal", ["10"], indirect=True)
+def test_one_circle_is_measured_and_accepted_wrong_keys_and_all(terminal: Terminal, tmp_path: Path) -> None:
+    terminal.until("then press Enter")
+    terminal.press("zk7\r")
+    terminal.until("touch nothing until it has fed out")
+    terminal.press("a5\x1b")  # there is nothing to accept yet
+    terminal.until("is complete")
+    terminal.press("a")
+    terminal.until("low-ccw-1 accepted")
+    terminal.press("q")
+    assert terminal.exit_code() == 0
+    assert terminal.restored()
+    assert f"{tmp_path / 'session'}: 1 of 6 runs accepted" in terminal.shown
+    (run,) = read_session(tmp_path / "session").runs
+    assert (run.label, run.state) == ("low ccw 1", RunState.ACCEPTED)
 
 
 def test_a_polite_kill_in_mid_circle_keeps_the_recording_and_the_terminal(terminal: Terminal, tmp_path: Path) -> None:

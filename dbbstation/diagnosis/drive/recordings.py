@@ -95,7 +95,7 @@ class Recordings:
             reverses=any(len(s.reversals) > 0 for s in self.signals),
         )
 
-    @property
+    @cached_property
     def samples_apart_s(self) -> float:
         """Time from one sample that is compared to the next [s]."""
         one = self.signals[0]

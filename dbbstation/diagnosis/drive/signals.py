@@ -117,7 +117,24 @@ class Signals:
         travel = np.abs(self.position_m - self.position_m[self.reversals[np.maximum(last, 0)]])
         return np.where(last >= 0, travel, np.inf)
 
-    @property
+    @cached_property
+    def beside_standstill(self) -> NDArray[np.float64]:
+        """Size of what the filters blur of a standstill into the samples beside it, one in it, shape (n,).
+
+        What friction does while a drive sticks, and when exactly it lets go, no model of motion knows.
+        """
+        standing = self.direction == 0.0
+        standing[1:] |= self.direction[1:] * self.direction[:-1] < 0.0
+        at, own = np.flatnonzero(standing), np.arange(len(self.t_s))
+        if not len(at):
+            return np.zeros(len(own))
+        next_one = np.searchsorted(at, own)
+        after = at[np.minimum(next_one, len(at) - 1)] - own
+        before = own - at[np.maximum(next_one - 1, 0)]
+        nearest = np.minimum(np.abs(after), np.abs(before))
+        return np.exp(-nearest * PER_CUTOFF * self.cutoff_hz / (REACH * self.rate_hz))
+
+    @cached_property
     def standing_m_s(self) -> float:
         """Speed below which the drive counts as standing [m/s]."""
         return MOVING_SHARE * float(np.abs(self.speed_m_s).max())

@@ -1,16 +1,18 @@
 """`dbb-jig/1`: the jig plate, its holders and the balls that were measured on it."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 from pydantic_core import PydanticCustomError
 
-from dbbstation.errors import Problem
+from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.quantities import Coordinate, ExpansionUmMK, Point, Quantity, TemperatureDegc
-from dbbstation.files.yaml.schema import Schema, dotted, read_document, validate
-from dbbstation.files.yaml.text import Location, YamlDocument
+from dbbstation.files.yaml.out import yaml_text
+from dbbstation.files.yaml.schema import Schema, dotted, format_of, read_document, validate
+from dbbstation.files.yaml.text import Location, YamlDocument, parse_yaml
 
 BY_CMM, UNDER_SPINDLE = "cmm", "under-spindle"
 """How a ball is placed: where a CMM measured it, or where nobody knows."""
@@ -161,3 +163,44 @@ def _plain_bores(jig: Any) -> dict[int, tuple[float, float]] | None:  # noqa: AN
         for bore, place in bores.items()
         if isinstance(place, tuple) and len(place) == 2 and all(isinstance(c, int | float) for c in place)  # noqa: PLR2004
     }
+
+
+def read_jig(path: Path) -> JigFile:
+    """Read a jig file.
+
+    Raises:
+        InputError: every fault of the file with its place.
+    """
+    faults: list[Problem] = []
+    jig = parse_jig(path, faults)
+    if jig is None or faults:
+        raise InputError(faults)
+    return jig
+
+
+def jig_text(data: dict[str, Any]) -> str:
+    """Return the text of a jig file, balls of the usual kind without saying so."""
+    balls = {
+        name: {k: v for k, v in ball.items() if (k, v) != ("placed", BY_CMM)} for name, ball in data["balls"].items()
+    }
+    return yaml_text({"format": format_of(JigFile), **data, "balls": balls})
+
+
+def checked_jig(text: str, file: str) -> JigFile:
+    """Return the jig that a text holds, checked as a file is.
+
+    Args:
+        text: of a jig file.
+        file: to name in messages: what the text was made from.
+
+    Raises:
+        InputError: everything that no jig file may say.
+    """
+    faults: list[Problem] = []
+    document = parse_yaml(text, file, faults)
+    jig = None if document is None else validate(document, JigFile, faults)
+    if document is not None:
+        check_balls(document, document.data.get("jig"), document.data.get("holders"), faults)
+    if jig is None or faults:
+        raise InputError([replace(fault, line=0, column=0) for fault in faults])
+    return jig

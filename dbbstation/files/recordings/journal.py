@@ -60,8 +60,13 @@ def run_foot(counts: Counts) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def run_line(values: Sequence[float | str], names: Sequence[str]) -> bytes:
+def run_line(values: Sequence[float | str], names: Sequence[str], *, exact: bool = False) -> bytes:
     """Return one line of a run file with its checksum.
+
+    Args:
+        values: one per column.
+        names: of the columns, without the checksum.
+        exact: write as many digits as it takes to read back the same bits.
 
     Raises:
         ValueError: a number that is not finite, or a text with a comma or line end in it.
@@ -75,7 +80,7 @@ def run_line(values: Sequence[float | str], names: Sequence[str]) -> bytes:
             continue
         if not math.isfinite(value):
             raise ValueError(f"{name} is {value}; a sample without a value has no place in a run")
-        fields.append(f"{value:.{columns.COLUMNS[name].decimals}f}")
+        fields.append(repr(value) if exact else f"{value:.{columns.COLUMNS[name].decimals}f}")
     body = ",".join(fields).encode()
     return body + f",{zlib.crc32(body):08x}\n".encode()
 

@@ -40,6 +40,7 @@ class RunFile:
         recording: the samples.
         header: what the `# key: value` lines say, by key.
         unknown_columns: text of columns that this program does not know, by name, one entry per sample.
+        status: what the instrument said of each sample; empty where nothing was noted.
         warnings: what was found that does not spoil the run.
         sha256: of the file's bytes as they were read.
     """
@@ -49,6 +50,7 @@ class RunFile:
     unknown_columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     warnings: tuple[Problem, ...] = ()
     sha256: str = ""
+    status: tuple[str, ...] = ()
 
 
 def read_run(path: Path, *, sha256: str = "") -> RunFile:
@@ -107,6 +109,7 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
         unknown_columns={name: tuple(lines.texts(name)) for name in lines.unknown},
         warnings=tuple(_few(warnings, file)),
         sha256=sha256,
+        status=tuple(lines.texts(columns.STATUS)) if columns.STATUS in lines.columns else (),
     )
 
 

@@ -7,12 +7,16 @@ import math
 import re
 import zlib
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import Problem
 from dbbstation.files.source_text import decode, shortened
 from dbbstation.trace import columns
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 _COMMA, _NEWLINE = ord(","), ord("\n")
 _CRC_LENGTH = 8
@@ -138,6 +142,18 @@ def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
     while rows and rows[-1].startswith(b"#"):
         header |= _said(rows.pop())
     return Lines(file, header, at + 1, names, rows, range(at + 2, at + 2 + len(rows)), ended)
+
+
+def split_head(path: Path, faults: list[Problem]) -> tuple[str, ...]:
+    """Return the columns of a run file without reading its samples; none, with the reason in `faults`, where it has none."""
+    try:
+        with path.open("rb") as file:
+            head = next((line for line in file if line.strip() and not line.startswith((b"#", b"\xef\xbb\xbf#"))), b"")
+    except OSError as error:
+        faults.append(Problem(str(path), 0, 0, f"cannot be read: {(error.strerror or '').lower()}", "check the file"))
+        return ()
+    text = decode(head, str(path), faults)
+    return () if not text else tuple(name.strip() for name in text.split(","))
 
 
 def _said(line: bytes) -> dict[str, str]:

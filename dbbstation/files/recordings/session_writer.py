@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError, Problem
@@ -52,6 +52,10 @@ class FinishedRun:
         started: when the first sample was taken; None where that means nothing.
         program: name and bytes of the NC program that was commanded, None for the plan's circle.
         model_sha256: of the model that the program was compensated with.
+        state: as the session notes it.
+        reason: why it was rejected; empty otherwise.
+        texts: columns that are no numbers, such as `status`, n texts each.
+        exact: write as many digits as it takes to read back the same bits, not those that instruments resolve.
     """
 
     test: str
@@ -62,6 +66,10 @@ class FinishedRun:
     started: datetime | None = None
     program: tuple[str, bytes] | None = None
     model_sha256: str = ""
+    state: RunState = RunState.ACCEPTED
+    reason: str = ""
+    texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    exact: bool = False
 
 
 def write_session(
@@ -70,13 +78,22 @@ def write_session(
     plan: InlinePlan,
     runs: Sequence[FinishedRun],
     details: SessionDetails | None = None,
+    more: Mapping[str, str | bytes] | None = None,
 ) -> None:
-    """Write a whole session at once, every run accepted; all of it or nothing.
+    """Write a whole session at once; all of it or nothing.
+
+    Args:
+        folder: of the session.
+        machine: nominal.
+        plan: as run.
+        runs: in order.
+        details: what it notes beside them.
+        more: further files by path in the folder.
 
     Raises:
         OutputError: the folder exists already, or cannot be written.
     """
-    files: dict[str, str | bytes] = {}
+    files: dict[str, str | bytes] = dict(more or {})
     entries = []
     for run in runs:
         name = f"{RUNS}/{run_name(run.test, run.direction, run.repeat)}"
@@ -91,8 +108,8 @@ def write_session(
             direction=run.direction,
             repeat=run.repeat,
             mounting=run.mounting,
-            state=RunState.ACCEPTED,
-            reason="",
+            state=run.state,
+            reason=run.reason,
             started=run.started,
             path=folder / name,
             sha256=hashlib.sha256(data).hexdigest(),
@@ -374,7 +391,7 @@ class SessionWriter:
 
 
 def _run_bytes(run: FinishedRun) -> bytes:
-    names = tuple(run.columns)
-    rows = zip(*(values.tolist() for values in run.columns.values()), strict=True)
+    names = (*run.columns, *run.texts)
+    rows = zip(*(values.tolist() for values in run.columns.values()), *run.texts.values(), strict=True)
     header = run_header(run.test, run.direction, run.repeat, names)
-    return header + b"".join([run_line(row, names) for row in rows])
+    return header + b"".join([run_line(row, names, exact=run.exact) for row in rows])

@@ -19,6 +19,7 @@ FORMATS = {
     "dbb-model": "a model",
     "dbb-settings": "a shop's settings",
     "dbb-bar": "the calibration of a bar",
+    "dbb-mapping": "the mapping of recordings made elsewhere",
 }
 """Every format by the name before its version, with what it is called in messages."""
 

@@ -52,8 +52,9 @@ def blocks(text: str, file: str, faults: list[Problem]) -> list[Block]:
     for number, line in enumerate(lines[first:], first + 1):
         if percent and _is_percent(line):
             return found
+        place = Place(file, number)
         try:
-            block = _block(_one_line(line, Place(file, number)), Place(file, number))
+            block = _block(_one_line(line, place), place)
         except BadLine as fault:
             faults.append(fault.problem)
             if len(faults) >= MOST_FAULTS:
@@ -93,12 +94,12 @@ def _one_line(line: str, place: Place) -> str:
     Raises:
         BadLine: it is longer than LinuxCNC reads, or has a character in it that some programs take for the end of a line.
     """
-    line_bytes = len(line.encode("utf-8", "surrogatepass"))
+    line_bytes = len(line) if line.isascii() else len(line.encode("utf-8", "surrogatepass"))
     if line_bytes > LONGEST_BYTES:
         what = f"the line has {line_bytes} characters"
         raise place.fault(LONGEST_BYTES + 1, what, f"LinuxCNC reads {LONGEST_BYTES}: write it as two lines")
     line = line.removesuffix("\r")
-    control = _CONTROL.search(line)
+    control = None if line.isprintable() else _CONTROL.search(line)
     if control is not None:
         what = f"the control character U+{ord(control[0]):04X}, which ends a line for some programs and not for others"
         raise place.fault(control.start() + 1, what, "remove it, or end the line with a line feed")

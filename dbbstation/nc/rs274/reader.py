@@ -136,6 +136,8 @@ class _Interpreter:
 
     def _shared_words(self, block: Block) -> None:
         """Refuse codes in one line that take the same word, or of which one undoes the other."""
+        if not block.codes:
+            return
         users = [self._in_line(block, Group.ONCE, {DWELL}), self._in_line(block, Group.PATH, {64.0})]
         users += [self._in_line(block, Group.MOTION, {CLOCKWISE, COUNTER_CLOCKWISE}) or self._modal_arc(block)]
         both = [code for code in users if code]
@@ -165,6 +167,8 @@ class _Interpreter:
         return word.value
 
     def _modes(self, block: Block) -> None:
+        if not block.codes:
+            return
         distance, centres = block.code(Group.DISTANCE), block.code(Group.ARC_DISTANCE)
         if distance is not None:
             self._absolute = distance == 90.0  # noqa: PLR2004
@@ -198,7 +202,7 @@ class _Interpreter:
         if machine is not None:
             self._check_machine(machine, block, named)
         # LinuxCNC makes a move to where it stands of a motion code alone.
-        stays = motion in {RAPID, LINEAR} and not named and not np.isnan(self._pose).any()
+        stays = not named and motion in {RAPID, LINEAR} and not np.isnan(self._pose).any()
         if motion == LINEAR:
             self._check_feed(block, _first_column(block))
         if not named and not is_turn and not stays:
@@ -233,21 +237,21 @@ class _Interpreter:
 
     def _target(self, block: Block) -> NDArray[np.float64]:
         """Pose that a block leads to, shape (6,)."""
-        target = self._pose.copy()
+        target: list[float] = self._pose.tolist()  # six numbers are sooner done without arrays
         for axis, letter in enumerate(AXES):
             word = block.words.get(letter)
             if word is not None:
                 value = word.value * (self._unit_mm if axis < 3 else 1.0)  # noqa: PLR2004
                 target[axis] = value if self._absolute else target[axis] + value
-        unknown = [letter for letter, value in zip(AXES, target, strict=True) if np.isnan(value)]
+        unknown = [letter for letter, value in zip(AXES, target, strict=True) if math.isnan(value)]
         if unknown:
             what = f"nobody knows where {', '.join(unknown)} stand{'s' if len(unknown) == 1 else ''} before this move"
             remedy = "name all six axes in the first move, absolutely (G90), or say where the machine stands"
             raise block.place.fault(_first_column(block), what, remedy)
-        if np.abs(target[:3]).max() > FARTHEST_MM or np.abs(target[3:]).max() > FARTHEST_DEG:
+        if max(map(abs, target[:3])) > FARTHEST_MM or max(map(abs, target[3:])) > FARTHEST_DEG:
             what = f"this move leads beyond {FARTHEST_MM:g} mm or {FARTHEST_DEG:g} degrees"
             raise block.place.fault(_first_column(block), what, "check its numbers, and G91 and G20 before it")
-        return target
+        return np.array(target)
 
     def _chords(self, block: Block, target: NDArray[np.float64]) -> NDArray[np.float64]:
         arc = self._arc(block, target)

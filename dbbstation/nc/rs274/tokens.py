@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from dbbstation.errors import Problem
 
@@ -40,8 +40,7 @@ _NOT_READ = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Word:
+class Word(NamedTuple):
     """A letter, in capitals, with its number.
 
     Attributes:
@@ -87,18 +86,19 @@ def tokens(text: str, place: Place) -> Iterator[Word | str]:
         if match is None:
             raise _unreadable(text, position, place)
         position = match.end()
-        if match["letter"]:
+        kind = match.lastgroup
+        if kind == "number":
             yield _word(match, place)
-        elif match["end"] is not None:
+        elif kind == "end":
             return
         else:
-            comment = match["comment"] if match["comment"] is not None else match["rest"]
-            yield comment.strip()
+            yield match[kind or 0].strip()
 
 
 def _word(match: re.Match[str], place: Place) -> Word:
-    letter, column = match["letter"].upper(), match.start("letter") + 1
-    number = match["number"].replace(" ", "").replace("\t", "")
+    letter, number = match.group("letter", "number")
+    letter, column = letter.upper(), match.start("letter") + 1
+    number = number.replace(" ", "").replace("\t", "")
     if letter == "N" and not number.isdecimal():
         raise place.fault(column, f"N{number} is no line number", "write a whole number, or none")
     value = float(number)

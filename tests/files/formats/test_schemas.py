@@ -20,6 +20,7 @@ EXAMPLES = {
     "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
     "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
     "dbb-settings/2": [FIXTURES / "settings" / "every-key.yaml"],
+    "dbb-mapping/1": [FIXTURES / "mappings" / "every-key.yaml"],
     "dbb-bar/1": [FIXTURES / "bars" / "zerodur.yaml"],
     "dbb-model/3": [FIXTURES / "models" / "provenance.yaml"],
     "dbb-session/3": [SESSIONS / "sealed" / "session.yaml", SESSIONS / "under-spindle" / "session.yaml"],

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.station import events
+from dbbstation.station.programs import read_toolpath
 from dbbstation.station.states import State
 from dbbstation.virtual.cell import VirtualCell
 from dbbstation.virtual.machine import VirtualMachine
+from dbbstation.virtual.path import path_of
 from dbbstation.virtual.truth import random_kinematics
 from dbbstation.virtual.wire import VirtualInstrument
 from dbbstation.virtual.wire_clock import ScaledClock
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.circle import Direction
     from dbbstation.plan.plan import Plan
+    from dbbstation.station.programs import RunProgram
 
 
 class Helper:
@@ -30,10 +35,12 @@ class Helper:
 
     Args:
         cell: what is helped at.
+        programs: NC programs that command runs, by test and direction; those that have none are plain circles.
     """
 
-    def __init__(self, cell: VirtualCell) -> None:
+    def __init__(self, cell: VirtualCell, programs: Mapping[tuple[str, Direction], RunProgram] | None = None) -> None:
         self._cell = cell
+        self._programs = programs or {}
         self._announced: events.RunAnnounced | None = None
 
     def __call__(self, event: events.Event) -> None:
@@ -51,7 +58,9 @@ class Helper:
             run = self._announced.run
             if self._announced.put_up:
                 self._cell.mount(run.test)
-            self._cell.start(run.test, run.direction)
+            program = self._programs.get((run.test, run.direction))
+            path = None if program is None else path_of(read_toolpath(Path(program.name), program.content))
+            self._cell.start(run.test, run.direction, path)
 
 
 @dataclass(frozen=True)
@@ -73,9 +82,23 @@ class VirtualPlace:
 
 @contextmanager
 def virtual_place(
-    machine: Machine, plan: Plan, protocol: Protocol, *, time_scale: float, seed: int = 0
+    machine: Machine,
+    plan: Plan,
+    protocol: Protocol,
+    *,
+    time_scale: float,
+    seed: int = 0,
+    programs: Mapping[tuple[str, Direction], RunProgram] | None = None,
 ) -> Iterator[VirtualPlace]:
     """Switch on a machine with errors drawn at random, and an instrument that reads the bar on it.
+
+    Args:
+        machine: nominal machine.
+        plan: what can be run on it.
+        protocol: of the instrument.
+        time_scale: how much faster than real time it goes.
+        seed: of the errors; the same seed makes the same machine.
+        programs: NC programs that command runs, by test and direction.
 
     Raises:
         TravelError: a circle leaves the travel.
@@ -86,4 +109,4 @@ def virtual_place(
     clock = ScaledClock(time_scale)
     cell = VirtualCell(virtual, clock)
     with VirtualInstrument(protocol, cell.length_mm_at, clock=clock) as wire:
-        yield VirtualPlace(wire.port, clock, Helper(cell), wire)
+        yield VirtualPlace(wire.port, clock, Helper(cell, programs), wire)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TypedDict
 
+RECONNECT_S = 30.0
+"""How long a measurement waits for an adapter whose cable was pulled out: time to see it and to put it back [s]."""
+
 _MEMORY_S = 2.0
 """How long the driver remembers the quickest arrival of samples; longer, the instrument's clock would drift [s]."""
 

@@ -1,0 +1,62 @@
+"""Asking for what the command line lacks: on a terminal a question, in a pipe one refusal that names every option."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+class Asker:
+    """Asks one thing after the other; where nobody can answer it gathers what is missing."""
+
+    def __init__(self) -> None:
+        self.terminal = sys.stdin.isatty() and sys.stderr.isatty()
+        self._missing: list[str] = []
+
+    def text(self, question: str, option: str, choices: Sequence[str] = (), default: str | None = None) -> str:
+        """Return an answer; empty where nobody can give one, which `check` refuses then.
+
+        Args:
+            question: as shown.
+            option: that says the same on the command line.
+            choices: the only answers that are taken; empty: any.
+            default: what Enter means; None: an answer is needed.
+        """
+        if not self.terminal:
+            self._missing.append(f"{option} ({question})")
+            return ""
+        kind = click.Choice(list(choices)) if choices else None
+        return str(click.prompt(question, type=kind, default=default, show_default=bool(default), err=True))
+
+    def number(self, question: str, option: str, *, needed: bool = False) -> float | None:
+        """Return a number; None where nobody can give one, or where Enter says that nobody knows it.
+
+        Args:
+            question: as shown.
+            option: that says the same on the command line.
+            needed: Enter does not do.
+        """
+        if not self.terminal:
+            self.text(question, option)
+            return None
+        while True:
+            answer = self.text(question if needed else f"{question}, Enter where nobody knows", option, default="")
+            try:
+                if answer or not needed:
+                    return float(answer.replace(",", ".")) if answer else None
+            except ValueError:
+                click.echo(f"`{answer}` is not a number", err=True)
+
+    def check(self) -> None:
+        """Refuse to go on without what could not be asked.
+
+        Raises:
+            click.UsageError: names every option that is missing.
+        """
+        if self._missing:
+            raise click.UsageError("what the files do not say has to be given:\n  " + "\n  ".join(self._missing))

@@ -1,0 +1,303 @@
+"""`dbbstation import`: recordings made elsewhere, as a session."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dbbstation.cli.mapping_options import mapping_options
+from dbbstation.cli.session_options import noted_options, session_details
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from dbbstation.cli.asking import Asker
+    from dbbstation.files.formats.mapping import MappingFile
+    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.recordings.foreign_csv import ForeignTable
+    from dbbstation.files.recordings.session_details import SessionDetails
+    from dbbstation.imported.runs import ImportedRun, Reader, RunName
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.plan import Plan
+
+CONDITIONS = ("temperature", "operator", "job", "bar")
+"""What a session notes and no table says."""
+
+
+@click.command("import")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE.csv...")
+@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Session folder to make.")
+@click.option("--plan", type=click.Path(path_type=Path), help="Test plan whose circles were run.")
+@click.option("--machine", type=click.Path(path_type=Path), help="The machine, as its controller believed it.")
+@mapping_options
+@click.option(
+    "--run",
+    "named",
+    multiple=True,
+    metavar="FILE=TEST-DIRECTION",
+    help="Which run a file is, such as old1.csv=a-ccw or old1.csv=a-ccw-2, where the file does not say it.",
+)
+@noted_options
+@click.option("--job", default="", help="What it was measured for.")
+@click.option(
+    "--not-known",
+    multiple=True,
+    type=click.Choice(CONDITIONS),
+    help="A condition that nobody knows any more; the session notes that. May be given more than once.",
+)
+@click.option("--yes", is_flag=True, help="Write without asking.")
+@click.option("--dry-run", is_flag=True, help="Show what would be written, try it out, and write nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def import_(
+    files: tuple[Path, ...],
+    *,
+    out: Path,
+    plan: Path | None,
+    machine: Path | None,
+    named: tuple[str, ...],
+    job: str,
+    not_known: tuple[str, ...],
+    yes: bool,
+    dry_run: bool,
+    as_json: bool,
+    **options: Any,  # noqa: ANN401 - those of the mapping and of the conditions
+) -> None:
+    r"""Take recordings that another program made into a sealed session.
+
+    Tables with angle or time, and deviation or length. What the columns mean is guessed from their names, shown, and kept in the
+    file of --mapping for the next time. What the files do not say is asked for on a terminal; in a pipe it has to be given. What is
+    computed, such as times from angles at the plan's feed, is said and noted in the session. The files as they came, the mapping
+    and all statements stay in the session's folder `imported`.
+
+    \b
+    Examples:
+      dbbstation import old/*.csv --out session --plan plan.yaml --machine machine.yaml --mapping old-program.yaml
+      dbbstation import a.csv --out session --plan plan.yaml --machine machine.yaml --run a.csv=a-ccw \
+        --column Winkel=angle:deg --column Abw=deviation:µm --zero-mm 150.0003 --angle-grows ccw --angle-zero-deg 0 \
+        --ambient-temp-c 20.4 --operator Mori --not-known job --not-known bar --dry-run
+    """
+    from dbbstation.cli.asking import Asker
+    from dbbstation.cli.mapping_options import MAPPING_OPTIONS
+    from dbbstation.errors import OutputError
+    from dbbstation.files.atomic import refuse_existing
+    from dbbstation.files.formats.mapping import write_mapping
+    from dbbstation.imported.session import write_imported
+
+    if out.exists():
+        raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
+    of_mapping = {name: options.pop(name) for name in MAPPING_OPTIONS}
+    remembered: Path | None = of_mapping["mapping_file"]
+    if remembered is not None and remembered.exists():
+        remembered = None
+    elif remembered is not None:
+        refuse_existing(remembered, force=False)
+    asker = Asker()
+    found = _read(asker, files, of_mapping, (plan, machine), named, options, job, not_known)
+    writes = (out, found.machine, found.plan, found.runs, found.details, found.more)
+    write_imported(*writes, dry=True)
+    if not as_json:
+        _show(found)
+    if not dry_run:
+        _confirm(asker, f"write {len(found.runs)} runs to {out}?", yes=yes)
+        write_imported(*writes, dry=False)
+        if remembered is not None:
+            write_mapping(remembered, found.mapping)
+    if as_json:
+        _print_json(found, out, written=not dry_run)
+    elif dry_run:
+        click.echo("nothing was written (--dry-run)")
+    else:
+        kept = "" if remembered is None else f", the mapping to {remembered}"
+        click.echo(f"{len(found.runs)} runs written to {out}{kept}")
+
+
+@dataclass(frozen=True)
+class _Import:
+    """Everything that will be written."""
+
+    mapping: MappingFile
+    plan: InlinePlan
+    machine: Machine
+    runs: Sequence[ImportedRun]
+    details: SessionDetails
+    statements: Sequence[str]
+    more: Mapping[str, str | bytes]
+
+
+def _read(
+    asker: Asker,
+    files: Sequence[Path],
+    of_mapping: Mapping[str, Any],
+    paths: tuple[Path | None, Path | None],
+    named: Sequence[str],
+    options: dict[str, Any],
+    job: str,
+    not_known: Sequence[str],
+) -> _Import:
+    """Read everything, and ask for what is missing."""
+    from dataclasses import replace
+    from datetime import UTC, datetime
+
+    from dbbstation.cli.mapping_options import chosen_mapping, read_tables
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.files.formats.machine import read_machine
+    from dbbstation.files.formats.plan import read_inline_plan
+    from dbbstation.files.recordings.entries import Note
+    from dbbstation.imported.runs import Reader
+    from dbbstation.imported.session import originals
+
+    tables = read_tables(files, of_mapping)
+    chosen = chosen_mapping(list(tables.values()), of_mapping, asker)
+    plan = paths[0] or Path(asker.text("test plan whose circles were run", "--plan"))
+    machine = paths[1] or Path(asker.text("file of the machine", "--machine"))
+    options, job = _conditions(asker, options, job, not_known)
+    asker.check()
+    mapping, inline, nominal = chosen(), read_inline_plan(plan), read_machine(machine)
+    planned = inline.to_domain()
+    told = _told(files, named, planned)
+    reader = Reader(mapping, planned)
+    runs: list[ImportedRun] = []
+    for path, table in tables.items():
+        runs += reader.read(table, told.get(path) or _asked_run(asker, reader, table, planned))
+    reader.check()
+    statements = [*_statements(mapping, runs, job, not_known), *reader.left_out]
+    now = datetime.now(UTC).replace(microsecond=0)
+    notes = tuple(Note(now, f"imported: {text}") for text in statements)
+    details = replace(session_details(**options, stroke_mm=None), notes=notes)
+    more = originals({path: table.data for path, table in tables.items()}, mapping, provenance(), statements)
+    return _Import(mapping, inline, nominal, runs, details, statements, more)
+
+
+def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
+    """Have what was shown confirmed.
+
+    Raises:
+        click.UsageError: nobody is there to confirm it.
+        click.Abort: it was not.
+    """
+    if not yes and not asker.terminal:
+        raise click.UsageError("nothing was written: give --yes to write what is shown, or --dry-run to look only")
+    if not yes:
+        click.confirm(question, abort=True, err=True)
+
+
+def _print_json(found: _Import, out: Path, *, written: bool) -> None:
+    from dbbstation.cli.output import print_json
+
+    runs = [
+        {
+            "file": Path(one.file).name,
+            "run": one.name,
+            "samples": len(one.run.columns["t_s"]),
+            "computed": list(one.computed),
+        }
+        for one in found.runs
+    ]
+    told = {"session": str(out), "written": written, "mapping": found.mapping.model_dump(exclude_none=True)}
+    print_json({**told, "runs": runs, "statements": list(found.statements)})
+
+
+def _conditions(
+    asker: Asker, options: dict[str, Any], job: str, not_known: Sequence[str]
+) -> tuple[dict[str, Any], str]:
+    """Ask for conditions that neither option nor settings state."""
+    if options["ambient_temp_c"] is None and "temperature" not in not_known:
+        options["ambient_temp_c"] = asker.number(
+            "temperature of the shop [degC]", _or("--ambient-temp-c", "temperature")
+        )
+    if not options["operator"] and "operator" not in not_known:
+        options["operator"] = asker.text("who measured", _or("--operator", "operator"), default="")
+    if not job and "job" not in not_known:
+        job = asker.text("what it was measured for", _or("--job", "job"), default="")
+    if options["bar_file"] is None and options["bar_length_mm"] is None and "bar" not in not_known:
+        option = _or("--bar FILE, or --bar-length-mm with --bar-uncertainty-um", "bar")
+        options["bar_length_mm"] = asker.number("calibrated length of the bar [mm]", option)
+        if options["bar_length_mm"] is not None:
+            options["bar_uncertainty_um"] = asker.number("its standard uncertainty [µm]", "--bar-uncertainty-um")
+    return options, job
+
+
+def _or(option: str, condition: str) -> str:
+    return f"{option}, or --not-known {condition}"
+
+
+def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path, RunName]:
+    """Which run each file is, as `--run` says."""
+    from dbbstation.imported.runs import run_name
+
+    found = {}
+    for text in named:
+        name, _, said = text.rpartition("=")
+        matching = [path for path in files if name in {str(path), path.name}]
+        run = run_name(said, list(plan.tests))
+        if len(matching) != 1:
+            raise click.UsageError(f"--run {text}: {name or 'it'} names {len(matching)} of the files that are given")
+        if run is None:
+            raise click.UsageError(
+                f"--run {text}: {said} is no run of the plan, whose tests are {', '.join(plan.tests)}"
+            )
+        found[matching[0]] = run
+    return found
+
+
+def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) -> RunName:
+    """Which run a file is; asked for where neither its rows nor its name say it."""
+    from dbbstation.imported.runs import RunName, run_name
+
+    if not asker.terminal or reader.says_test(table):
+        return RunName()
+    while True:
+        answer = asker.text(
+            f"which run is {Path(table.table.file).name}, such as {next(iter(plan.tests))}-ccw", "--run"
+        )
+        found = run_name(answer, list(plan.tests))
+        if found is not None:
+            return found
+        click.echo(f"the plan's tests: {', '.join(plan.tests)}; directions: ccw, cw", err=True)
+
+
+def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], job: str, not_known: Sequence[str]) -> list[str]:
+    """What somebody who reads the session later has to know of it."""
+    from dbbstation.files.formats.mapping import ANGLE, DEVIATION
+
+    files = ", ".join(dict.fromkeys(Path(one.file).name for one in runs))
+    found = [f"from {files}: kept in the folder `imported`", *([f"job: {job}"] if job else [])]
+    if mapping.column(DEVIATION) is not None:
+        found.append(f"lengths are the deviations plus {mapping.zero_mm} mm, a positive deviation is a longer bar")
+    if mapping.column(ANGLE) is not None and mapping.angle is not None:
+        zero = "the start of the turn" if mapping.angle.zero_deg is None else f"{mapping.angle.zero_deg:g} degrees"
+        found.append(f"angle 0 of the files is {zero}, their angles grow with {mapping.angle.grows}")
+    by_text: dict[str, list[str]] = {}
+    for one in runs:
+        for text in one.computed:
+            by_text.setdefault(text, []).append(one.name)
+    for text, names in by_text.items():
+        found.append(f"{text} ({'every run' if len(names) == len(runs) else ', '.join(names)})")
+    return [*found, *(f"nobody knows: {one}" for one in not_known)]
+
+
+def _show(found: _Import) -> None:
+    from dbbstation.cli.output import print_table
+    from dbbstation.trace.columns import LENGTH, TIME
+
+    print_table(
+        ["column", "means", "unit"], [[name, one.means, one.unit or ""] for name, one in found.mapping.columns.items()]
+    )
+    click.echo()
+    rows = []
+    for one in found.runs:
+        length, t_s = one.run.columns[LENGTH], one.run.columns[TIME]
+        span = f"{float(length.min()):.4f} to {float(length.max()):.4f}"
+        rows.append(
+            [Path(one.file).name, one.name, str(len(t_s)), f"{t_s[-1] - t_s[0]:.2f}", span, one.run.state.value]
+        )
+    print_table(["file", "run", "samples", "t [s]", "length [mm]", "state"], rows)
+    details = found.details
+    bar = "not known" if details.bar is None else f"{details.bar.calibrated_length_mm:.4f} mm"
+    temp = "not known" if details.ambient_temp_c is None else f"{details.ambient_temp_c:g} degC"
+    click.echo(f"\noperator {details.operator or 'not known'}, temperature {temp}, bar {bar}")
+    for text in found.statements:
+        click.echo(f"- {text}")

@@ -1,0 +1,325 @@
+"""`dbbstation jig`: the jig file from what a coordinate measuring machine found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from dbbstation.cli.number_types import Finite
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from dbbstation.files.formats.jig import JigFile
+    from dbbstation.plan.repeatability import Repeatability
+
+_UNITS = ("mm", "µm", "um", "m", "inch", "mil", "µinch")
+_SHEET = click.argument("sheet", type=click.Path(path_type=Path), metavar="SHEET")
+_UNIT = click.option(
+    "--unit", type=click.Choice(_UNITS), default="mm", show_default=True, help="Of a table's coordinates."
+)
+_COLUMN = click.option(
+    "--column",
+    "columns",
+    multiple=True,
+    metavar="WHAT=NAME",
+    help="Which column is what: ball, bore, holder, x, y, z, u or ux, uy, uz, such as x=Ist_X  [default: by their names].",
+)
+_JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+_FORCE = click.option("--force", is_flag=True, help="Replace an existing file.")
+
+
+@click.group()
+def jig() -> None:
+    """Make a jig file from the sheet of a coordinate measuring machine; find how well holders repeat.
+
+    \b
+    Examples:
+      dbbstation jig sheet cmm.csv --jig plate.yaml --u-um 0.8 --out plate-2026.yaml
+      dbbstation jig holders mountings.csv --jig plate.yaml --out plate-2026.yaml
+    """  # noqa: D301 (click reads the escape)
+
+
+@jig.command()
+@_SHEET
+@click.option(
+    "--jig", "before", required=True, type=click.Path(path_type=Path), help="Jig file whose plate and holders stay."
+)
+@_COLUMN
+@_UNIT
+@click.option(
+    "--name", "names", multiple=True, metavar="LABEL=BALL", help="Ball of the jig that the sheet calls otherwise."
+)
+@click.option(
+    "--k", "coverage", type=Finite(0.5, 5), help="Coverage factor of the sheet's uncertainties, 2 for U (k = 2)."
+)
+@click.option(
+    "--u-um", type=Finite(0.01, 1000), help="Standard uncertainty of a coordinate where the sheet states none [µm]."
+)
+@click.option("--cmm-temp-c", type=Finite(-30, 80), help="Temperature of the plate while it was measured [degC].")
+@click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False), help="Jig file to write.")
+@_FORCE
+@_JSON
+def sheet(
+    sheet: Path,
+    *,
+    before: Path,
+    columns: tuple[str, ...],
+    unit: str,
+    names: tuple[str, ...],
+    coverage: float | None,
+    u_um: float | None,
+    cmm_temp_c: float | None,
+    out: Path,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Write a jig file with the balls that a CMM sheet has: a table, or measured features in DMIS (.dmo, .dmi, .dmis, .out).
+
+    Coordinates are in the jig's frame. Plate and holders are those of --jig. Uncertainties of three axes become one, their root mean
+    square: a jig file has one per ball. Each ball is shown with its change against the jig before.
+
+    \b
+    Examples:
+      dbbstation jig sheet cmm.csv --jig plate.yaml --column x=Ist_X --column y=Ist_Y --column z=Ist_Z --column u=U --k 2 --out new.yaml
+      dbbstation jig sheet plate.dmo --jig plate.yaml --name SPH1=9-short --u-um 0.8 --cmm-temp-c 20.1 --out new.yaml
+    """  # noqa: D301 (click reads the escape)
+    from dbbstation.cli.output import print_json, print_table
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.files.formats.jig import jig_text, read_jig
+    from dbbstation.files.provenance import refuse_existing_table, write_table
+    from dbbstation.files.recordings.cmm_sheet import jig_of_sheet, read_sheet
+
+    refuse_existing_table(out, force=force)
+    old = read_jig(before)
+    measured = read_sheet(sheet, _pairs(columns, "--column", _WHAT), unit.replace("um", "µm"), coverage)
+    new = jig_of_sheet(
+        old,
+        measured,
+        str(sheet),
+        names=_pairs(names, "--name"),
+        uncertainty_um=u_um,
+        cmm_temp_c=cmm_temp_c,
+    )
+    write_table(out, jig_text(new.model_dump(exclude_none=True)), provenance(), force=force)
+    balls = {name: _change_um(old, name, ball.centre_mm) for name, ball in new.balls.items()}
+    lost = [name for name in old.balls if name not in new.balls]
+    if as_json:
+        told = {
+            name: {"centre_mm": list(new.balls[name].centre_mm), "change_um": change} for name, change in balls.items()
+        }
+        print_json({"jig": str(out), "balls": told, "not_in_the_sheet": lost})
+        return
+    rows = [
+        [
+            name,
+            *(f"{value:.4f}" for value in new.balls[name].centre_mm),
+            f"{new.balls[name].uncertainty_um:.2f}",
+            *_texts(change),
+        ]
+        for name, change in balls.items()
+    ]
+    print_table(["ball", "x [mm]", "y [mm]", "z [mm]", "u [µm]", "dx [µm]", "dy [µm]", "dz [µm]"], rows)
+    if lost:
+        click.echo(f"not in the sheet, and not in the new file: {', '.join(lost)}")
+    if cmm_temp_c is None:
+        click.echo("the file does not say how warm the plate was on the CMM: give --cmm-temp-c")
+    click.echo(f"{len(balls)} balls written to {out}")
+
+
+@jig.command()
+@_SHEET
+@_COLUMN
+@_UNIT
+@click.option("--holder", help="Holder that all rows are of, where the table does not say it.")
+@click.option(
+    "--cmm-repeatability-um",
+    type=Finite(0, 100),
+    default=0.0,
+    help="Standard deviation of what the CMM reads of a ball that stays; its variance is taken off  [default: 0].",
+)
+@click.option(
+    "--jig", "before", type=click.Path(path_type=Path), help="Jig file whose holders get the result; with --out."
+)
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Jig file to write.")
+@_FORCE
+@_JSON
+def holders(
+    sheet: Path,
+    *,
+    columns: tuple[str, ...],
+    unit: str,
+    holder: str | None,
+    cmm_repeatability_um: float,
+    before: Path | None,
+    out: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Find how well holders put their ball back, from centres over repeated mountings [CAL III-B].
+
+    One row per mounting, with holder, bore (or ball) and x, y, z. Ten mountings in each place are usual. Deviations from the mean of
+    each place count. The standard deviation per axis, with its chi-square interval, is what a jig file calls `repeatability_um`.
+
+    \b
+    Examples:
+      dbbstation jig holders mountings.csv
+      dbbstation jig holders mountings.csv --cmm-repeatability-um 0.3 --jig plate.yaml --out plate-2026.yaml
+    """  # noqa: D301 (click reads the escape)
+    from dbbstation.cli.output import print_json
+    from dbbstation.errors import InputError, Problem
+    from dbbstation.files.provenance import refuse_existing_table
+    from dbbstation.files.recordings.cmm_sheet import read_sheet
+    from dbbstation.plan.repeatability import repeatability
+
+    if (before is None) != (out is None):
+        raise click.UsageError(
+            "--jig and --out belong together: the holders of one get the result, the other is written"
+        )
+    if out is not None:
+        refuse_existing_table(out, force=force)
+    rows = read_sheet(sheet, _pairs(columns, "--column", _WHAT), unit.replace("um", "µm"), 1.0, of_one_holder=True)
+    found: dict[str, Repeatability] = {}
+    try:
+        for name, places in _by_holder(rows, holder, sheet).items():
+            found[name] = repeatability(places, cmm_repeatability_um)
+    except ValueError as error:
+        raise InputError(
+            [Problem(str(sheet), 0, 0, str(error), "put each ball up at least twice, ten times is usual")]
+        ) from error
+    if before is not None and out is not None:
+        _write_holders(found, before, out, sheet, force=force)
+    if as_json:
+        told = {name: _summary(one) for name, one in found.items()}
+        print_json({"holders": told, "jig": None if out is None else str(out)})
+        return
+    _print_holders(found)
+    if out is not None:
+        click.echo(f"holders written to {out}")
+
+
+def _write_holders(found: Mapping[str, Repeatability], before: Path, out: Path, sheet: Path, *, force: bool) -> None:
+    """Write a jig file as before, with what was found of its holders.
+
+    Raises:
+        InputError: the jig has no such holder.
+        OutputError: the file cannot be written.
+    """
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.errors import InputError, Problem
+    from dbbstation.files.formats.jig import checked_jig, jig_text, read_jig
+    from dbbstation.files.provenance import write_table
+
+    old = read_jig(before)
+    unknown = [name for name in found if name not in old.holders]
+    if unknown:
+        what = f"the jig has no holder {', '.join(unknown)}"
+        raise InputError([Problem(str(before), 0, 0, what, f"its holders: {', '.join(old.holders)}")])
+    data = old.model_dump(exclude_none=True)
+    data["holders"] |= {name: {"repeatability_um": float(f"{one.together.s_um:.4g}")} for name, one in found.items()}
+    new = checked_jig(jig_text(data), str(sheet))
+    write_table(out, jig_text(new.model_dump(exclude_none=True)), provenance(), force=force)
+
+
+def _print_holders(found: Mapping[str, Repeatability]) -> None:
+    from dbbstation.cli.output import print_table
+    from dbbstation.plan.repeatability import UNLIKE_AXES
+
+    lines: list[list[object]] = []
+    for name, one in found.items():
+        axes = ", ".join(f"{scatter.s_um:.2f}" for scatter in one.axes)
+        interval = f"{one.together.low_um:.2f} to {one.together.high_um:.2f}"
+        distance = f"{one.rms_distance_um:.2f}"
+        lines.append([name, one.places, one.mountings, axes, f"{one.together.s_um:.2f}", interval, distance])
+    titles = ["holder", "places", "mountings", "s of x, y, z [µm]", "s per axis [µm]", "95 %", "rms distance [µm]"]
+    print_table(titles, lines)
+    for name, one in found.items():
+        if one.axes_differ < UNLIKE_AXES:
+            click.echo(
+                f"{name}: the axes scatter differently (p = {one.axes_differ:.2g}); a jig file has one value for all"
+            )
+
+
+_WHAT = ("ball", "bore", "holder", "x", "y", "z", "u", "ux", "uy", "uz")
+
+
+def _pairs(texts: Sequence[str], option: str, known: Sequence[str] = ()) -> dict[str, str]:
+    """Pairs `A=B` of an option.
+
+    Raises:
+        click.UsageError: no pair, or a first part that is not known.
+    """
+    found = {}
+    for text in texts:
+        first, has, second = text.partition("=")
+        if not (has and first and second) or (known and first not in known):
+            raise click.UsageError(
+                f"{option} {text}: "
+                + (f"write WHAT=NAME, WHAT is one of {', '.join(known)}" if known else "write LABEL=BALL")
+            )
+        found[first] = second
+    return found
+
+
+def _change_um(old: JigFile, name: str, centre_mm: Sequence[float]) -> list[float] | None:
+    if name not in old.balls:
+        return None
+    return [1e3 * (new - before) for new, before in zip(centre_mm, old.balls[name].centre_mm, strict=True)]
+
+
+def _texts(change_um: Sequence[float] | None) -> list[str]:
+    return ["new", "", ""] if change_um is None else [f"{value:+.1f}" for value in change_um]
+
+
+def _by_holder(rows: Sequence[Any], holder: str | None, sheet: Path) -> dict[str, list[Any]]:
+    """Centres by holder and place, shape (n, axes) each [µm].
+
+    Raises:
+        InputError: a row without a holder.
+    """
+    import numpy as np
+
+    from dbbstation.errors import InputError, Problem
+
+    groups: dict[tuple[str, object], list[tuple[float, ...]]] = {}
+    for row in rows:
+        name = row.holder or holder
+        if not name:
+            what = "nothing says which holder this row is of"
+            raise InputError(
+                [Problem(str(sheet), row.line, 0, what, "say it with --column holder=NAME, or --holder for all")]
+            )
+        centre = tuple(1e3 * value for value in row.centre_mm if np.isfinite(value))
+        groups.setdefault((name, row.name or row.bore), []).append(centre)
+    found: dict[str, list[Any]] = {}
+    for (name, _), centres in groups.items():
+        found.setdefault(name, []).append(np.array(centres))
+    return found
+
+
+def _summary(one: Repeatability) -> dict[str, Any]:
+    from dbbstation.plan.repeatability import LEVEL
+
+    def plain(scatter: Any) -> dict[str, Any]:  # noqa: ANN401 - imported late
+        ends = {"low_um": scatter.low_um, "high_um": scatter.high_um}
+        return {
+            "s_um": scatter.s_um,
+            **ends,
+            "standard_uncertainty_um": scatter.u_um,
+            "degrees_of_freedom": scatter.freedom,
+        }
+
+    return {
+        "repeatability_um": one.together.s_um,
+        "together": plain(one.together),
+        "axes": {axis: plain(scatter) for axis, scatter in zip("xyz", one.axes, strict=False)},
+        "level": LEVEL,
+        "rms_distance_um": one.rms_distance_um,
+        "mean_distance_um": one.mean_distance_um,
+        "places": one.places,
+        "mountings": one.mountings,
+        "p_axes_alike": one.axes_differ,
+        "of_cmm_um": one.of_cmm_um,
+    }

@@ -1,0 +1,42 @@
+"""`--model`: for every command that judges circles while they are measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from dbbstation.cli.source_files import source_file_option
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from dbbstation.model.identified import IdentifiedModel
+
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+
+def judging_model_options(function: _Function) -> _Function:
+    """Give a command `--model` and `--source-file`; it passes them to `judging_model`."""
+    option = click.option(
+        "--model",
+        "model_file",
+        type=click.Path(path_type=Path, dir_okay=False),
+        help="Judge circles by this calibrated model of the machine, not by its nominal geometry.",
+    )
+    return option(source_file_option(function))
+
+
+def judging_model(model_file: Path | None, source_files: Sequence[Path]) -> IdentifiedModel | None:
+    """Return the model that says where circles are expected; None where none is given.
+
+    Raises:
+        InputError: every fault of the file with its place.
+    """
+    if model_file is None:
+        return None
+    from dbbstation.files.formats.model import read_model
+    from dbbstation.files.own_sources import every_source
+
+    return read_model(model_file, every_source(source_files))

@@ -1,0 +1,221 @@
+"""Options that say what the columns of foreign tables mean, and the mapping that follows from them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from dbbstation.cli.number_types import Finite
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from dbbstation.cli.asking import Asker
+    from dbbstation.files.formats.mapping import MappingFile
+    from dbbstation.files.recordings.foreign_csv import ForeignTable
+    from dbbstation.imported.proposal import Proposed
+
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+_SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t"}
+
+_OPTIONS = (
+    click.option(
+        "--mapping",
+        "mapping_file",
+        type=click.Path(path_type=Path, dir_okay=False),
+        help="What the columns mean: read where the file exists, written there for the next time where it does not.",
+    ),
+    click.option(
+        "--column",
+        "columns",
+        multiple=True,
+        metavar="NAME=MEANING:UNIT",
+        help="What a column is, such as Winkel=angle:deg, Abw=deviation:µm, T1=bar_temp_c:degC or Nr=ignored.",
+    ),
+    click.option(
+        "--angle-zero-deg", type=Finite(-720, 720), help="Angle in the machine, from +X to +Y, where the files have 0."
+    ),
+    click.option(
+        "--angle-grows",
+        type=click.Choice(["ccw", "cw", "travel"]),
+        help="Sense in which the files' angles grow, seen from +Z.",
+    ),
+    click.option(
+        "--trace",
+        type=click.Choice(["whole", "turn"]),
+        help="Files without angles: the whole run with feed-in and feed-out, or the full turn alone.",
+    ),
+    click.option("--zero-mm", type=Finite(20, 2000), help="Length of the bar at which the deviation is 0 [mm]."),
+    click.option("--file-name", metavar="PATTERN", help="What names of files say, such as '{test}_{direction}'."),
+    click.option(
+        "--encoding", type=click.Choice(["utf-8", "utf-16", "cp1252"]), help="Of the files' text  [default: utf-8]."
+    ),
+)
+
+MAPPING_OPTIONS = (
+    "mapping_file",
+    "columns",
+    "angle_zero_deg",
+    "angle_grows",
+    "trace",
+    "zero_mm",
+    "file_name",
+    "encoding",
+)
+"""Names of the parameters that they fill."""
+
+
+def mapping_options(function: _Function) -> _Function:
+    """Give a command these options."""
+    for option in reversed(_OPTIONS):
+        function = option(function)
+    return function
+
+
+def read_tables(files: Sequence[Path], options: Mapping[str, Any]) -> dict[Path, ForeignTable]:
+    """Read all files, as the mapping says where there is one.
+
+    Raises:
+        InputError: every fault of every file.
+        click.UsageError: an option says what the mapping says too.
+    """
+    from dbbstation.errors import InputError, Problem
+    from dbbstation.files.formats.mapping import read_mapping
+    from dbbstation.files.formats.number_language import NumberLanguage
+    from dbbstation.files.recordings.foreign_csv import read_foreign
+
+    language, encoding = None, options["encoding"] or "utf-8"
+    kept = _kept(options)
+    if kept is not None:
+        also = [name for name in MAPPING_OPTIONS[1:] if options[name] not in (None, ())]
+        if also:
+            said = ", ".join("--" + ("column" if name == "columns" else name.replace("_", "-")) for name in also)
+            raise click.UsageError(f"{options['mapping_file']} says what columns mean: edit it, or leave out {said}")
+        mapping = read_mapping(kept)
+        language, encoding = NumberLanguage(mapping.decimal, _SEPARATORS[mapping.separator]), mapping.encoding
+    found: dict[Path, ForeignTable] = {}
+    faults: list[Problem] = []
+    for path in files:
+        try:
+            found[path] = read_foreign(path, language, encoding)
+        except InputError as error:
+            faults += error.problems
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def chosen_mapping(
+    tables: Sequence[ForeignTable], options: Mapping[str, Any], asker: Asker
+) -> Callable[[], MappingFile]:
+    """Return what gives the mapping once everything was answered: from its file, or from names, options and answers.
+
+    Args:
+        tables: that it is for; the columns of the first are named in it.
+        options: by name.
+        asker: of what cannot be told.
+    """
+    from dbbstation.files.formats.mapping import ANGLE, DEVIATION, UNITS, read_mapping
+    from dbbstation.imported.proposal import EXPORTED, Proposed
+
+    kept = _kept(options)
+    if kept is not None:
+        return lambda: read_mapping(kept)
+    table = tables[0]
+    columns = _columns(table, options["columns"])
+    for name, one in columns.items():
+        if not one.complete:
+            units = list(UNITS[one.means])
+            unit = asker.text(
+                f"unit of the column {name}, taken for {one.means}", f"--column '{name}={one.means}:UNIT'", units
+            )
+            columns[name] = Proposed(one.means, unit)
+    means = {one.means for one in columns.values()}
+    own = set(table.table.names) >= EXPORTED
+    data: dict[str, Any] = {"columns": columns, "trace": options["trace"], "file_name": options["file_name"]}
+    if ANGLE in means:
+        data["angle"] = {"zero_deg": 0.0, "grows": "ccw"} if own else _angle(options, asker)
+    elif not own and options["trace"] is None:
+        question = "the files have no angles: are they the whole run with feed-in and feed-out, or the turn alone"
+        data["trace"] = asker.text(question, "--trace", ["whole", "turn"])
+    if own and options["trace"] is None:
+        data["trace"] = "whole"
+    data["zero_mm"] = options["zero_mm"]
+    if DEVIATION in means and options["zero_mm"] is None:
+        data["zero_mm"] = asker.number("length of the bar at which the deviation is 0 [mm]", "--zero-mm", needed=True)
+    data["encoding"] = options["encoding"]
+    return lambda: _mapping(table, data)
+
+
+def _kept(options: Mapping[str, Any]) -> Path | None:
+    path: Path | None = options["mapping_file"]
+    return path if path is not None and path.exists() else None
+
+
+def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
+    """What columns are: as the options say, else as their names do."""
+    from dbbstation.imported.proposal import Proposed, proposed, stated
+
+    told: dict[str, Proposed] = {}
+    for text in said:
+        found = stated(text)
+        if found is None:
+            from dbbstation.files.formats.mapping import MEANINGS
+
+            known = ", ".join(MEANINGS)
+            raise click.UsageError(
+                f"--column {text}: write NAME=MEANING or NAME=MEANING:UNIT, a meaning is one of {known}"
+            )
+        if found[0] not in table.table.names:
+            raise click.UsageError(f"--column {text}: the columns are {', '.join(table.table.names)}")
+        told[found[0]] = found[1]
+    guessed = proposed([name for name in table.table.names if name not in told], table.units)
+    taken = {one.means for one in told.values()}
+    if taken & {"length", "deviation"}:
+        taken |= {"length", "deviation"}
+    left = {name: Proposed("ignored") if one.means in taken else one for name, one in guessed.items()}
+    return {name: told.get(name) or left[name] for name in table.table.names}
+
+
+def _angle(options: Mapping[str, Any], asker: Asker) -> dict[str, Any]:
+    grows = options["angle_grows"] or asker.text(
+        "sense in which the files' angles grow, seen from +Z", "--angle-grows", ["ccw", "cw", "travel"]
+    )
+    zero = options["angle_zero_deg"]
+    if zero is None and grows != "travel":
+        zero = asker.number(
+            "angle in the machine, from +X to +Y, where the files have 0 [deg]", "--angle-zero-deg", needed=True
+        )
+    return {"grows": grows, "zero_deg": zero}
+
+
+def _mapping(table: ForeignTable, data: Mapping[str, Any]) -> MappingFile:
+    """The mapping as its file has it.
+
+    Raises:
+        click.UsageError: something that no mapping may say.
+    """
+    from pydantic import ValidationError
+
+    from dbbstation.files.formats.mapping import MappingFile
+
+    separator = next(name for name, sign in _SEPARATORS.items() if sign == table.language.separator)
+    columns = {
+        name: {"means": one.means, **({"unit": one.unit} if one.unit else {})} for name, one in data["columns"].items()
+    }
+    whole = {
+        "format": "dbb-mapping/1",
+        "separator": separator,
+        "decimal": table.language.decimal,
+        **data,
+        "columns": columns,
+    }
+    try:
+        return MappingFile.model_validate({key: value for key, value in whole.items() if value is not None})
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise click.UsageError(f"the mapping{f', {place}' if place else ''}: {first['msg']}") from error

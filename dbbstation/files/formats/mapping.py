@@ -1,0 +1,185 @@
+"""`dbb-mapping/1`: what the columns of a recording made elsewhere mean, written once and used for every file of its kind."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.atomic import write_text
+from dbbstation.files.formats.quantities import Quantity
+from dbbstation.files.yaml.out import yaml_text
+from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
+from dbbstation.trace import columns
+from dbbstation.trace.columns import Kind
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Self
+
+INCH_MM = 25.4
+"""One inch [mm], exactly [ISO 31-1]."""
+
+_LENGTHS = {"mm": 1.0, "µm": 1e-3, "m": 1e3, "inch": INCH_MM, "mil": 1e-3 * INCH_MM, "µinch": 1e-6 * INCH_MM}
+_ANGLES = {"deg": 1.0, "rad": math.degrees(1.0), "turn": 360.0}
+_TIMES = {"s": 1.0, "ms": 1e-3, "min": 60.0}
+_CURRENTS = {"A": 1.0, "mA": 1e-3}
+_TEMPERATURES = {"degC": 1.0, "degF": 5.0 / 9.0, "K": 1.0}
+_OFFSETS = {"degF": -160.0 / 9.0, "K": -273.15}
+
+TIME, ANGLE, LENGTH, DEVIATION = "time", "angle", "length", "deviation"
+TEST, DIRECTION, REPEAT, MOUNTING, STATE, STARTED = "test", "direction", "repeat", "mounting", "state", "started"
+IGNORED = "ignored"
+
+OF_RUNS = (TEST, DIRECTION, REPEAT, MOUNTING, STATE, STARTED)
+"""Meanings of columns that say which run a row belongs to, the same in all rows of a run."""
+
+_OF_KIND = {Kind.TEMPERATURE: _TEMPERATURES, Kind.CURRENT: _CURRENTS}
+
+UNITS: dict[str, dict[str, float]] = {
+    TIME: _TIMES,
+    ANGLE: _ANGLES,
+    LENGTH: _LENGTHS,
+    DEVIATION: _LENGTHS,
+    **{name: _OF_KIND[column.kind] for name, column in columns.COLUMNS.items() if column.kind in _OF_KIND},
+}
+"""Units of every meaning that has one, with what one of it is in the unit of a run file."""
+
+MEANINGS = (*UNITS, columns.STATUS, *OF_RUNS, IGNORED)
+"""Everything that a column can be."""
+
+ENCODINGS = ("utf-8", "utf-16", "cp1252")
+
+
+def in_run_units(meaning: str, unit: str) -> tuple[float, float]:
+    """Return factor and offset from a unit to that of a run file: `value * factor + offset`."""
+    return UNITS[meaning][unit], _OFFSETS.get(unit, 0.0)
+
+
+def _meaning(text: str) -> str:
+    if text not in MEANINGS:
+        raise PydanticCustomError(
+            "meaning", "`{text}` is nothing that a column can be: {known}", {"text": text, "known": ", ".join(MEANINGS)}
+        )
+    return text
+
+
+class ColumnSchema(Schema):
+    """One column of the files."""
+
+    means: Annotated[str, AfterValidator(_meaning)]
+    """`time`, `angle`, `length` (between the ball centres), `deviation` (of the length from `zero_mm`, longer positive), `test`,
+    `direction`, `repeat`, `mounting`, `state`, `started`, `status`, a further column of run files such as `bar_temp_c`, or `ignored`."""
+    unit: str | None = None
+    """Unit of its numbers; absent where the column is a text, a count or ignored."""
+
+    @model_validator(mode="after")
+    def _has_unit(self) -> Self:
+        known = UNITS.get(self.means)
+        if known is None and self.unit is not None:
+            raise PydanticCustomError("unit", "a column that is `{means}` has no unit", {"means": self.means})
+        if known is not None and self.unit not in known:
+            said = "it has no unit" if self.unit is None else f"`{self.unit}` is no unit of it"
+            what = {"means": self.means, "said": said, "known": ", ".join(known)}
+            raise PydanticCustomError("unit", "a column that is `{means}`: {said}; give one of {known}", what)
+        return self
+
+
+class AngleSchema(Schema):
+    """How the angles of the files lie in the machine."""
+
+    zero_deg: Annotated[float, Quantity("deg", 0, 720, signed=True)] | None = None
+    """Angle in the machine, from +X towards +Y, at which the files write 0; absent: where the plan starts the turn [deg]."""
+    grows: Literal["ccw", "cw", "travel"]
+    """Sense in which the numbers grow, seen from +Z: always `ccw`, always `cw`, or with the `travel` of the run."""
+
+
+class MappingFile(Schema):
+    """What the columns of recordings made elsewhere mean."""
+
+    format: Literal["dbb-mapping/1"]
+    """Name and version of this format."""
+    name: Annotated[str, Field(min_length=1)] | None = None
+    """What people call the program that wrote the files."""
+    encoding: Literal["utf-8", "utf-16", "cp1252"] = "utf-8"
+    """Of the files' text; a byte order mark in a file takes precedence."""
+    separator: Literal["comma", "semicolon", "tab"]
+    """What stands between columns."""
+    decimal: Literal[".", ","] = "."
+    """Decimal sign."""
+    columns: Annotated[dict[str, ColumnSchema], Field(min_length=1)]
+    """Meaning of each column by its name in the file; one that is not named here is refused."""
+    angle: AngleSchema | None = None
+    """How angles lie in the machine; needed where a column is an angle."""
+    trace: Literal["whole", "turn"] | None = None
+    """Of files with times and without angles: the `whole` run with feed-in and feed-out, or the full `turn` alone."""
+    zero_mm: Annotated[float, Quantity("mm", 20, 2_000)] | None = None
+    """Length of the bar at which the deviation is 0; needed where a column is a deviation [mm]."""
+    file_name: str | None = None
+    """What the names of files say, such as `{test}_{direction}` or `{test}-{direction}-{repeat}`; without the ending."""
+    words: dict[str, Literal["ccw", "cw"]] = Field(default_factory=dict)
+    """Directions as the files write them."""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        meanings = [column.means for column in self.columns.values()]
+        for one in sorted({m for m in meanings if m != IGNORED and meanings.count(m) > 1}):
+            raise PydanticCustomError("twice", "two columns are `{one}`; take one of them for `ignored`", {"one": one})
+        if LENGTH in meanings and DEVIATION in meanings:
+            raise PydanticCustomError("both", "length and deviation say the same twice; ignore one of them", {})
+        if LENGTH not in meanings and DEVIATION not in meanings:
+            raise PydanticCustomError("length", "no column is `length` or `deviation`", {})
+        if TIME not in meanings and ANGLE not in meanings:
+            raise PydanticCustomError("time", "no column is `time` or `angle`", {})
+        if ANGLE in meanings and self.angle is None:
+            raise PydanticCustomError(
+                "angle", "a column is an angle: `angle` has to say where 0 lies and how it grows", {}
+            )
+        if DEVIATION in meanings and self.zero_mm is None:
+            raise PydanticCustomError("zero", "a column is a deviation: `zero_mm` has to say from which length", {})
+        if ANGLE not in meanings and self.trace is None:
+            raise PydanticCustomError("trace", "there are no angles: `trace` has to be `whole` or `turn`", {})
+        if self.separator == "comma" and self.decimal == ",":
+            raise PydanticCustomError("alike", "decimal sign and separator are both a comma", {})
+        return self
+
+    def column(self, meaning: str) -> str | None:
+        """Return the name of the column with a meaning; None where there is none."""
+        return next((name for name, column in self.columns.items() if column.means == meaning), None)
+
+
+def parse_mapping(path: Path, faults: list[Problem]) -> MappingFile | None:
+    """Read a mapping; None with every fault added to `faults`."""
+    document = read_document(path, MappingFile, faults)
+    return None if document is None else validate(document, MappingFile, faults)
+
+
+def read_mapping(path: Path) -> MappingFile:
+    """Read a mapping.
+
+    Raises:
+        InputError: every fault of the file with its place.
+    """
+    faults: list[Problem] = []
+    mapping = parse_mapping(path, faults)
+    if mapping is None or faults:
+        raise InputError(faults)
+    return mapping
+
+
+def mapping_text(mapping: MappingFile) -> str:
+    """Return the text of a mapping's file."""
+    data = mapping.model_dump(exclude_none=True, exclude_defaults=True)
+    return yaml_text({"format": format_of(MappingFile), **data})
+
+
+def write_mapping(path: Path, mapping: MappingFile) -> None:
+    """Write a mapping.
+
+    Raises:
+        OutputError: the file exists, or it cannot be written.
+    """
+    write_text(path, mapping_text(mapping))

@@ -1,0 +1,234 @@
+"""What was worked out of files, kept so that it need not be worked out again: an index in the user's cache folder.
+
+It is never the only copy of anything: one that is missing, damaged, or of another version of the program is begun anew. SQLite
+without a write-ahead log, which needs memory that processes on one computer share; never on a share and never in the folder itself.
+Two processes at once write the same lines, one after the other.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import logging
+import os
+import sqlite3
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+from dbbstation import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+_LOG = logging.getLogger(__name__)
+
+_FORM = 1
+"""Counts changes of what is kept under one version of the program."""
+
+VERSION = f"{__version__}/{_FORM}"
+
+_PATIENCE_S = 5.0
+"""How long another process may write; what cannot be kept after that is worked out again another time [s]."""
+
+SHARES = frozenset(
+    {"9p", "afs", "ceph", "cifs", "davfs", "fuse.davfs2", "fuse.glusterfs", "fuse.rclone", "fuse.s3fs", "fuse.sshfs"}
+    | {"glusterfs", "ncpfs", "nfs", "nfs4", "smb3", "smbfs"}
+)
+"""File systems of other computers, on which SQLite's locks cannot be relied on."""
+
+_MOUNTS = Path("/proc/self/mounts")
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """By what a file is known not to have changed, without reading it.
+
+    Attributes:
+        modified_ns: when it was written [ns].
+        size: in bytes.
+    """
+
+    modified_ns: int
+    size: int
+
+
+def stamp_of(path: Path) -> Stamp:
+    """Return the stamp of a file.
+
+    Raises:
+        OSError: it is not there.
+    """
+    stat = path.stat()
+    return Stamp(stat.st_mtime_ns, stat.st_size)
+
+
+@dataclass(frozen=True)
+class _Row:
+    stamp: Stamp
+    sha256: str
+    text: str
+
+
+class Kept:
+    """What is kept of the files of one folder, each written at once: work that is interrupted loses nothing. A context.
+
+    Args:
+        folder: whose files these are.
+        begin_anew: forget what is kept.
+
+    Attributes:
+        problem: why nothing can be kept, in words; empty where it can.
+    """
+
+    def __init__(self, folder: Path, *, begin_anew: bool = False) -> None:
+        self.problem = ""
+        self._rows: dict[str, _Row] = {}
+        self._by_hash: dict[str, str] = {}
+        self._file = index_file(folder)
+        self._base: sqlite3.Connection | None = None
+        why = _unfit(self._file, folder)
+        if why:
+            self._give_up(why)
+            return
+        if begin_anew:
+            self._forget()
+        self._open()
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the index; everything is written already."""
+        self._close()
+
+    def of(self, name: str, stamp: Stamp) -> str | None:
+        """Return what is kept of a file; None where it has changed, or nothing is kept."""
+        row = self._rows.get(name)
+        return row.text if row is not None and row.stamp == stamp else None
+
+    def of_content(self, sha256: str) -> str | None:
+        """Return what is kept of a file with this content, whatever its name."""
+        return self._by_hash.get(sha256)
+
+    def keep(self, name: str, stamp: Stamp, sha256: str, text: str) -> None:
+        """Keep what was worked out of a file.
+
+        Args:
+            name: of the file in the folder.
+            stamp: of the file before it was read.
+            sha256: of its content.
+            text: what is kept.
+        """
+        self._rows[name] = _Row(stamp, sha256, text)
+        self._by_hash[sha256] = text
+        row = (name, stamp.modified_ns, stamp.size, sha256, text)
+        self._write("INSERT OR REPLACE INTO kept VALUES (?, ?, ?, ?, ?)", [row])
+
+    def drop_others(self, names: Iterable[str]) -> None:
+        """Forget files that are not there any more."""
+        gone = self._rows.keys() - set(names)
+        for name in gone:
+            del self._rows[name]
+        self._write("DELETE FROM kept WHERE name = ?", [(name,) for name in sorted(gone)])
+
+    def _write(self, command: str, rows: Sequence[tuple[object, ...]]) -> None:
+        if self._base is None or not rows:
+            return
+        try:
+            self._base.executemany(command, rows)
+        except sqlite3.Error as error:
+            self._give_up(str(error))
+
+    def _open(self) -> None:
+        for attempt in range(2):
+            try:
+                self._file.parent.mkdir(parents=True, exist_ok=True)
+                self._base = self._ready()
+                self._read()
+            except sqlite3.OperationalError as error:  # locked, no room, no permission: not for us to remove
+                self._give_up(str(error))
+            except (sqlite3.DatabaseError, TypeError, ValueError) as error:
+                _LOG.info("the index %s is damaged and is begun anew: %s", self._file, error)
+                self._close()
+                self._forget()
+                if attempt:
+                    self._give_up(str(error))
+            except OSError as error:
+                self._give_up(str(error))
+            if self._base is not None or self.problem:
+                return
+
+    def _ready(self) -> sqlite3.Connection:
+        base = sqlite3.connect(self._file, timeout=_PATIENCE_S, isolation_level=None)
+        try:
+            base.execute("PRAGMA journal_mode = DELETE")
+            base.execute("BEGIN IMMEDIATE")
+            base.execute("CREATE TABLE IF NOT EXISTS version (text TEXT)")
+            known = [text for (text,) in base.execute("SELECT text FROM version")]
+            if known != [VERSION]:
+                base.execute("DROP TABLE IF EXISTS kept")
+                base.execute("DELETE FROM version")
+                base.execute("INSERT INTO version VALUES (?)", (VERSION,))
+            base.execute(
+                "CREATE TABLE IF NOT EXISTS kept (name TEXT PRIMARY KEY, modified_ns INTEGER, size INTEGER, sha256 TEXT, text TEXT)"
+            )
+            base.execute("COMMIT")
+        except sqlite3.Error:
+            base.close()
+            raise
+        return base
+
+    def _read(self) -> None:
+        if self._base is None:
+            return
+        rows = self._base.execute("SELECT name, modified_ns, size, sha256, text FROM kept").fetchall()
+        self._rows = {
+            str(n): _Row(Stamp(int(at), int(size)), str(digest), str(text)) for n, at, size, digest, text in rows
+        }
+        self._by_hash = {row.sha256: row.text for row in self._rows.values()}
+
+    def _forget(self) -> None:
+        for path in (self._file, self._file.with_name(self._file.name + "-journal")):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+    def _close(self) -> None:
+        if self._base is not None:
+            self._base.close()
+            self._base = None
+
+    def _give_up(self, why: str) -> None:
+        self._close()
+        self.problem = f"nothing is kept for the next time ({self._file}): {why}"
+        _LOG.info("%s", self.problem)
+
+
+def index_file(folder: Path) -> Path:
+    """Return where the index of a folder is kept: in the user's cache folder, under a hash of the folder's path."""
+    import platformdirs  # noqa: PLC0415 - only a history looks for it
+
+    digest = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:24]
+    return platformdirs.user_cache_path("dbbstation", appauthor=False) / "history" / f"{digest}.sqlite"
+
+
+def _unfit(file: Path, folder: Path) -> str:
+    """Return why an index must not stand where it would; empty where it may."""
+    if file.resolve().is_relative_to(folder.resolve()):
+        return "the cache folder lies in the folder of the sessions; set XDG_CACHE_HOME to another"
+    kind = _file_system(file.resolve())
+    return f"the cache folder lies on a share ({kind}); set XDG_CACHE_HOME to a local one" if kind in SHARES else ""
+
+
+def _file_system(path: Path) -> str:
+    """Return the kind of file system that a path lies on; empty where the system does not say."""
+    if str(path).startswith("\\\\"):
+        return "cifs"
+    try:
+        lines = _MOUNTS.read_text("utf-8", "replace").splitlines()
+    except OSError:
+        return ""
+    mounts = [(Path(words[1].replace("\\040", " ")), words[2]) for words in map(str.split, lines) if len(words) > 2]  # noqa: PLR2004 - device, place, kind
+    over = [(len(place.parts), kind) for place, kind in mounts if path.is_relative_to(place)]
+    return max(over, default=(0, ""))[1]

@@ -1,0 +1,199 @@
+"""Sheets of a coordinate measuring machine: ball centres from CSV or DMIS, and the jig file that follows."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.jig import JigFile, checked_jig, jig_text
+from dbbstation.files.formats.mapping import LENGTH, UNITS
+from dbbstation.files.recordings.dmis import read_dmis
+from dbbstation.files.recordings.foreign_csv import read_foreign
+from dbbstation.files.recordings.table_csv import missing_column
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.files.recordings.table_csv import TableFile
+
+AXES = ("x", "y", "z")
+DMIS_ENDINGS = (".dmo", ".dmi", ".dmis", ".out")
+LENGTH_UNITS = tuple(UNITS[LENGTH])
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One ball as a sheet has it.
+
+    Attributes:
+        name: as the sheet calls it; empty where it gives bore and holder only.
+        bore: that it stands in; None where the sheet does not say it.
+        holder: that it stands on; empty where the sheet does not say it.
+        centre_mm: x, y, z [mm]; z is NaN where the sheet has none.
+        uncertainty_um: one standard deviation per axis, root mean square of those of the axes [µm]; None where the sheet has none.
+        line: of the file.
+    """
+
+    name: str
+    bore: int | None
+    holder: str
+    centre_mm: tuple[float, float, float]
+    uncertainty_um: float | None
+    line: int
+
+
+def read_sheet(
+    path: Path, columns: Mapping[str, str], unit: str, coverage: float | None, *, of_one_holder: bool = False
+) -> list[Measured]:
+    """Read a sheet; DMIS by the ending of its name, else a table.
+
+    Args:
+        path: of the file.
+        columns: names of columns by what they are: `ball`, `bore`, `holder`, `x`, `y`, `z`, `u` or `ux`, `uy`, `uz`; others by name.
+        unit: of coordinates and uncertainties of a table.
+        coverage: k of the uncertainties U of a table; None where it has none.
+        of_one_holder: a bore alone says which ball a row is.
+
+    Raises:
+        InputError: every fault of the file.
+    """
+    if path.suffix.lower() in DMIS_ENDINGS:
+        return [Measured(one.name, None, "", one.centre_mm, None, one.line) for one in read_dmis(path)]
+    table = read_foreign(path).table
+    found = {**{key: name for key in _KEYS if (name := _usual(key, table)) is not None}, **columns}
+    missing = [key for key in ("x", "y") if key not in found]
+    faults = [
+        missing_column(name, table.names, str(path), table.header) for name in found.values() if name not in table.names
+    ]
+    remedy = f"say which with --column {missing[0] if missing else 'x'}=NAME; columns here: {', '.join(table.names)}"
+    faults += [Problem(str(path), table.header, 0, f"no column is taken for {key}", remedy) for key in missing]
+    if "ball" not in found and not ({"bore"} if of_one_holder else {"bore", "holder"}) <= set(found):
+        what = "no column says which ball a row is"
+        faults.append(
+            Problem(str(path), table.header, 0, what, "say it with --column ball=NAME, or with bore and holder")
+        )
+    of_u = [key for key in ("u", "ux", "uy", "uz") if key in found]
+    if of_u and coverage is None:
+        what = "the sheet has uncertainties, and nothing says what they are"
+        faults.append(
+            Problem(str(path), table.header, 0, what, "give --k: 2 for U (k = 2), 1 for standard uncertainties")
+        )
+    if not faults:
+        faults += [fault for key in (*AXES, *of_u) if key in found for fault in _bad_cells(table, found[key])]
+    if faults:
+        raise InputError(faults)
+    return [_row(table, k, found, UNITS[LENGTH][unit], coverage) for k in range(len(table))]
+
+
+def jig_of_sheet(
+    before: JigFile,
+    measured: Sequence[Measured],
+    file: str,
+    *,
+    names: Mapping[str, str],
+    uncertainty_um: float | None,
+    cmm_temp_c: float | None,
+) -> JigFile:
+    """Return a jig whose balls are those of a sheet; plate and holders stay as they are.
+
+    Args:
+        before: the jig so far.
+        measured: balls.
+        file: of the sheet, for messages.
+        names: names of balls in the jig by those in the sheet.
+        uncertainty_um: standard uncertainty of balls whose sheet states none [µm]; None: they are refused.
+        cmm_temp_c: of the plate while it was measured [degC]; None where nobody knows: the jig file says nothing of it then.
+
+    Raises:
+        InputError: a ball that the jig does not know and the sheet does not place, twice the same, no uncertainty, or whatever no jig
+            file may say, such as a ball that lies at another bore.
+    """
+    faults: list[Problem] = []
+    balls: dict[str, Any] = {}
+    for one in measured:
+        name = names.get(one.name) or _known_name(one, before)
+        known = before.balls.get(name)
+        bore, holder = (one.bore, one.holder) if known is None else (known.bore, known.holder)
+        u_um = one.uncertainty_um if one.uncertainty_um is not None else uncertainty_um
+        if not holder:
+            remedy = f"say --name '{one.name}=BALL'; the jig has {', '.join(before.balls)}"
+            faults.append(Problem(file, one.line, 0, f"the jig has no ball `{name}`", remedy))
+        elif name in balls:
+            faults.append(Problem(file, one.line, 0, f"the ball `{name}` comes a second time", "take one of them out"))
+        elif u_um is None:
+            what = f"nothing states an uncertainty of `{name}`"
+            faults.append(Problem(file, one.line, 0, what, "give --u-um, the standard uncertainty of a coordinate"))
+        elif not all(map(math.isfinite, one.centre_mm)):
+            faults.append(Problem(file, one.line, 0, f"`{name}` has no z", "say which column it is: --column z=NAME"))
+        else:
+            centre = tuple(float(f"{value:.7f}") for value in one.centre_mm)  # 0.1 nm: no digits of the conversion
+            balls[name] = {"bore": bore, "holder": holder, "centre_mm": centre, "uncertainty_um": float(f"{u_um:.6g}")}
+    if faults:
+        raise InputError(faults)
+    plate = before.jig.model_dump(exclude_none=True)
+    plate.pop("cmm_temp_c", None)
+    data = before.model_dump(exclude_none=True) | {
+        "jig": plate | ({} if cmm_temp_c is None else {"cmm_temp_c": cmm_temp_c})
+    }
+    return checked_jig(jig_text(data | {"balls": balls}), file)
+
+
+_KEYS = ("ball", "bore", "holder", *AXES, "u", "ux", "uy", "uz")
+_NAMES = {
+    "ball": {"ball", "name", "label", "feature", "id"},
+    "holder": {"holder", "halter"},
+    "bore": {"bore", "bohrung"},
+}
+
+
+def _usual(key: str, table: TableFile) -> str | None:
+    """Column that is this by its name: `X`, `x_mm`, `U(x) [µm]` is not guessed."""
+    wanted = _NAMES.get(key, {key})
+    names = [name for name in table.names if re.split(r"[\s_\[(]", name.strip().lower())[0] in wanted]
+    # `U` and `u` are different things, and so is what another program means by them: they are named, not guessed.
+    return None if key.startswith("u") or len(names) != 1 else names[0]
+
+
+def _bad_cells(table: TableFile, name: str) -> list[Problem]:
+    lines, cells = table.lines.tolist(), table.cells[name]
+    bad = np.flatnonzero(~np.isfinite(table.values[name])).tolist()
+    return [
+        Problem(
+            table.file,
+            lines[k],
+            0,
+            f"{name} is `{cells[k]}`, not a finite number",
+            "correct the cell or take the row out",
+        )
+        for k in bad
+    ]
+
+
+def _row(table: TableFile, k: int, found: Mapping[str, str], factor: float, coverage: float | None) -> Measured:
+    def text(key: str) -> str:
+        return table.cells[found[key]][k] if key in found else ""
+
+    def number(key: str) -> float:
+        return factor * float(table.values[found[key]][k]) if key in found else math.nan
+
+    of_axes = [number(key) for key in ("ux", "uy", "uz") if key in found] or [number("u")]
+    u_mm = math.sqrt(sum(one**2 for one in of_axes) / len(of_axes))
+    u_um = None if math.isnan(u_mm) or coverage is None else 1e3 * u_mm / coverage
+    bore = int(text("bore")) if text("bore").isdigit() else None
+    centre = (number("x"), number("y"), number("z"))
+    return Measured(text("ball"), bore, text("holder"), centre, u_um, int(table.lines[k]))
+
+
+def _known_name(one: Measured, jig: JigFile) -> str:
+    """Name of a ball in the jig: the same but for case and underscores, or the one in this bore on this holder."""
+    plain = {name.lower().replace("_", "-"): name for name in jig.balls}
+    if one.name:
+        return plain.get(one.name.lower().replace("_", "-"), one.name)
+    placed = [name for name, ball in jig.balls.items() if (ball.bore, ball.holder) == (one.bore, one.holder)]
+    return placed[0] if placed else f"{one.bore}-{one.holder}"

@@ -1,0 +1,112 @@
+"""Measured points in the output of a CMM in DMIS [ISO 22093]: `FA(NAME)=FEAT/SPHERE,OUTER,CART,x,y,z,d` and `FEAT/POINT,CART,x,y,z,i,j,k`.
+
+Read are actual features (`FA`) in cartesian coordinates, `UNITS/`, comments (`$$`) and lines continued by `$`. The text of the standard
+was not at hand; the statements are as manuals of CMM programs describe them (PTC Creo, Supported DMIS Commands).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.source_text import decode, read_bytes, shortened
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+_MM = {"MM": 1.0, "CM": 10.0, "M": 1000.0, "INCH": 25.4, "FEET": 304.8}
+_ACTUAL = re.compile(r"FA\(\s*([^()]+?)\s*\)\s*=\s*FEAT\s*/\s*(.*)", re.IGNORECASE)
+_FRAME = re.compile(r"(D\(.*\)\s*=\s*)?(DATSET|TRANS|ROTATE|RECALL|LOCATE)\s*/", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class DmisPoint:
+    """One actual feature.
+
+    Attributes:
+        name: its label.
+        centre_mm: x, y, z in the frame that is set where it stands [mm].
+        line: of the file.
+    """
+
+    name: str
+    centre_mm: tuple[float, float, float]
+    line: int
+
+
+def read_dmis(path: Path) -> list[DmisPoint]:
+    """Read the actual spheres and points of a DMIS output.
+
+    Raises:
+        InputError: it cannot be read, has none, no unit, polar coordinates, or sets another frame between two of them.
+    """
+    faults: list[Problem] = []
+    data = read_bytes(path, faults)
+    text = None if data is None else decode(data, str(path), faults)
+    if text is None:
+        raise InputError(faults)
+    found: list[DmisPoint] = []
+    factor, frame = 0.0, 0
+    for line, statement in _statements(text):
+        unit = re.match(r"UNITS\s*/\s*(\w+)", statement, re.IGNORECASE)
+        actual = _ACTUAL.match(statement)
+        if unit:
+            factor = _MM.get(unit[1].upper(), 0.0)
+            if not factor:
+                faults.append(Problem(str(path), line, 0, f"`{unit[1]}` is no unit", f"known: {', '.join(_MM)}"))
+        elif _FRAME.match(statement) and found:
+            frame = frame or line
+        elif actual and actual[2].split(",")[0].strip().upper() in {"SPHERE", "POINT"}:
+            if frame:
+                what = f"the frame was set anew in line {frame}, between measured features: they have no common frame"
+                faults.append(Problem(str(path), line, 0, what, "output all features in the frame of the jig"))
+                break
+            point = _point(actual[1], actual[2], factor, str(path), line, faults)
+            found += [] if point is None else [point]
+    faults += _of_the_whole(found, factor, str(path), faults)
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def _of_the_whole(found: list[DmisPoint], factor: float, file: str, faults: list[Problem]) -> Iterator[Problem]:
+    """Yield what the file lacks as a whole."""
+    if found and not factor:
+        yield Problem(file, 0, 0, "no unit is stated", "the file needs a statement such as UNITS/MM,ANGDEC")
+    if not found and not faults:
+        what = "there is no measured sphere or point: no `FA(NAME)=FEAT/SPHERE` or `FEAT/POINT`"
+        yield Problem(file, 0, 0, what, "output actual features; `F(NAME)` are nominal ones")
+
+
+def _statements(text: str) -> Iterator[tuple[int, str]]:
+    """Statements with the number of their first line: comments left out, lines joined that end in `$`."""
+    first, parts = 0, list[str]()
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = raw.partition("$$")[0].strip()
+        first = first if parts else number
+        parts.append(line.removesuffix("$").strip())
+        if not line.endswith("$"):
+            whole = "".join(parts)
+            parts = []
+            if whole:
+                yield first, whole
+
+
+def _point(name: str, said: str, factor: float, file: str, line: int, faults: list[Problem]) -> DmisPoint | None:
+    cells = [cell.strip() for cell in said.split(",")]
+    words = [cell.upper() for cell in cells]
+    if "CART" not in words:
+        faults.append(Problem(file, line, 0, f"{name} is not in cartesian coordinates", "output it with CART"))
+        return None
+    after = cells[words.index("CART") + 1 :][:3]
+    try:
+        x, y, z = (float(cell) * factor for cell in after)
+    except ValueError:
+        faults.append(
+            Problem(file, line, 0, f"{name}: `{shortened(', '.join(after))}` are no three numbers", "check the line")
+        )
+        return None
+    return DmisPoint(name, (x, y, z), line)

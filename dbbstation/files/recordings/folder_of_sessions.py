@@ -1,0 +1,103 @@
+"""Which sessions and models a folder holds."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.recordings.session import SESSION_FILE
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+DEEPEST = 4
+"""Folders inside one another that are looked through: year, machine, month, session."""
+
+_MODEL_MARK = b"format: dbb-model/"
+"""How a model file begins; other YAML files are not read."""
+
+_MARK_WITHIN = 4096
+"""Bytes of a file in which the mark is looked for."""
+
+
+@dataclass(frozen=True)
+class FolderFiles:
+    """Files of a folder, by their paths in it.
+
+    Attributes:
+        sessions: session files.
+        models: files that may be models.
+        closed: folders that cannot be looked into, with the reason.
+    """
+
+    sessions: dict[str, Path]
+    models: dict[str, Path]
+    closed: list[tuple[str, str]]
+
+
+def files_of(folder: Path) -> FolderFiles:
+    """Return session files, and files that may be models, in and below a folder; what lies deep in a session is its own.
+
+    Links to folders are not followed.
+
+    Raises:
+        InputError: it is no folder, is a session itself, or holds none.
+    """
+    sessions: dict[str, Path] = {}
+    models: dict[str, Path] = {}
+    closed: list[tuple[str, str]] = []
+
+    def look(here: Path, depth: int) -> None:
+        try:
+            with os.scandir(here) as listed:
+                entries = sorted(listed, key=lambda entry: entry.name)
+        except OSError as error:
+            closed.append((here.relative_to(folder).as_posix(), reason_of(error)))
+            return
+        is_session = here != folder and any(entry.name == SESSION_FILE for entry in entries)
+        for entry in entries:
+            path = here / entry.name
+            name = path.relative_to(folder).as_posix()
+            if is_session and entry.name == SESSION_FILE:
+                sessions[name] = path
+            elif entry.is_file() and entry.name.endswith((".yaml", ".yml")) and _may_be_model(path):
+                models[name] = path
+            elif not is_session and depth < DEEPEST and not entry.name.startswith(".") and _is_folder(entry):
+                look(path, depth + 1)
+
+    if not folder.is_dir():
+        what = "there is no such folder" if not folder.exists() else "this is no folder"
+        raise InputError([Problem(str(folder), 0, 0, what, "name a folder that holds session folders")])
+    if (folder / SESSION_FILE).is_file():
+        what = "this folder is one session, a history is of a folder that holds several"
+        raise InputError([Problem(str(folder), 0, 0, what, f"name the folder around it: {folder.resolve().parent}")])
+    look(folder, 1)
+    if not sessions:
+        raise InputError([_no_sessions(folder)])
+    return FolderFiles(sessions, models, closed)
+
+
+def reason_of(error: OSError) -> str:
+    """Return why the system refused, in words."""
+    return (error.strerror or str(error)).lower()
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    return entry.is_dir(follow_symlinks=False)
+
+
+def _may_be_model(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return _MODEL_MARK in file.read(_MARK_WITHIN)
+    except OSError:
+        return False
+
+
+def _no_sessions(folder: Path) -> Problem:
+    what = f"no folder in it holds a {SESSION_FILE}, {DEEPEST} folders deep"
+    return Problem(
+        str(folder), 0, 0, what, "name a folder that holds the session folders of `measure`, `station` or `simulate`"
+    )

@@ -1,0 +1,171 @@
+"""Tables that other programs wrote: text before the names, units below them, any separator, decimal commas, CRLF, byte order marks."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.csv_rows import csv_rows
+from dbbstation.files.formats.number_language import NumberLanguage
+from dbbstation.files.recordings.table_csv import TableFile, parse_table
+from dbbstation.files.source_text import decode, read_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+_LANGUAGES = (
+    NumberLanguage(".", ","),
+    NumberLanguage(".", ";"),
+    NumberLanguage(".", "\t"),
+    NumberLanguage(",", ";"),
+    NumberLanguage(",", "\t"),
+)
+"""Ways of writing tables; the first of those that fit as well."""
+
+_SIGNS = ",;\t"
+
+_LOOKED_AT = 300
+"""Lines that tell how a table is written: text before it is a page at the most."""
+
+
+_NAMES_WITHIN = 3
+"""Lines above the first row in which the names of the columns stand: a line of units and an empty one may come between."""
+
+_UNIT = re.compile(r"[\[(].*[\])]|[µμu]?m|mm|in|inch|mil|deg|°|rad|s|ms|min|°?c|degc|k|m?a|-", re.IGNORECASE)
+"""A cell that is a unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForeignTable:
+    """A table made elsewhere.
+
+    Attributes:
+        table: its columns.
+        language: how its numbers are written.
+        units: what stands below the names of columns, by name; empty where nothing does.
+        comments: `key: value` lines above the names, by key in small letters.
+        data: the whole file.
+    """
+
+    table: TableFile
+    language: NumberLanguage
+    units: Mapping[str, str]
+    comments: Mapping[str, str]
+    data: bytes
+
+
+def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: str = "utf-8") -> ForeignTable:
+    """Read a table that another program wrote.
+
+    Args:
+        path: of the file.
+        language: how numbers are written; None: as fits best.
+        encoding: of the text where no byte order mark tells it.
+
+    Raises:
+        InputError: it cannot be read, has no table, or has lines of another width.
+    """
+    faults: list[Problem] = []
+    data = read_bytes(path, faults)
+    text = None if data is None else _text(data, str(path), encoding, faults)
+    if data is None or text is None:
+        raise InputError(faults)
+    lines = text.splitlines()
+    chosen = language or _language(lines, str(path))
+    rows = [_cells(line, chosen, str(path), number) for number, line in enumerate(lines, start=1)]
+    first = next((k for k in range(len(rows)) if _is_row(rows[k], chosen) and _goes_on(rows, k, chosen)), None)
+    if first is None:
+        remedy = f"check which file it is; {chosen.text}"
+        raise InputError([Problem(str(path), 0, 0, "there is no table of numbers in this file", remedy)])
+    above = [
+        k for k in range(first) if len(rows[k]) == len(rows[first]) and any(rows[k]) and not _count(rows[k], chosen)
+    ]
+    near = [k for k in above if k >= first - _NAMES_WITHIN]
+    if not near:
+        what = "no line above the numbers names the columns"
+        raise InputError([Problem(str(path), first + 1, 0, what, "write one name per column in a line above them")])
+    # A line of units may stand below the names.
+    has_units = len(near) > 1 and all(_UNIT.fullmatch(cell) for cell in rows[near[-1]] if cell)
+    names = near[-2] if has_units else near[-1]
+    body = [*[""] * names, lines[names].lstrip("\ufeff# "), *lines[names + 1 :]]
+    if has_units:
+        body[near[-1]] = ""
+    if lines[names].rstrip().endswith(chosen.separator) and not rows[names][-1]:
+        body = [line.rstrip().removesuffix(chosen.separator) for line in body]
+    table = parse_table("\n".join(body), str(path), numbers=chosen)
+    units = dict(zip(table.names, rows[near[-1]], strict=False)) if has_units else {}
+    return ForeignTable(table, chosen, units, _comments(lines[:names]), data)
+
+
+def _text(data: bytes, file: str, encoding: str, faults: list[Problem]) -> str | None:
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encoding = "utf-16"
+    if encoding == "utf-8" or data.startswith(codecs.BOM_UTF8):
+        found: list[Problem] = []
+        text = decode(data, file, found)
+        remedy = "say --encoding cp1252 where a western Windows program wrote it, or save it as UTF-8"
+        faults += [Problem(one.file, one.line, one.column, one.what, remedy) for one in found]
+        return text
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError as error:
+        what = f"byte {data[error.start]:#04x} at position {error.start} is no {encoding} text"
+        faults.append(Problem(file, 0, 0, what, "give another --encoding, or save the file as UTF-8"))
+        return None
+
+
+def _language(lines: list[str], file: str) -> NumberLanguage:
+    """The way of writing with most numbers less cells that were not taken apart: `0,5;1,5` is `0`, `5;1`, `5` with a comma between."""
+
+    def fit(language: NumberLanguage) -> int:
+        rows = [_cells(line, language, file, k) for k, line in enumerate(lines[:_LOOKED_AT], start=1)]
+        return sum(_count(row, language) - _whole(row, language) for row in rows if len(row) > 1)
+
+    return max(_LANGUAGES, key=fit)
+
+
+def _cells(line: str, language: NumberLanguage, file: str, number: int) -> list[str]:
+    if not line.strip() or (_is_comment(line) and language.separator not in line):
+        return []
+    row = next(csv_rows([line], language.separator, file, first_line=number), (number, list[str]()))[1]
+    return [cell.strip() for cell in row]
+
+
+def _count(row: list[str], language: NumberLanguage) -> int:
+    return sum(bool(np.isfinite(language.number(cell))) for cell in row)
+
+
+def _whole(row: list[str], language: NumberLanguage) -> int:
+    """How many cells are no numbers and hold digits beside a separator or decimal comma."""
+    others = [cell for cell in row if any(sign in cell for sign in _SIGNS) and any(map(str.isdigit, cell))]
+    return len(others) - _count(others, language)
+
+
+def _is_row(row: list[str], language: NumberLanguage) -> bool:
+    return _count(row, language) > 1
+
+
+def _goes_on(rows: list[list[str]], k: int, language: NumberLanguage) -> bool:
+    """Whether the next line is a row of the same table too: a single line of numbers may be a date and a version."""
+    following = next((row for row in rows[k + 1 :] if row), None)
+    return following is not None and len(following) == len(rows[k]) and _is_row(following, language)
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip("\ufeff ").startswith("#")
+
+
+def _comments(lines: list[str]) -> dict[str, str]:
+    """What lines `key: value`, `key = value` or `key;value` above the table say."""
+    found = {}
+    for line in lines:
+        told = re.match(r"[\ufeff# ]*([^:=;\t,]{1,40}?)\s*[:=;\t,]\s*(.+)$", line)
+        if told:
+            found[told[1].strip().lower()] = told[2].strip(' ";\t,')
+    return found

@@ -1,0 +1,1 @@
+"""Figures of a machine over its sessions: trends, and changes beyond uncertainty."""

@@ -1,0 +1,90 @@
+"""Whether the dates of sessions can be right."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from datetime import datetime
+
+    from dbbstation.history.record import SessionFigures
+
+MOSTLY = 0.8
+"""Share of a machine's sessions whose names must stand in the order of their dates before names are taken for a second witness of
+the order. Names that were given at random agree on about 2 / sqrt(n) of n [Logan and Shepp 1977]: a third of 36."""
+
+_NUMBER = re.compile(r"(\d+)")
+
+
+def date_faults(sessions: Sequence[SessionFigures], now: datetime) -> list[str]:
+    """Say which sessions have dates that cannot be right, or that another session has too.
+
+    Args:
+        sessions: of one machine, each with its date.
+        now: the time.
+    """
+    said = []
+    by_date = sorted(sessions, key=_dated)
+    for one, other in pairwise(by_date):
+        if one.started == other.started:
+            said.append(
+                f"{one.name} and {other.name} both start at {told(other.started)}; they are taken by their names"
+            )
+    said += [
+        f"{one.name} is dated {told(one.started)}, which is still to come: was the clock set wrong?"
+        for one in by_date
+        if one.started is not None and one.started > now
+    ]
+    by_name = sorted(sessions, key=lambda one: natural(one.name))
+    outside = _out_of_order([_dated(one) for one in by_name])
+    if 0 < len(outside) <= (1.0 - MOSTLY) * len(by_name):
+        for k in outside:
+            other = by_name[k - 1] if k else by_name[1]
+            where = "follows" if k else "precedes"
+            said.append(
+                f"{by_name[k].name} is dated {told(by_name[k].started)} and {where} {other.name}, dated "
+                f"{told(other.started)}, by its name: was the clock set wrong?"
+            )
+    return said
+
+
+def told(moment: datetime | None) -> str:
+    """Return a moment in words."""
+    return "–" if moment is None else f"{moment:%Y-%m-%d %H:%M}"
+
+
+def natural(name: str) -> tuple[tuple[int, int, str], ...]:
+    """Return a key that sorts names with numbers as people count: `w9` before `w10`."""
+    parts = (part for part in _NUMBER.split(name) if part)
+    return tuple((0, int(part), "") if part.isdecimal() else (1, 0, part) for part in parts)
+
+
+def by_time(session: SessionFigures) -> tuple[float, tuple[tuple[int, int, str], ...]]:
+    """Return a key that sorts sessions by date, those of one date by name."""
+    return _dated(session), natural(session.name)
+
+
+def _dated(session: SessionFigures) -> float:
+    return -1.0 if session.started is None else session.started.timestamp()
+
+
+def _out_of_order(values: Sequence[float]) -> list[int]:
+    """Return which values are not on the longest run of values that do not fall."""
+    tails: list[float] = []
+    ends: list[int] = []
+    before: list[int | None] = []
+    for k, value in enumerate(values):
+        place = bisect_left(tails, value + 1e-9)
+        before.append(ends[place - 1] if place else None)
+        tails[place : place + 1] = [value]
+        ends[place : place + 1] = [k]
+    kept = set[int]()
+    last = ends[-1] if ends else None
+    while last is not None:
+        kept.add(last)
+        last = before[last]
+    return [k for k in range(len(values)) if k not in kept]

@@ -1,0 +1,107 @@
+"""What a history knows of one session and of one model: figures with their uncertainties, and what may explain a change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure of one run.
+
+    Attributes:
+        name: such as `G` or `X`.
+        value_um: its size [µm].
+        u_um: its standard uncertainty [µm].
+    """
+
+    name: str
+    value_um: float
+    u_um: float
+
+
+@dataclass(frozen=True)
+class RunFigures:
+    """Figures of one accepted run.
+
+    Attributes:
+        test: name of its test.
+        direction: `ccw` or `cw`.
+        circle: its commanded circle in words: runs of one test are comparable where these are the same.
+        figures: of the run.
+    """
+
+    test: str
+    direction: str
+    circle: str
+    figures: tuple[Figure, ...]
+
+
+@dataclass(frozen=True)
+class SessionFigures:
+    """One session.
+
+    Attributes:
+        name: of its folder, from the folder of the history.
+        sha256: of its session file.
+        machine: serial number of the machine, or the name in its machine file.
+        started: start of the first accepted run; None where no run has one noted.
+        runs: accepted runs that show a circle.
+        bar: serial number of the bar; empty where not noted.
+        programs: NC programs that were run instead of the plan's circles, as a hash over theirs; empty for none.
+        notes: what is to be said of it.
+    """
+
+    name: str
+    sha256: str
+    machine: str
+    started: datetime | None
+    runs: tuple[RunFigures, ...]
+    bar: str = ""
+    programs: str = ""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ModelParameter:
+    """One parameter of the machine in a model.
+
+    Attributes:
+        source: name of its error source.
+        name: of the parameter.
+        value: its size, in `unit`.
+        u: its standard uncertainty; None where it was held or is not known.
+        unit: of both.
+    """
+
+    source: str
+    name: str
+    value: float
+    u: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class ModelFigures:
+    """One identified model.
+
+    Attributes:
+        file: its path, from the folder of the history.
+        sha256: of the file.
+        sessions: SHA-256 of the session files that it comes from, by name.
+        parameters: those of the machine.
+    """
+
+    file: str
+    sha256: str
+    sessions: dict[str, str] = field(default_factory=dict)
+    parameters: tuple[ModelParameter, ...] = ()
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Names of its error sources: a parameter is comparable with that of a model that has the same ones."""
+        return tuple(dict.fromkeys(parameter.source for parameter in self.parameters))

@@ -1,0 +1,115 @@
+"""How long a control chart runs until it signals: a CUSUM together with a limit for single values.
+
+The chart takes standardised values z, independent and normal with variance one where nothing changes. Upwards it adds
+S = max(0, S + z - k) and signals where S > h [Page 1954, Biometrika 41, 100], or where one z > c [Lucas 1982, J. Quality
+Technology 14, 51]; downwards it does the same with -z. Run lengths come from the Markov chain of [Brook and Evans 1972,
+Biometrika 59, 539], which takes any number of places after the point: no approximation of h is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ndtr, ndtri
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+STATES = 201
+"""Values of S that the chain tells apart. With twice as many the average run length changes by less than a thousandth."""
+
+REFERENCE = 0.5
+"""k [standard deviations]: half the change that is to be found soonest [Page 1954], which is one standard deviation of a session.
+`dbbstation study history` shows what others would bring."""
+
+SINGLE_SHARE = 0.5
+"""Share of the false alarms that the limit for single sessions may make; the CUSUM has the rest. A large step is then seen at once,
+before it widens the scatter that it is held against."""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Limits of a two-sided chart, all in standard deviations of one value.
+
+    Attributes:
+        reference: k, taken off every value.
+        interval: h, beyond which a sum signals.
+        single: c, beyond which one value signals.
+    """
+
+    reference: float
+    interval: float
+    single: float = np.inf
+
+
+def transitions(chart: Chart, mean: float = 0.0) -> NDArray[np.float64]:
+    """Return probabilities of the upward sum's next state by its state, shape (STATES, STATES); what lacks to one signals.
+
+    Args:
+        chart: its limits.
+        mean: of the values, in standard deviations.
+    """
+    width = 2.0 * chart.interval / (2.0 * STATES - 1.0)  # the last state's upper edge is h
+    state = np.arange(STATES)
+    edges = (state[None, :] - state[:, None] + 0.5) * width + chart.reference
+    below = ndtr(np.minimum(edges, chart.single) - mean)
+    return np.diff(below, axis=1, prepend=0.0)
+
+
+def average_run_length(chart: Chart, mean: float = 0.0) -> float:
+    """Return the mean number of values until the two-sided chart signals, its sums at zero before the first.
+
+    The rates of both directions add up [Kemp 1961, J. R. Stat. Soc. B 23, 149].
+    """
+    rates = [1.0 / _one_sided(chart, side * mean) for side in (1.0, -1.0)]
+    return 1.0 / sum(rates)
+
+
+def _one_sided(chart: Chart, mean: float) -> float:
+    lengths = np.linalg.solve(np.eye(STATES) - transitions(chart, mean), np.ones(STATES))
+    return float(lengths[0])
+
+
+def signalled_within(chart: Chart, means: Iterable[float]) -> NDArray[np.float64]:
+    """Return the probability that the upward chart has signalled by each value, shape (n,).
+
+    Args:
+        chart: its limits.
+        means: of each value, in standard deviations; the n values in their order.
+    """
+    state = np.zeros(STATES)
+    state[0] = 1.0
+    within = []
+    moves: dict[float, NDArray[np.float64]] = {}
+    for mean in means:
+        if mean not in moves:
+            moves[mean] = transitions(chart, mean)
+        state = state @ moves[mean]
+        within.append(1.0 - state.sum())
+    return np.array(within)
+
+
+@cache
+def chart_for(false_alarms: float, reference: float = REFERENCE, single_share: float = SINGLE_SHARE) -> Chart:
+    """Return the chart that signals so often where nothing changes.
+
+    Args:
+        false_alarms: signals per value, both directions together: one over the average run length.
+        reference: k.
+        single_share: share of them that single values may make; 0 for a plain CUSUM.
+    """
+    single = -float(ndtri(false_alarms * single_share / 2.0)) if single_share else np.inf
+
+    def beyond(interval: float) -> float:
+        return float(np.log(average_run_length(Chart(reference, interval, single)) * false_alarms))
+
+    # A plain one-sided CUSUM runs for about exp(2 k (h + 1.166)) / (2 k²) values [Siegmund 1985, Sequential Analysis, 2.56].
+    plain = 2.0 / (false_alarms * (1.0 - single_share))
+    guess = float(np.log1p(2.0 * reference**2 * plain)) / (2.0 * reference) - 1.166
+    return Chart(reference, float(brentq(beyond, 0.1, max(guess, 0.0) + 2.0 / reference, xtol=1e-6)), single)

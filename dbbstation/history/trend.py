@@ -1,0 +1,244 @@
+"""Figures of all sessions of a folder as trends: one for each machine, quantity and circle."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.history.order import by_time
+from dbbstation.history.run_length import chart_for
+from dbbstation.history.watch import Verdict, watch
+from dbbstation.plan.tolerance import CircleFigure
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.history.record import Figure, ModelFigures, SessionFigures
+    from dbbstation.history.run_length import Chart
+    from dbbstation.history.watch import Watched
+    from dbbstation.plan.tolerance import Tolerance
+
+FALSE_ALARMS = 1e-3
+"""False alarms per session of a machine, all its quantities together: one in a thousand sessions, in nineteen years of weekly ones.
+As many as the findings of runs allow themselves."""
+
+LIMITED = {
+    "G": CircleFigure.CIRCULAR_DEVIATION,
+    "R": CircleFigure.MEAN_RADIAL_ERROR,
+    "C": CircleFigure.CENTRE_DEVIATION,
+}
+"""Figures that the shop's tolerances hold for."""
+
+NOT_WATCHED = frozenset({"C"})
+"""A distance, folded at zero, is not normal; X and Y, of which it is made, are watched."""
+
+_FIRST = {"G": 0, "X": 1, "Y": 2, "R": 3, "C": 4}
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a trend is of.
+
+    Attributes:
+        figure: such as `G`; name of the parameter.
+        test: name of the test; empty for a parameter.
+        direction: `ccw` or `cw`; empty for a parameter.
+        of: circle in words; of a parameter its error source.
+        unit: of the values.
+        beside: of a parameter the other sources of its models, since it is comparable only beside the same ones.
+    """
+
+    figure: str
+    test: str
+    direction: str
+    of: str
+    unit: str = "µm"
+    beside: tuple[str, ...] = ()
+
+    @property
+    def is_parameter(self) -> bool:
+        """Whether it comes from models."""
+        return not self.test
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """One quantity of one machine over its sessions; arrays have shape (n,).
+
+    Attributes:
+        subject: what it is of.
+        label: in words, no other of this machine has the same.
+        at: which sessions of the machine.
+        values: mean over the runs of each session.
+        u: standard uncertainty of each; NaN where not known.
+        limit: greatest size by the shop's tolerances; None where there is none.
+        watched: what changed; None where it is not watched.
+        why_not: why it is not; empty where it is.
+    """
+
+    subject: Subject
+    label: str
+    at: NDArray[np.intp]
+    values: NDArray[np.float64]
+    u: NDArray[np.float64]
+    limit: float | None
+    watched: Watched | None
+    why_not: str = ""
+
+    @property
+    def verdict(self) -> Verdict:
+        """What its history says."""
+        return Verdict.CANNOT_TELL if self.watched is None else self.watched.verdict
+
+
+@dataclass(frozen=True, eq=False)
+class MachineHistory:
+    """Sessions and trends of one machine.
+
+    Attributes:
+        machine: serial number or name.
+        sessions: in time order.
+        trends: circles first, in the order of tests, then parameters.
+        chart: limits that each quantity is watched with; None where none is.
+        expected: false alarms to be expected over this history if nothing changed.
+    """
+
+    machine: str
+    sessions: tuple[SessionFigures, ...]
+    trends: tuple[Trend, ...]
+    chart: Chart | None
+    expected: float
+
+
+@dataclass
+class _Series:
+    at: list[int] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+    u: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How trends are worked out.
+
+    Attributes:
+        coverage_factor: k of U = k u.
+        tolerances: of the shop.
+        false_alarms: per session, over all quantities of a machine.
+        tests: names of those to take; empty for all.
+        exclude: names of those to leave out.
+    """
+
+    coverage_factor: float
+    tolerances: Sequence[Tolerance] = ()
+    false_alarms: float = FALSE_ALARMS
+    tests: Sequence[str] = ()
+    exclude: Sequence[str] = ()
+
+    def takes(self, test: str) -> bool:
+        """Whether a test is among those that were asked for."""
+        return (not self.tests or test in self.tests) and test not in self.exclude
+
+
+def histories(
+    sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: Asked
+) -> tuple[MachineHistory, ...]:
+    """Return the history of every machine, in the order of their names.
+
+    Args:
+        sessions: each with its date, each counted once.
+        models: by the SHA-256 of the one session that each comes from.
+        asked: how.
+    """
+    machines = sorted({one.machine for one in sessions})
+    return tuple(
+        _history(machine, sorted((one for one in sessions if one.machine == machine), key=by_time), models, asked)
+        for machine in machines
+    )
+
+
+def _history(
+    machine: str, sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: Asked
+) -> MachineHistory:
+    series = _circle_series(sessions, asked) | _parameter_series(sessions, models)
+    numbers = {subject: (np.array(one.at), np.array(one.values), np.array(one.u)) for subject, one in series.items()}
+    reasons = {subject: _why_not(subject, u) for subject, (_, _, u) in numbers.items()}
+    count = sum(not reason for reason in reasons.values())
+    chart = chart_for(asked.false_alarms / count) if count else None
+    labels = _labels(list(series))
+    trends = []
+    for subject, (at, values, u) in numbers.items():
+        looked = None if reasons[subject] or chart is None else watch(values, u, chart, asked.coverage_factor)
+        limit = _limit(subject, asked.tolerances)
+        trends.append(Trend(subject, labels[subject], at, values, u, limit, looked, reasons[subject]))
+    looked_at = sum(trend.watched.watched for trend in trends if trend.watched is not None)
+    return MachineHistory(
+        machine, tuple(sessions), tuple(trends), chart, asked.false_alarms * looked_at / count if count else 0.0
+    )
+
+
+def _why_not(subject: Subject, u: NDArray[np.float64]) -> str:
+    """Return why a quantity cannot be watched; empty where it can."""
+    if subject.figure in NOT_WATCHED and not subject.is_parameter:
+        return "watched by X and Y"
+    if not np.all(u > 0.0):
+        return "its uncertainty is not known"
+    return ""
+
+
+def _circle_series(sessions: Sequence[SessionFigures], asked: Asked) -> dict[Subject, _Series]:
+    found: dict[Subject, _Series] = {}
+    for k, session in enumerate(sessions):
+        runs: dict[tuple[str, str, str], list[tuple[Figure, ...]]] = {}
+        for run in session.runs:
+            if asked.takes(run.test):
+                runs.setdefault((run.test, run.direction, run.circle), []).append(run.figures)
+        for (test, direction, circle), repeats in runs.items():
+            for place, figure in enumerate(repeats[0]):
+                one = found.setdefault(Subject(figure.name, test, direction, circle), _Series())
+                one.at.append(k)
+                one.values.append(float(np.mean([figures[place].value_um for figures in repeats])))
+                # What repeats do not share averages out; what is stated holds mostly what they share.
+                one.u.append(float(np.sqrt(np.mean([figures[place].u_um ** 2 for figures in repeats]))))
+    order = sorted(found, key=lambda s: (s.test, s.direction, s.of, _FIRST.get(s.figure, len(_FIRST))))
+    return {subject: found[subject] for subject in order}
+
+
+def _parameter_series(sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures]) -> dict[Subject, _Series]:
+    found: dict[Subject, _Series] = {}
+    for k, session in enumerate(sessions):
+        model = models.get(session.sha256)
+        for parameter in () if model is None else model.parameters:
+            beside = tuple(sorted(source for source in model.sources if source != parameter.source)) if model else ()
+            subject = Subject(parameter.name, "", "", parameter.source, parameter.unit, beside)
+            one = found.setdefault(subject, _Series())
+            one.at.append(k)
+            one.values.append(parameter.value)
+            one.u.append(np.nan if parameter.u is None else parameter.u)
+    return found
+
+
+def _labels(subjects: Sequence[Subject]) -> dict[Subject, str]:
+    """Return names that tell quantities apart: with the circle, or with the other sources, only where that is needed."""
+    short = {s: f"{s.of} {s.figure}" if s.is_parameter else f"{s.figure} {s.test} {s.direction}" for s in subjects}
+    count = Counter(short.values())
+    return {s: name if count[name] == 1 else f"{name} ({_apart(s)})" for s, name in short.items()}
+
+
+def _apart(subject: Subject) -> str:
+    """Return what tells a quantity from another of the same name."""
+    if not subject.is_parameter:
+        return subject.of
+    return f"beside {', '.join(subject.beside)}" if subject.beside else "alone"
+
+
+def _limit(subject: Subject, tolerances: Sequence[Tolerance]) -> float | None:
+    """Return the smallest limit of the shop's tolerances that holds for a quantity."""
+    figure = None if subject.is_parameter else LIMITED.get(subject.figure)
+    held = [t.largest_um for t in tolerances if t.figure is figure and t.holds_for(subject.test, subject.direction)]
+    return min(held, default=None)

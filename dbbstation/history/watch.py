@@ -1,0 +1,287 @@
+"""Changes of one quantity over the sessions of a machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.history.standardised import BASELINE, standardised
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.history.run_length import Chart
+    from dbbstation.history.standardised import Standardised
+
+
+class Verdict(StrEnum):
+    """What a history says of one quantity."""
+
+    STEADY = "steady"
+    """No change beyond scatter and uncertainty."""
+    STANDS_OUT = "stands out"
+    """Single sessions lie beyond both, and the next ones do not."""
+    CHANGED = "changed"
+    """From some session on it is another."""
+    CANNOT_TELL = "cannot tell"
+    """Too few sessions, or no stated uncertainty."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something beyond scatter and uncertainty.
+
+    Attributes:
+        verdict: `STANDS_OUT` or `CHANGED`.
+        since: number of the value from which it is so.
+        found: number of the value that showed it.
+        difference: values from `since` to `found` less the level before; of a change that is a baseline's length ago: the level
+            after it less the level before.
+        u_difference: its standard uncertainty, by the larger of stated uncertainty and scatter.
+    """
+
+    verdict: Verdict
+    since: int
+    found: int
+    difference: float
+    u_difference: float
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """One quantity over all sessions; arrays have shape (n,).
+
+    Attributes:
+        events: in time order.
+        z: standard normal where nothing changes; NaN where a value was not held against others.
+        high: CUSUM upwards, NaN as above.
+        low: CUSUM downwards, not negative.
+        level: level from a change to the next, the latest known one of each stretch.
+        u_level: its standard uncertainty, by the larger of stated uncertainty and scatter.
+        scatter: of the last stretch, in stated uncertainties; NaN where too few values.
+        lacking: values that the last stretch needs until it is watched; 0 where it is.
+    """
+
+    events: tuple[Event, ...]
+    z: NDArray[np.float64]
+    high: NDArray[np.float64]
+    low: NDArray[np.float64]
+    level: NDArray[np.float64]
+    u_level: NDArray[np.float64]
+    scatter: float
+    lacking: int
+
+    @property
+    def watched(self) -> int:
+        """How many values were held against others."""
+        return int(np.isfinite(self.z).sum())
+
+    @property
+    def verdict(self) -> Verdict:
+        """What all of it says."""
+        if not self.watched:
+            return Verdict.CANNOT_TELL
+        found = {event.verdict for event in self.events}
+        return next((v for v in (Verdict.CHANGED, Verdict.STANDS_OUT) if v in found), Verdict.STEADY)
+
+
+def watch(
+    values: NDArray[np.float64],
+    u: NDArray[np.float64],
+    chart: Chart,
+    coverage_factor: float,
+    baseline: int = BASELINE,
+) -> Watched:
+    """Look for changes beyond scatter and beyond stated uncertainty.
+
+    A change is reported where the chart signals and the difference is more than k u besides. After a change a new baseline begins
+    with the next value: those that showed the change were chosen by it, and would make the new level look off. A single value
+    beyond its limit counts for a change where the next one lies beyond on the same side; otherwise it stands out, and is left out of
+    the level.
+
+    Args:
+        values: in time order, shape (n,).
+        u: standard uncertainty of each, positive, shape (n,).
+        chart: its limits.
+        coverage_factor: k of U = k u.
+        baseline: values before the first that is watched, after each change again.
+    """
+    count = len(values)
+    z, high, low, level, u_level = (np.full(count, np.nan) for _ in range(5))
+    events: list[Event] = []
+    start, out = 0, list[int]()
+    while True:
+        at = np.array([k for k in range(start, count) if k not in out], dtype=np.intp)
+        stretch = _Stretch(at, standardised(values[at], u[at], baseline), values[at], u[at], chart, coverage_factor)
+        found = stretch.first_event()
+        end = count if found is None else found.found + 1
+        inside = at < end
+        z[at[inside]], high[at[inside]], low[at[inside]] = (x[inside] for x in (stretch.of.z, *stretch.sums))
+        if found is not None:
+            alike = _leads_to(found, events, start)
+            if found.verdict is Verdict.STANDS_OUT and not alike:
+                events.append(found)
+                out.append(found.found)
+                continue
+            if alike:
+                events = [event for event in events if event not in alike]
+                found = _change(min(found.since, alike[0].since), found.found, at, values, u)
+        stays = at[inside] if found is None else at[at < found.since]
+        until = count if found is None else found.since
+        level[start:until], u_level[start:until] = stretch.final(len(stays))
+        if start and len(stays) >= baseline:
+            events = [_settled(e, level, u_level, start) if e.found == start - 1 else e for e in events]
+        if found is None:
+            break
+        events.append(found)
+        start = found.found + 1
+        level[found.since : start], u_level[found.since : start] = np.nan, np.nan
+        if start >= count:
+            at = at[:0]
+            break
+    left = len(at)
+    scatter = float(_scatter(values[at], u[at]))
+    return Watched(tuple(events), z, high, low, level, u_level, scatter, max(baseline - left, 0))
+
+
+def _settled(event: Event, level: NDArray[np.float64], u_level: NDArray[np.float64], start: int) -> Event:
+    """Return a change with the difference of the levels about it: that of the values which showed it was chosen for being large.
+
+    Args:
+        event: the change.
+        level: of every value.
+        u_level: its standard uncertainty.
+        start: number of the first value of the level after it.
+    """
+    before = event.since - 1
+    difference, u = float(level[start] - level[before]), float(np.hypot(u_level[start], u_level[before]))
+    return replace(event, difference=difference, u_difference=u)
+
+
+def _leads_to(found: Event, events: list[Event], start: int) -> list[Event]:
+    """Return the single values that stood out on the same side where a change begins: they belong to it.
+
+    Of a value that stands out itself only the one just before it: a change is what goes on.
+    """
+    first = found.since - 1
+    return [
+        event
+        for event in events
+        if event.verdict is Verdict.STANDS_OUT
+        and event.found >= max(first, start)
+        and event.difference * found.difference > 0.0
+    ]
+
+
+def _change(since: int, found: int, at: NDArray[np.intp], values: NDArray[np.float64], u: NDArray[np.float64]) -> Event:
+    """Return a change with all its values, those that stood out among them.
+
+    Args:
+        since: number of its first value.
+        found: number of the value that showed it.
+        at: numbers of the values that the level before is taken from, as far as they are before it.
+        values: all of them.
+        u: their standard uncertainties.
+    """
+    before, these = at[at < since], slice(since, found + 1)
+    level, u_level = _mean(values[before], u[before])
+    after, u_after = _mean(values[these], u[these])
+    spread = max(1.0, _scatter(values[before], u[before]))
+    return Event(Verdict.CHANGED, since, found, after - level, spread * float(np.hypot(u_after, u_level)))
+
+
+def _scatter(values: NDArray[np.float64], u: NDArray[np.float64]) -> float:
+    """Return the standard deviation of values in stated uncertainties; NaN for fewer than two."""
+    if len(values) < 2:  # noqa: PLR2004 - one value does not scatter
+        return np.nan
+    mean = np.average(values, weights=1.0 / u**2)
+    return float(np.sqrt(np.sum(((values - mean) / u) ** 2) / (len(values) - 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Values from the beginning or a change on, without those that stand out.
+
+    Attributes:
+        at: their numbers.
+        of: held against those before.
+        values: themselves.
+        u: their standard uncertainties.
+        chart: its limits.
+        coverage_factor: k of U = k u.
+    """
+
+    at: NDArray[np.intp]
+    of: Standardised
+    values: NDArray[np.float64]
+    u: NDArray[np.float64]
+    chart: Chart
+    coverage_factor: float
+
+    @property
+    def sums(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """CUSUM upwards and downwards; NaN in the baseline."""
+        return tuple(self._sum(side) for side in (1.0, -1.0))  # type: ignore[return-value]  # two of them
+
+    def _sum(self, side: float) -> NDArray[np.float64]:
+        out = np.full(len(self.at), np.nan)
+        steps = np.cumsum(side * self.of.z[np.isfinite(self.of.z)] - self.chart.reference)
+        out[np.isfinite(self.of.z)] = steps - np.minimum(np.minimum.accumulate(steps), 0.0)
+        return out
+
+    def first_event(self) -> Event | None:
+        """Return the first value beyond a limit whose difference is beyond the stated uncertainty too."""
+        sums = self.sums
+        high, low = (np.nan_to_num(one) for one in sums)
+        single = np.abs(np.nan_to_num(self.of.z)) > self.chart.single
+        beyond = single | (np.maximum(high, low) > self.chart.interval)
+        for k in np.flatnonzero(beyond):
+            if single[k]:
+                event = self._event(Verdict.STANDS_OUT, int(k), int(k))
+            else:
+                since = self._since(int(k), 1.0 if high[k] >= low[k] else -1.0)
+                event = self._event(Verdict.CHANGED, since, int(k))
+            if abs(event.difference) > self.coverage_factor * self._stated(event):
+                return event
+        return None
+
+    def _since(self, k: int, side: float) -> int:
+        """Return the most probable first value of a change that value k showed, behind the sum's last zero.
+
+        Of normal values that one whose sum up to k is the largest, over the root of how many they are [Hinkley 1970,
+        Biometrika 57, 1].
+        """
+        sums = np.nan_to_num(self._sum(side))
+        first = int(np.flatnonzero(sums[:k] <= 0.0)[-1]) + 1  # those of the baseline are zero
+        behind = np.cumsum(side * self.of.z[first : k + 1][::-1])[::-1]
+        return first + int(np.argmax(behind / np.sqrt(np.arange(len(behind), 0, -1))))
+
+    def final(self, count: int) -> tuple[float, float]:
+        """Return the level of the first values and its standard uncertainty; NaN for none."""
+        if not count:
+            return np.nan, np.nan
+        level, u_level = _mean(self.values[:count], self.u[:count])
+        scatter = _scatter(self.values[:count], self.u[:count])
+        return level, u_level * max(1.0, float(np.nan_to_num(scatter)))
+
+    def _event(self, verdict: Verdict, since: int, k: int) -> Event:
+        after, u_after = _mean(self.values[since : k + 1], self.u[since : k + 1])
+        u_both = self._spread(since) * float(np.hypot(u_after, self.of.u_level[since]))
+        return Event(verdict, int(self.at[since]), int(self.at[k]), after - float(self.of.level[since]), u_both)
+
+    def _stated(self, event: Event) -> float:
+        """Standard uncertainty of an event's difference by the stated ones alone."""
+        since = int(np.searchsorted(self.at, event.since))
+        return event.u_difference / self._spread(since)
+
+    def _spread(self, k: int) -> float:
+        return max(1.0, float(self.of.scatter[k]))
+
+
+def _mean(values: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the weighted mean and its standard uncertainty by the stated ones."""
+    weight = 1.0 / u**2
+    return float(np.average(values, weights=weight)), float(1.0 / np.sqrt(weight.sum()))

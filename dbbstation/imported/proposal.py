@@ -1,0 +1,128 @@
+"""What the columns of a foreign table probably mean, read off their names: a proposal that a person confirms."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.files.formats.mapping import (
+    ANGLE,
+    DEVIATION,
+    DIRECTION,
+    IGNORED,
+    LENGTH,
+    MEANINGS,
+    OF_RUNS,
+    TIME,
+    UNITS,
+)
+from dbbstation.trace import columns
+from dbbstation.trace.columns import Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+_WORDS = {
+    TIME: {"time", "t", "zeit", "elapsed", "sec", "seconds"},
+    ANGLE: {"angle", "theta", "winkel", "phi"},
+    LENGTH: {"length", "distance", "radius", "laenge", "länge", "abstand"},
+    DEVIATION: {"deviation", "dev", "error", "abweichung", "fehler"},
+    DIRECTION: {"richtung", "dir"},
+}
+
+_UNIT_WORDS = {
+    **dict.fromkeys(("µm", "um", "micron", "microns", "micrometer", "mikrometer"), "µm"),
+    **dict.fromkeys(("mm", "millimeter", "millimetre"), "mm"),
+    **dict.fromkeys(("in", "inch", "inches", "zoll"), "inch"),
+    **dict.fromkeys(("mil", "thou"), "mil"),
+    **dict.fromkeys(("µin", "uin", "µinch", "uinch"), "µinch"),
+    **dict.fromkeys(("deg", "°", "degree", "degrees", "grad"), "deg"),
+    **dict.fromkeys(("rad", "radian", "radians"), "rad"),
+    **dict.fromkeys(("s", "sec", "second", "seconds"), "s"),
+    **dict.fromkeys(("ms", "msec"), "ms"),
+    "m": "m",
+    "min": "min",
+    "turn": "turn",
+}
+
+_OWN = {columns.TIME: (TIME, "s"), columns.LENGTH: (LENGTH, "mm"), columns.THETA: (ANGLE, "deg")}
+_OWN |= {
+    name: (name, "degC" if column.kind is Kind.TEMPERATURE else "A")
+    for name, column in columns.COLUMNS.items()
+    if column.kind in {Kind.TEMPERATURE, Kind.CURRENT}
+}
+
+EXPORTED = frozenset({"test", "direction", "repeat", columns.TIME, columns.THETA, columns.LENGTH})
+"""Columns that tell a table of `dbbstation export`."""
+
+
+@dataclass(frozen=True)
+class Proposed:
+    """What a column probably is.
+
+    Attributes:
+        means: one of `MEANINGS`.
+        unit: of its numbers; empty where the name does not tell it and where there is none.
+    """
+
+    means: str
+    unit: str = ""
+
+    @property
+    def complete(self) -> bool:
+        """Whether a unit is told where one is needed."""
+        return self.means not in UNITS or bool(self.unit)
+
+
+def proposed(names: Sequence[str], units: Mapping[str, str]) -> dict[str, Proposed]:
+    """Return what columns probably are, by name; no two are the same thing, and what cannot be told is ignored.
+
+    Args:
+        names: of the columns.
+        units: what stands below the names, by name.
+    """
+    found: dict[str, Proposed] = {}
+    for name in names:
+        if name in _OWN:
+            found[name] = Proposed(*_OWN[name])
+        elif name in OF_RUNS or name == columns.STATUS:
+            found[name] = Proposed(name)
+    for name in names:
+        taken = {one.means for one in found.values()}
+        meaning = _meaning(name)
+        if name in found or meaning is None or meaning in taken or (meaning == DEVIATION and LENGTH in taken):
+            continue
+        found[name] = Proposed(meaning, _unit(units.get(name, "") or name, meaning))
+    if LENGTH in {one.means for one in found.values()}:
+        found = {name: one for name, one in found.items() if one.means != DEVIATION}
+    return {name: found.get(name, Proposed(IGNORED)) for name in names}
+
+
+def stated(text: str) -> tuple[str, Proposed] | None:
+    """Return what `NAME=MEANING` or `NAME=MEANING:UNIT` says; None where it says nothing that a column can be."""
+    name, has, meant = text.rpartition("=")
+    meaning, _, unit = meant.partition(":")
+    known = UNITS.get(meaning, {})
+    spelled = next((one for one in known if _plain(one) == _plain(unit)), "") or _unit(f"[{unit}]", meaning)
+    if not has or not name or meaning not in MEANINGS or (unit and not spelled) or (unit and not known):
+        return None
+    return name, Proposed(meaning, spelled)
+
+
+def _meaning(name: str) -> str | None:
+    words = set(re.findall(r"[^\W\d_]+", re.sub(r"[\[(].*", "", name).lower()))
+    return next((meaning for meaning, known in _WORDS.items() if words & known), None)
+
+
+def _unit(text: str, meaning: str) -> str:
+    """Unit of a meaning that a name says, in brackets or as its last word; empty where it says none."""
+    bracket = re.search(r"[\[(]\s*([^\])]*?)\s*[\])]", text)
+    word = bracket[1] if bracket else re.split(r"[\s_,/]+", text.strip())[-1]
+    unit = _UNIT_WORDS.get(_plain(word), "")
+    return unit if unit in UNITS.get(meaning, {}) else ""
+
+
+def _plain(text: str) -> str:
+    """A unit as it is compared: Greek mu as the micro sign, small letters."""
+    return text.strip().lower().replace("μ", "µ").replace("μ", "µ")

@@ -1,0 +1,164 @@
+"""Times and angles of one run: angles into the machine's frame; what the file lacks follows from the plan's feed, and is said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.plan.circle import FULL_TURN_DEG, Circle, Direction
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.files.formats.mapping import AngleSchema
+
+LONGEST_START_S = 3600.0
+"""Times that begin later, or before 0, are those of a clock: they are counted from the first sample [s]."""
+
+UNLIKE_FEED = 0.05
+"""Share that the feed of times and angles may differ from the plan's before it is told: ramps and dwells of a control are less than a
+hundredth of a turn's time on the recordings at hand."""
+
+LEAST_TURN = 0.99
+"""Share of a turn that times must cover at the plan's feed; less says that the feed is another one."""
+
+
+class UnusableTravelError(Exception):
+    """Times or angles that no run can have.
+
+    Args:
+        what: is wrong.
+        remedy: what to do.
+    """
+
+    def __init__(self, what: str, remedy: str) -> None:
+        self.what, self.remedy = what, remedy
+        super().__init__(what)
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """When and where samples of a run were taken.
+
+    Attributes:
+        t_s: rising times, shape (n,) [s].
+        theta_deg: angles from +X towards +Y, shape (n,) [deg]; None where the circle has to be found in the trace.
+        rows: which rows of the file these are, shape (n,).
+        computed: what the file did not say, in words.
+    """
+
+    t_s: NDArray[np.float64]
+    theta_deg: NDArray[np.float64] | None
+    rows: NDArray[np.int64]
+    computed: tuple[str, ...] = ()
+
+
+def rises(angle_deg: NDArray[np.float64]) -> bool:
+    """Whether angles grow over the run, steps of a turn aside."""
+    return float(np.sum(np.diff(_unwrapped(angle_deg)))) > 0.0
+
+
+def machine_angles(angle_deg: NDArray[np.float64], said: AngleSchema, circle: Circle) -> NDArray[np.float64]:
+    """Return angles from +X towards +Y, shape (n,) [deg].
+
+    Args:
+        angle_deg: as the file has them, shape (n,) [deg].
+        said: where their 0 lies and how they grow.
+        circle: of the run.
+
+    Raises:
+        UnusableTravelError: they turn against the direction of the run.
+    """
+    sense = circle.direction.sign if said.grows == "travel" else Direction(said.grows).sign
+    zero = circle.start_deg if said.zero_deg is None else said.zero_deg
+    theta = zero + sense * angle_deg
+    if len(theta) > 1 and rises(theta) != (circle.direction is Direction.CCW):
+        raise UnusableTravelError(
+            f"the angles turn against {circle.direction}",
+            "check the direction of the run, and `angle: grows` of the mapping",
+        )
+    return theta
+
+
+def travel(
+    t_s: NDArray[np.float64] | None, theta_deg: NDArray[np.float64] | None, circle: Circle, trace: str | None
+) -> Travel:
+    """Return times and angles of a run.
+
+    Args:
+        t_s: times of the file, shape (n,) [s]; None where it has none.
+        theta_deg: angles in the machine, shape (n,) [deg]; None where it has none.
+        circle: of the run.
+        trace: of a run without angles: `whole` or `turn`.
+
+    Raises:
+        UnusableTravelError: neither is there, times do not rise, or a turn takes longer at the plan's feed.
+    """
+    if t_s is None:
+        if theta_deg is None:
+            raise UnusableTravelError("there are neither times nor angles", "export one of them")
+        return _from_angles(theta_deg, circle)
+    timed, computed = _from_zero(t_s)
+    rows = np.arange(len(timed))
+    if theta_deg is not None:
+        return Travel(timed, theta_deg, rows, (*computed, *_feed_note(timed, theta_deg, circle)))
+    if trace is None:
+        raise UnusableTravelError("this run has no angles", "say in the mapping: `trace: whole`, or `turn`")
+    return Travel(timed, None, rows, computed) if trace == "whole" else _turn(timed, circle, computed)
+
+
+def _from_angles(theta_deg: NDArray[np.float64], circle: Circle) -> Travel:
+    progress = circle.direction.sign * (_unwrapped(theta_deg) - theta_deg[0])
+    still = np.flatnonzero(np.diff(progress) <= 0.0)
+    if len(still):
+        what = f"the angle stands still or turns back in row {still[0] + 2} of the run, and there are no times"
+        raise UnusableTravelError(what, "export the times too, or sort out these rows")
+    said = f"times: computed from the angles {_at(circle)}"
+    return Travel(progress / circle.turning_deg_s, theta_deg, np.arange(len(theta_deg)), (said,))
+
+
+def _from_zero(t_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Times of a clock from their first sample on; others as they are."""
+    back = np.flatnonzero(np.diff(t_s) <= 0.0)
+    if len(back):
+        k = int(back[0]) + 1
+        what = f"time runs backwards or stands still in row {k + 1} of the run: {t_s[k]:g} s after {t_s[k - 1]:g} s"
+        raise UnusableTravelError(what, "check that the rows are those of one run, in order")
+    if 0.0 <= t_s[0] <= LONGEST_START_S:
+        return t_s, ()
+    return t_s - t_s[0], ("times: counted from the first sample of each run, before that they are those of a clock",)
+
+
+def _turn(t_s: NDArray[np.float64], circle: Circle, computed: tuple[str, ...]) -> Travel:
+    """Angles of a turn that begins with the first sample, by the programmed feed."""
+    progress = (t_s - t_s[0]) * circle.turning_deg_s
+    if progress[-1] < LEAST_TURN * FULL_TURN_DEG:
+        turn_s = FULL_TURN_DEG / circle.turning_deg_s
+        what = f"the times span {t_s[-1] - t_s[0]:.2f} s, a turn takes {turn_s:.2f} s {_at(circle)}"
+        raise UnusableTravelError(what, "set the feed of the plan to the one that was run, check the unit of the times")
+    rows = np.flatnonzero(progress < FULL_TURN_DEG)
+    said = f"angles: computed from the times {_at(circle)}, the first sample at {circle.start_deg:g} degrees"
+    beyond = len(t_s) - len(rows)
+    more = (f"{beyond} samples beyond the full turn are left out",) if beyond else ()
+    return Travel(t_s[rows], circle.theta_deg(progress[rows]), rows, (*computed, said, *more))
+
+
+def _feed_note(t_s: NDArray[np.float64], theta_deg: NDArray[np.float64], circle: Circle) -> tuple[str, ...]:
+    if len(t_s) < 2:  # noqa: PLR2004 - one sample has no speed
+        return ()
+    turned = abs(float(np.sum(np.diff(_unwrapped(theta_deg)))))
+    feed = circle.feed_mm_min * turned / float(t_s[-1] - t_s[0]) / circle.turning_deg_s
+    if abs(feed / circle.feed_mm_min - 1.0) <= UNLIKE_FEED:
+        return ()
+    return (f"note: times and angles make a feed of {feed:.0f} mm/min, the plan says {circle.feed_mm_min:g}",)
+
+
+def _at(circle: Circle) -> str:
+    return f"at the plan's feed of {circle.feed_mm_min:g} mm/min"
+
+
+def _unwrapped(theta_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angles without steps of a turn [deg]."""
+    return np.unwrap(theta_deg, period=FULL_TURN_DEG)

@@ -1,0 +1,137 @@
+"""How well a holder puts its ball back: scatter of the ball's place over repeated mountings, with its uncertainty [CAL III-B].
+
+The ball is taken out and put up again n times in each bore, and a CMM measures its centre each time. Within each place the deviations
+from the place's own mean count; sums of squares and degrees of freedom add over places. With f degrees of freedom, f s² / sigma² has
+a chi-square distribution, which gives the interval of sigma [GUM E.4.3].
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import chi2
+from scipy.stats import f as f_distribution
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+LEVEL = 0.95
+"""Probability of the intervals, as that of U (k = 2)."""
+
+UNLIKE_AXES = 0.01
+"""Probability, of axes that scatter alike, to differ so much that it is told."""
+
+FEWEST = 2
+"""Mountings of one place that show a scatter."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """A standard deviation from so many degrees of freedom.
+
+    Attributes:
+        s_um: estimate [µm].
+        low_um: lower end of its interval [µm].
+        high_um: upper end [µm].
+        freedom: degrees of freedom.
+    """
+
+    s_um: float
+    low_um: float
+    high_um: float
+    freedom: int
+
+    @property
+    def u_um(self) -> float:
+        """Standard uncertainty of the estimate, s / sqrt(2 f) [GUM E.4.3] [µm]."""
+        return self.s_um / math.sqrt(2.0 * self.freedom)
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Scatter of a holder.
+
+    Attributes:
+        axes: of x, y and, where it was measured, z.
+        together: of all coordinates, what a holder file states: one standard deviation per axis.
+        rms_distance_um: root mean square of the distance from the mean place, what sigma sqrt(number of axes) estimates [µm].
+        mean_distance_um: mean of that distance, corrected for the mean place that the mountings themselves give [µm].
+        places: number of places.
+        mountings: in all.
+        axes_differ: probability of a ratio as great as that of the largest and the smallest variance, if all axes scatter alike.
+        of_cmm_um: standard deviation of the CMM's readings that was taken off [µm].
+    """
+
+    axes: tuple[Scatter, ...]
+    together: Scatter
+    rms_distance_um: float
+    mean_distance_um: float
+    places: int
+    mountings: int
+    axes_differ: float
+    of_cmm_um: float = 0.0
+
+
+def repeatability(places_um: Sequence[NDArray[np.float64]], cmm_um: float = 0.0, level: float = LEVEL) -> Repeatability:
+    """Return how well a ball comes back to its place.
+
+    Args:
+        places_um: centres over the mountings of one place, shape (n, 2) or (n, 3) each [µm].
+        cmm_um: standard deviation of what the CMM reads of a ball that was not touched [µm]; its variance is taken off.
+        level: probability of the intervals.
+
+    Raises:
+        ValueError: no place has two mountings.
+    """
+    several = [place for place in places_um if len(place) >= FEWEST]
+    if not several:
+        raise ValueError("no place has two mountings: there is no scatter to be seen")
+    off = [place - place.mean(axis=0) for place in several]
+    squares = np.sum([np.sum(one**2, axis=0) for one in off], axis=0)
+    freedom = sum(len(one) - 1 for one in off)
+    axes = tuple(scatter(float(total), freedom, cmm_um, level) for total in squares)
+    together = scatter(float(squares.sum()), freedom * len(squares), cmm_um, level)
+    # Distances from the mean of the mountings themselves are too small by sqrt((n - 1) / n).
+    distances = np.concatenate([np.linalg.norm(one, axis=1) * math.sqrt(len(one) / (len(one) - 1)) for one in off])
+    return Repeatability(
+        axes=axes,
+        together=together,
+        rms_distance_um=math.sqrt(float(squares.sum()) / freedom),
+        mean_distance_um=float(distances.mean()),
+        places=len(several),
+        mountings=len(distances),
+        axes_differ=_axes_differ(squares, freedom),
+        of_cmm_um=cmm_um,
+    )
+
+
+def scatter(squares_um2: float, freedom: int, cmm_um: float = 0.0, level: float = LEVEL) -> Scatter:
+    """Return the standard deviation that a sum of squares shows, and its chi-square interval.
+
+    Args:
+        squares_um2: sum of squares of deviations from means [µm²].
+        freedom: degrees of freedom f.
+        cmm_um: standard deviation whose square is taken off the variance and both ends of its interval [µm].
+        level: probability of the interval.
+    """
+    tail = (1.0 - level) / 2.0
+    variances = (
+        squares_um2 / freedom,
+        squares_um2 / float(chi2.ppf(1.0 - tail, freedom)),
+        squares_um2 / float(chi2.ppf(tail, freedom)),
+    )
+    s_um, low_um, high_um = (math.sqrt(max(one - cmm_um**2, 0.0)) for one in variances)
+    return Scatter(s_um, low_um, high_um, freedom)
+
+
+def _axes_differ(squares: NDArray[np.float64], freedom: int) -> float:
+    """Probability of the greatest ratio of two variances, times the number of pairs [Bonferroni]."""
+    if squares.min() <= 0.0:
+        return 1.0 if squares.max() <= 0.0 else 0.0
+    pairs = len(squares) * (len(squares) - 1) / 2
+    return min(1.0, 2.0 * pairs * float(f_distribution.sf(squares.max() / squares.min(), freedom, freedom)))

@@ -1,0 +1,170 @@
+"""What is done with a session once it is measured: calibrate, diagnose, write programs and report. Each is a command of the program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.service.work import Progress, Work
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+
+class Step(StrEnum):
+    """What can be done, in the order in which it is usual."""
+
+    CALIBRATE = "calibrate"
+    DIAGNOSE = "diagnose"
+    PROGRAMS = "programs"
+    REPORT = "report"
+
+
+KINEMATIC, JOINT, PROGRAMS, REPORT = "model.yaml", "joint-model.yaml", "programs", "report.html"
+"""Names in the folder of results."""
+
+
+@dataclass
+class Result:
+    """How a step stands.
+
+    Attributes:
+        progress: None: not begun.
+        stage: what it does now.
+        passed_s: time since it began, until it ended [s].
+        answer: what its command printed; empty until it is done.
+        failure: what it said where it failed.
+        path: what it wrote; None until it is done.
+    """
+
+    progress: Progress | None = None
+    stage: str = ""
+    passed_s: float = 0.0
+    answer: dict[str, Any] = field(default_factory=dict)
+    failure: str = ""
+    path: Path | None = None
+
+
+class After:
+    """Works on one session, one step at a time; results go into a new folder beside it.
+
+    Args:
+        session: its folder.
+        model: of an earlier calibration, that the circles are held against until this one has a model; None: none.
+        settings: file of the shop's settings where one was named; None: those that are found.
+        start: starts a command; a process of its own.
+    """
+
+    def __init__(
+        self,
+        session: Path,
+        model: Path | None = None,
+        settings: Path | None = None,
+        start: Callable[[Sequence[str], Path], Work] = Work,
+    ) -> None:
+        self.session = session.absolute()
+        self.results = {step: Result() for step in Step}
+        self._model = model
+        self._settings = settings
+        self._start = start
+        self._folder: Path | None = None
+        self._running: tuple[Step, Work] | None = None
+        self._waiting: list[Step] = []
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the results: made with the first step, never one that was there before."""
+        if self._folder is None:
+            parent, name = self.session.parent, f"{self.session.name}-results"
+            numbered = (parent / (name if k == 1 else f"{name}-{k}") for k in range(1, 1000))
+            self._folder = next(path for path in numbered if not path.exists())
+        return self._folder
+
+    @property
+    def busy(self) -> Step | None:
+        """The step that is being done."""
+        return None if self._running is None else self._running[0]
+
+    @property
+    def model(self) -> Path | None:
+        """The best model there is: of the diagnosis, of the calibration, an earlier one."""
+        for step in (Step.DIAGNOSE, Step.CALIBRATE):
+            if self.results[step].progress is Progress.DONE:
+                return self.results[step].path
+        return self._model
+
+    def can(self, step: Step) -> bool:
+        """Whether a step can be begun now."""
+        return self.busy is None and not (step is Step.PROGRAMS and self.model is None)
+
+    def do(self, *steps: Step) -> None:
+        """Do these steps, one behind the other; a step that fails or is cancelled ends the row."""
+        if self.busy is None:
+            self._waiting = list(steps)
+            self._next()
+
+    def cancel(self) -> None:
+        """End what is being done; what was done before stays."""
+        self._waiting = []
+        if self._running is not None:
+            self._running[1].cancel()
+
+    def look(self) -> None:
+        """Take in how far the work has come; begin the next step where one has ended."""
+        if self._running is None:
+            return
+        step, work = self._running
+        result, progress = self.results[step], work.progress
+        result.progress, result.stage, result.passed_s = progress, work.stage, work.passed_s
+        if progress is Progress.RUNNING:
+            return
+        if progress is Progress.DONE:
+            result.answer, result.path = work.answer(), self.folder / self._out(step)
+        elif progress is Progress.FAILED:
+            result.failure = work.failure()
+        work.close()
+        self._running = None
+        if progress is Progress.DONE:
+            self._next()
+        else:
+            self._waiting = []
+
+    def close(self) -> None:
+        """End what is being done, and wait for that."""
+        self._waiting = []
+        if self._running is not None:
+            self._running[1].close()
+            self._running = None
+
+    def _next(self) -> None:
+        if not self._waiting:
+            return
+        step = self._waiting.pop(0)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.results[step] = Result(Progress.RUNNING)
+        self._running = step, self._start(self._arguments(step), self.folder)
+
+    def _arguments(self, step: Step) -> list[str]:
+        settings = [] if self._settings is None else ["--settings", str(self._settings.absolute())]
+        session, out = str(self.session), ["--out", self._out(step), "--force"]
+        model = [] if self.model is None else ["--model", str(self.model)]
+        match step:
+            case Step.CALIBRATE | Step.DIAGNOSE:
+                return [*settings, step.value, session, *out]
+            case Step.PROGRAMS:
+                plan, machine = self._files()
+                return [*settings, "program", "--plan", plan, "--machine", machine, *model, *out]
+            case Step.REPORT:
+                return [*settings, "report", session, *model, *out]
+
+    def _files(self) -> tuple[str, str]:
+        from dbbstation.files.recordings.session import read_session  # noqa: PLC0415 - read when it is needed, anew
+
+        session = read_session(self.session)
+        return str(session.plan_path), str(session.machine_path)
+
+    @staticmethod
+    def _out(step: Step) -> str:
+        return {Step.CALIBRATE: KINEMATIC, Step.DIAGNOSE: JOINT, Step.PROGRAMS: PROGRAMS, Step.REPORT: REPORT}[step]

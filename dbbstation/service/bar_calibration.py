@@ -1,0 +1,173 @@
+"""The bar on its calibrator, live: the instrument is read all the time, and averaged when somebody asks for it."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
+
+from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.files.formats.bar import write_bar
+from dbbstation.instrument.driver import Instrument
+from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
+from dbbstation.service.bar_reading import DRIFT, bar_file, read_on_calibrator
+from dbbstation.service.patience import driver_patience
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.instrument.reading import Reading
+
+_TICK_S = 0.05
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What somebody states of bar and calibrator.
+
+    Attributes:
+        serial_number: of the bar.
+        calibrator: serial number of the block.
+        calibrator_mm: its length at 20 degC [mm].
+        calibrator_u_um: standard uncertainty of that [µm].
+        certified: date of its certificate, YYYY-MM-DD.
+        temp_c: temperature of the bar now [degC].
+    """
+
+    serial_number: str
+    calibrator: str
+    calibrator_mm: float
+    calibrator_u_um: float
+    certified: str
+    temp_c: float
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What was found.
+
+    Attributes:
+        path: of the file that was written.
+        long_um: how much the bar reads too long [µm].
+        u_um: standard uncertainty of that [µm].
+        drift_um: how far it drifted meanwhile [µm].
+        drifted: whether that matters.
+    """
+
+    path: Path
+    long_um: float
+    u_um: float
+    drift_um: float
+    drifted: bool
+
+
+class BarCalibration:
+    """Owns the instrument while the bar is on its calibrator; close it whatever happens.
+
+    Args:
+        protocol: of the instrument.
+        port: where it is.
+        baud: where it is not set to the usual rate.
+        count: good readings that are averaged.
+
+    Attributes:
+        latest: the last reading; None before one has come.
+        failure: what ended the reading; None while all is well.
+        found: of the last calibration; None before it is through.
+        done: readings that have come of those that are averaged.
+        count: as given.
+    """
+
+    def __init__(self, protocol: Protocol, port: str, baud: int | None = None, count: int = USUAL_READINGS) -> None:
+        self._protocol, self._port, self._baud = protocol, port, baud
+        self.count = count
+        self.latest: Reading | None = None
+        self.failure: StationError | None = None
+        self.found: Calibrated | None = None
+        self.done = 0
+        self._wanted: tuple[Stated, Path] | None = None
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="bar", daemon=True)
+        self._thread.start()
+
+    @property
+    def busy(self) -> bool:
+        """Whether readings are being averaged."""
+        return self._wanted is not None and self._thread.is_alive()
+
+    def begin(self, stated: Stated, path: Path) -> None:
+        """Average from now on, and write the file; does nothing while that goes on.
+
+        Args:
+            stated: of bar and calibrator.
+            path: of the file; one that exists is not overwritten.
+        """
+        if not self.busy:
+            self.failure, self.found, self.done = None, None, 0
+            self._wanted = stated, path
+            if not self._thread.is_alive():
+                self._thread = threading.Thread(target=self._run, name="bar", daemon=True)
+                self._thread.start()
+
+    def close(self) -> None:
+        """Give the instrument back."""
+        self._stop.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            with Instrument(self._protocol, self._port, baud=self._baud, **driver_patience(1.0)) as source:
+                while not self._stop.wait(_TICK_S):
+                    readings = source.drain()
+                    self.latest = readings[-1] if readings else self.latest
+                    if self._wanted is not None:
+                        self.found = self._averaged(source, *self._wanted)
+                        self._wanted = None
+        except StationError as error:
+            self.failure, self._wanted = error, None
+        except _StoppedError:
+            pass
+
+    def _averaged(self, source: Instrument, stated: Stated, path: Path) -> Calibrated:
+        try:
+            found = read_on_calibrator(source, self.count, progress=self._progress)
+            file = bar_file(
+                found,
+                {
+                    "serial_number": stated.serial_number,
+                    "temp_c": stated.temp_c,
+                    "temp_uncertainty_k": USUAL_TEMP_UNCERTAINTY_K,
+                    "expansion_um_m_k": STEEL_BAR_UM_M_K,
+                },
+                {
+                    "serial_number": stated.calibrator,
+                    "length_mm": stated.calibrator_mm,
+                    "uncertainty_um": stated.calibrator_u_um,
+                    "certified": stated.certified,
+                },
+                self._protocol.name,
+                datetime.now(UTC),
+            )
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            raise InputError([Problem("bar", 0, 0, f"{'.'.join(map(str, first['loc']))}: {first['msg']}")]) from error
+        except ValueError as error:
+            what = f"{error}; `dbbstation bar --resolution-um` takes the last digit of the display"
+            raise InputError([Problem("bar", 0, 0, what)]) from error
+        write_bar(path, file)
+        drifted = abs(found.drift_mm) > DRIFT * file.uncertainty_mm
+        long_um = 1e3 * (found.mean_mm - file.length_mm)
+        return Calibrated(path, long_um, 1e3 * file.uncertainty_mm, 1e3 * found.drift_mm, drifted)
+
+    def _progress(self, done: int, _of: int) -> None:
+        self.done = done
+        if self._stop.is_set():
+            raise _StoppedError
+
+
+class _StoppedError(Exception):
+    """Somebody left while readings were being averaged."""

@@ -1,0 +1,88 @@
+"""The bar on its calibrator: readings of it, and the file that they become."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import InstrumentError
+from dbbstation.files.formats.bar import BarFile
+from dbbstation.plan.bar import USUAL_READINGS
+from dbbstation.trace.steady import steady
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from datetime import datetime
+
+    from dbbstation.instrument.driver import Instrument
+    from dbbstation.trace.steady import Steady
+
+DRIFT = 2.0
+"""A drift that is greater than the expanded uncertainty (k = 2) matters."""
+
+
+def read_on_calibrator(
+    source: Instrument,
+    count: int = USUAL_READINGS,
+    resolution_um: float | None = None,
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> Steady:
+    """Return the mean of so many good readings.
+
+    Args:
+        source: started instrument.
+        count: good readings.
+        resolution_um: last digit of the display [µm]; None: as the readings show.
+        progress: told how many of how many have come.
+
+    Raises:
+        InstrumentError: the line, or too many readings that are no length.
+        ValueError: the resolution cannot be told.
+    """
+    lengths: list[float] = []
+    for reading in source.readings(2 * count):
+        if reading.length_mm is not None and reading.status == "ok":
+            lengths.append(reading.length_mm)
+            progress(len(lengths), count)
+        if len(lengths) == count:
+            break
+    else:
+        what = f"only {len(lengths)} of {2 * count} readings are a length"
+        raise InstrumentError(what, where=source.where, remedy="put the bar on the calibrator, check its cable")
+    return steady(np.array(lengths), None if resolution_um is None else 1e-3 * resolution_um)
+
+
+def bar_file(
+    found: Steady, of_bar: Mapping[str, object], calibrator: Mapping[str, object], instrument: str, now: datetime
+) -> BarFile:
+    """Return the calibration as its file has it.
+
+    Args:
+        found: the readings.
+        of_bar: serial number, temperature with its uncertainty, expansion, as `BarFile` names them.
+        calibrator: as `CalibratorSchema` has it.
+        instrument: name.
+        now: the time of day with its zone.
+
+    Raises:
+        pydantic.ValidationError: a value that no such file may have.
+    """
+    readings = {
+        "instrument": instrument,
+        "count": found.count,
+        "mean_mm": found.mean_mm,
+        "uncertainty_um": 1e3 * found.uncertainty_mm,
+        "scatter_um": 1e3 * found.scatter_mm,
+        "resolution_um": 1e3 * found.resolution_mm,
+    }
+    calibrated = now.replace(microsecond=0).isoformat().replace("+00:00", "Z")
+    return BarFile.model_validate(
+        {
+            "format": "dbb-bar/1",
+            **of_bar,
+            "calibrated": calibrated,
+            "calibrator": dict(calibrator),
+            "readings": readings,
+        }
+    )

@@ -1,0 +1,71 @@
+"""Files to choose from: machines, plans and calibrations of bars in the working folder, and those of the package."""
+
+from __future__ import annotations
+
+import re
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from dbbstation.files.shipped import shipped_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+
+class Kind(StrEnum):
+    """Formats that are chosen from; the text is how the `format` key begins."""
+
+    MACHINE = "dbb-machine/"
+    PLAN = "dbb-plan/"
+    BAR = "dbb-bar/"
+    MODEL = "dbb-model/"
+
+
+DEPTH = 2
+"""Folders below the working folder that are looked into."""
+
+_HEAD = 4096
+"""Bytes of a file within which its format is stated: behind the comments at its top."""
+
+_SHIPPED = {Kind.MACHINE: ("fixtures", "machines/reference.yaml"), Kind.PLAN: ("protocols", "plans/*.yaml")}
+"""Examples that come with the package."""
+
+
+def candidates(kind: Kind, under: Path, *, shipped: bool = True) -> tuple[Path, ...]:
+    """Return the files of a format, those under a folder first; copies inside sessions are left out.
+
+    Args:
+        kind: which format.
+        under: folder to search, and the folders in it.
+        shipped: whether those of the package are offered too.
+    """
+    own = [path for path in _files(under, DEPTH) if _is(kind, path)]
+    if not shipped or kind not in _SHIPPED:
+        return tuple(own)
+    folder, pattern = _SHIPPED[kind]
+    of_package = [path for path in sorted(shipped_folder(folder).glob(pattern)) if path not in own]
+    return (*own, *of_package)
+
+
+def _files(folder: Path, depth: int) -> Iterator[Path]:
+    try:
+        inside = sorted(folder.iterdir())
+    except OSError:
+        return
+    if any(path.name == "session.yaml" for path in inside):
+        return
+    yield from (path for path in inside if path.suffix in {".yaml", ".yml"} and path.is_file())
+    if depth:
+        for path in inside:
+            if path.is_dir() and not path.name.startswith("."):
+                yield from _files(path, depth - 1)
+
+
+def _is(kind: Kind, path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError:
+        return False
+    return re.search(rb"^format:\s*['\"]?" + re.escape(kind.encode()), head, re.MULTILINE) is not None

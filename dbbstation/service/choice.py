@@ -1,0 +1,205 @@
+"""What somebody chose to measure, what is missing of that, and what it becomes: a job that is checked and ready to be opened."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from dbbstation.files.formats.bar import read_bar
+from dbbstation.files.formats.machine import read_machine
+from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.recordings.session import SESSION_FILE, read_session
+from dbbstation.files.recordings.session_details import SessionDetails
+from dbbstation.instrument.library import load_instrument, with_zero
+from dbbstation.plan.duration import circles_s
+from dbbstation.service.memory import Line
+from dbbstation.service.order import Order, ordered
+from dbbstation.station.assembly import Job
+from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
+from dbbstation.station.programs import load_programs
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.plan.circle import Direction
+    from dbbstation.station.programs import RunProgram
+
+PROGRAMS = "programs"
+"""Folder of a session in which its NC programs are."""
+
+
+class Part(StrEnum):
+    """What has to be chosen for a new session."""
+
+    MACHINE = "machine"
+    PLAN = "plan"
+    INSTRUMENT = "instrument"
+    PORT = "port"
+    FOLDER = "folder"
+    BAR = "bar"
+    PROGRAMS = "programs"
+    OPERATOR = "operator"
+    SERIAL_NUMBER = "serial number"
+    TEMPERATURE = "temperature"
+    ORDER = "order"
+    GATE = "drift gate"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the shop allows.
+
+    Attributes:
+        largest_bar_age_h: age of a calibration of the bar beyond which it is stale [h].
+        largest_loss_percent: share of a run's samples that may be lost [%]; None: what the plan says.
+        loss_over_plan: whether that holds also where the plan says something.
+    """
+
+    largest_bar_age_h: float = USUAL_AGE_H
+    largest_loss_percent: float | None = None
+    loss_over_plan: bool = False
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A session to be made, or to be gone on with.
+
+    Attributes:
+        folder: of the session; None: not chosen.
+        machine: file of the nominal machine; None: not chosen; a session that exists has its own.
+        plan: file of the plan, likewise.
+        line: instrument and port.
+        bar: file of the bar's calibration; None: none.
+        bar_waiver: why it is measured without; empty: it is not.
+        programs: folder of NC programs; None: plain nominal circles.
+        operator: name.
+        serial_number: of the machine.
+        ambient_temp_c: temperature of the shop before [degC]; None: not read.
+        order: of the tests; a session that exists keeps its own.
+        gate: whether the first test is repeated at the end.
+    """
+
+    folder: Path | None = None
+    machine: Path | None = None
+    plan: Path | None = None
+    line: Line = field(default_factory=Line)
+    bar: Path | None = None
+    bar_waiver: str = ""
+    programs: Path | None = None
+    operator: str = ""
+    serial_number: str = ""
+    ambient_temp_c: float | None = None
+    order: Order = Order.PLAN
+    gate: bool = False
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether the session exists."""
+        return self.folder is not None and (self.folder / SESSION_FILE).is_file()
+
+    def missing(self) -> tuple[Part, ...]:
+        """Return what has still to be chosen, in the order in which it is asked for."""
+        given = {
+            Part.MACHINE: self.goes_on or self.machine is not None,
+            Part.PLAN: self.goes_on or self.plan is not None,
+            Part.INSTRUMENT: bool(self.line.instrument),
+            Part.PORT: bool(self.line.port),
+            Part.BAR: self.goes_on or self.line.virtual or self.bar is not None or bool(self.bar_waiver),
+            Part.FOLDER: self.folder is not None,
+        }
+        return tuple(part for part, there in given.items() if not there)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A choice that was read and checked.
+
+    Attributes:
+        job: ready to be opened.
+        protocol: of the instrument.
+        line: instrument and port.
+        runs: of the whole plan.
+        circles_s: time that their circles take at their planned feeds [s].
+    """
+
+    job: Job
+    protocol: Protocol
+    line: Line
+    runs: int
+    circles_s: float
+
+
+def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel | None = None) -> Prepared:
+    """Read what was chosen and dry-run it; nothing is opened or written.
+
+    Args:
+        choice: with nothing missing.
+        limits: of the shop.
+        model: that circles are judged by; None: the nominal machine.
+
+    Raises:
+        StationError: faults of files, a circle that leaves the travel, a bar of unknown length, an unknown instrument.
+        ValueError: something is missing.
+    """
+    limits = limits or Limits()
+    if choice.missing() or choice.folder is None:
+        raise ValueError(f"missing: {', '.join(choice.missing())}")
+    protocol = _protocol(choice)
+    machine, plan, plan_file, programs = _read(choice, limits)
+    calibration = None if choice.bar is None else read_bar(choice.bar)
+    bar = None if calibration is None else calibration.to_bar(protocol.length.stroke_mm)
+    details = SessionDetails(
+        choice.serial_number, choice.operator, choice.ambient_temp_c, bar, choice.bar_waiver.strip()
+    )
+    job = Job(
+        machine,
+        plan,
+        choice.folder,
+        details,
+        programs,
+        rate_hz=protocol.fastest_hz(choice.line.baud),
+        range_mm=protocol.length.range_mm,
+        model=model,
+    )
+    job.check(str(plan_file))
+    domain = plan.to_domain()
+    if not (choice.goes_on or choice.line.virtual or details.bar_waiver):
+        check_bar_known(bar, domain, datetime.now(UTC), limits.largest_bar_age_h)
+    every = [test.run(direction) for test in domain.tests.values() for direction in test.directions]
+    again = [domain.tests[name].run(way) for name in domain.repeat_at_end for way in domain.tests[name].directions]
+    return Prepared(job, protocol, choice.line, len(every) + len(again), circles_s([*every, *again]))
+
+
+def _protocol(choice: Choice) -> Protocol:
+    line = choice.line
+    protocol = load_instrument(line.instrument, line.profile or None)
+    zero_mm = line.zero_mm
+    if zero_mm is None and protocol.length.relative and choice.bar is not None:
+        zero_mm = read_bar(choice.bar).length_mm
+    return with_zero(protocol, zero_mm if protocol.length.relative else None)
+
+
+def _read(choice: Choice, limits: Limits) -> tuple[Machine, InlinePlan, Path, dict[tuple[str, Direction], RunProgram]]:
+    """Machine, plan, the plan's file and programs: those of the session where it exists."""
+    folder = choice.folder
+    if folder is not None and choice.goes_on:
+        session = read_session(folder)
+        machine, plan = session.machine, read_inline_plan(session.plan_path)
+        commanded = any(run.program is not None for run in session.runs)
+        programs = load_programs(folder / PROGRAMS, session.plan, machine) if commanded else {}
+        return machine, plan, session.plan_path, programs
+    if choice.machine is None or choice.plan is None:
+        raise ValueError("machine or plan is missing")
+    machine = read_machine(choice.machine)
+    plan = ordered(read_inline_plan(choice.plan), choice.order, gate=choice.gate)
+    stated = plan.plan.largest_loss_percent is not None
+    if limits.largest_loss_percent is not None and (limits.loss_over_plan or not stated):
+        plan = replace(plan, plan=plan.plan.model_copy(update={"largest_loss_percent": limits.largest_loss_percent}))
+    programs = {} if choice.programs is None else load_programs(choice.programs, plan.to_domain(), machine)
+    return machine, plan, choice.plan, programs

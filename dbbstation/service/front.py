@@ -1,0 +1,289 @@
+"""The front desk of the station: which sessions there are, what can be chosen, what answers; opens and closes jobs."""
+
+from __future__ import annotations
+
+import math
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import StationError
+from dbbstation.files.recordings.session import read_session
+from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
+from dbbstation.service.after import JOINT, KINEMATIC, After
+from dbbstation.service.bar_calibration import BarCalibration, Stated
+from dbbstation.service.candidates import Kind, candidates
+from dbbstation.service.choice import Choice, Limits, Part, Prepared, prepare
+from dbbstation.service.memory import VIRTUAL, Line, Memory
+from dbbstation.service.opening import opener
+from dbbstation.service.port_probe import Answer, ports, probe
+from dbbstation.service.runner import Runner
+from dbbstation.service.session_list import list_sessions
+from dbbstation.service.virtual_place import virtual_place
+from dbbstation.service.work import Progress, Work
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.service.session_list import SessionLine
+    from dbbstation.station.events import Observer
+
+SEED = 3
+"""Of the virtual machine's errors: the same machine every time, so that a session can be gone on with."""
+
+USUAL_VIRTUAL = "streaming-encoder"
+"""Instrument of a virtual machine where none was chosen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A job whose sequence can be started.
+
+    Attributes:
+        prepared: what is measured.
+        runner: runs it.
+    """
+
+    prepared: Prepared
+    runner: Runner
+
+
+@dataclass(frozen=True, eq=False)
+class Front:
+    """Finds, checks and opens; one job at a time.
+
+    Attributes:
+        under: working folder, in which sessions and files are looked for.
+        memory: of last choices.
+        limits: of the shop.
+        observers: told of everything that happens in a sequence.
+        model: that circles are judged by; None: the nominal machine.
+        given: what the command line or the shop's settings say; holds over what is remembered.
+        settings: file of the shop's settings where one was named.
+    """
+
+    under: Path
+    memory: Memory
+    limits: Limits = field(default_factory=Limits)
+    observers: Sequence[Observer] = ()
+    model: IdentifiedModel | None = None
+    given: Choice = field(default_factory=Choice)
+    settings: Path | None = None
+    _open: ExitStack = field(default_factory=ExitStack)
+
+    def sessions(self) -> tuple[SessionLine, ...]:
+        """Return sessions under the working folder and those that were open lately, the last first."""
+        return list_sessions(self.under, [folder for folder, _ in self.memory.read().sessions])
+
+    def first_choice(self) -> Choice:
+        """Return what was chosen last, for a new session: files that are gone are left out."""
+        last = self.memory.read()
+        line = self._with_given(last.line)
+        given = self.given
+        choice = replace(
+            given,
+            line=line,
+            operator=given.operator or last.operator,
+            serial_number=given.serial_number or last.serial_number,
+        )
+        if last.machine is not None and last.machine.is_file():
+            choice = replace(choice, machine=last.machine)
+        if last.plan is not None and last.plan.is_file():
+            choice = replace(choice, plan=last.plan)
+        return replace(choice, folder=self.new_folder())
+
+    def virtual_choice(self) -> Choice:
+        """Return a choice with which anybody can try everything: nothing is missing, and no hardware is needed."""
+        machine = candidates(Kind.MACHINE, self.under)[-1]
+        plan = next(path for path in candidates(Kind.PLAN, self.under) if path.name == "ten-minute-check.yaml")
+        line = Line(instrument=USUAL_VIRTUAL, port=list(VIRTUAL)[-1])
+        return Choice(self.new_folder("virtual"), machine, plan, line)
+
+    def goes_on_with(self, folder: Path) -> Choice:
+        """Return the choice to go on with a session: plan and machine lie in its folder, the instrument is remembered."""
+        return Choice(folder, line=self._with_given(self.memory.read().line_of(folder)))
+
+    def new_folder(self, name: str = "session") -> Path:
+        """Return a folder for a new session that is not there yet."""
+        return _not_there(self.under, name)
+
+    def files(self, part: Part) -> tuple[Path, ...]:
+        """Return the files that can be chosen for a part."""
+        kinds = {Part.MACHINE: Kind.MACHINE, Part.PLAN: Kind.PLAN, Part.BAR: Kind.BAR}
+        return candidates(kinds[part], self.under)
+
+    def instruments(self) -> list[tuple[str, str]]:
+        """Return name and profile of the instruments that are known, the usual profile of each first."""
+        return [(name, one.profile) for name in known_instruments() for one in load_variants(name)]
+
+    def ports(self) -> list[tuple[str, str]]:
+        """Return name and description of what can be chosen as port: those of the computer, and virtual machines."""
+        return [*ports(), *((name, "no hardware, to try it") for name in VIRTUAL)]
+
+    def probe(self, line: Line) -> Answer:
+        """Return what answers at a port; takes some seconds.
+
+        Args:
+            line: instrument and port.
+        """
+        if line.virtual:
+            return Answer(line.port, answers=True, text="is switched on when it is needed")
+        try:
+            protocol = load_instrument(line.instrument, line.profile or None)
+            # What a relative instrument calls zero does not matter for whether it answers.
+            protocol = with_zero(protocol, (line.zero_mm or 0.0) if protocol.length.relative else None)
+        except StationError as error:
+            return Answer(line.port, answers=False, text=str(error))
+        return probe(protocol, line.port, line.baud)
+
+    def prepare(self, choice: Choice) -> Prepared:
+        """Read and check what was chosen; raises as `choice.prepare`."""
+        return prepare(choice, self.limits, self.model)
+
+    def write_programs(self, choice: Choice) -> tuple[int, str]:
+        """Write nominal NC programs of all circles into a new folder beside the session; return how many, and where.
+
+        Raises:
+            StationError: what the command says.
+            ValueError: plan or machine is missing.
+        """
+        plan, machine = choice.plan, choice.machine
+        if choice.folder is not None and choice.goes_on:
+            session = read_session(choice.folder)
+            plan, machine = session.plan_path, session.machine_path
+        if plan is None or machine is None or choice.folder is None:
+            raise ValueError("plan, machine or folder is missing")
+        folder = _not_there(choice.folder.parent, f"{choice.folder.name}-programs")
+        names = ["--plan", str(plan.absolute()), "--machine", str(machine.absolute()), "--out", str(folder.absolute())]
+        work = Work(["program", *names], self.under)
+        try:
+            if work.wait() is not Progress.DONE:
+                raise StationError(work.failure())
+            return len(work.answer()["programs"]), str(folder)
+        finally:
+            work.close()
+
+    def bar_calibration(self, line: Line, values: Mapping[str, str]) -> BarCalibration:
+        """Begin to read the bar on its calibrator; close it whatever happens.
+
+        Args:
+            line: instrument and port.
+            values: what is stated, as `stated_bar` takes it; a relative instrument shows zero at the calibrator's length.
+
+        Raises:
+            StationError: no such instrument.
+            ValueError: a relative instrument, and the calibrator's length is no number.
+        """
+        protocol = load_instrument(line.instrument, line.profile or None)
+        zero_mm = line.zero_mm
+        if protocol.length.relative and zero_mm is None:
+            zero_mm = _number(values, "calibrator_mm")
+        protocol = with_zero(protocol, zero_mm if protocol.length.relative else None)
+        return BarCalibration(protocol, line.port, line.baud)
+
+    def stated_bar(self, values: Mapping[str, str]) -> Stated:
+        """Return what is stated of bar and calibrator.
+
+        Args:
+            values: texts by the names of `Stated`.
+
+        Raises:
+            ValueError: one that should be a number is none.
+        """
+        numbers = {name: _number(values, name) for name in ("calibrator_mm", "calibrator_u_um", "temp_c")}
+        return Stated(values["serial_number"], values["calibrator"], certified=values["certified"], **numbers)
+
+    def off_calibrator_um(self, length_mm: float, values: Mapping[str, str]) -> float | None:
+        """Return how much longer a reading is than the calibrator [µm]; None where its length is not stated yet."""
+        try:
+            return 1e3 * (length_mm - _number(values, "calibrator_mm"))
+        except ValueError:
+            return None
+
+    def new_bar_file(self) -> Path:
+        """Return a file for a calibration of the bar that is not there yet."""
+        return _not_there(self.under, f"bar-{datetime.now().astimezone():%Y-%m-%d}", ".yaml")
+
+    def open(self, choice: Choice, prepared: Prepared) -> Opened:
+        """Switch on what is virtual, remember the choice, and return what runs the sequence.
+
+        Raises:
+            StationError: the virtual machine refuses.
+        """
+        self.close()
+        job, line = prepared.job, prepared.line
+        port, observers = line.port, [*self.observers]
+        if line.virtual:
+            place = self._open.enter_context(
+                virtual_place(
+                    job.machine,
+                    job.plan.to_domain(),
+                    prepared.protocol,
+                    time_scale=line.time_scale,
+                    seed=SEED,
+                    programs=job.programs,
+                )
+            )
+            job = replace(job, clock=place.clock, time_scale=line.time_scale)
+            port, observers = place.port, [*observers, place.helper]
+        self._remember(choice)
+        opened = opener(job, prepared.protocol, port, baud=line.baud, observers=observers, time_scale=line.time_scale)
+        runner = Runner(opened)
+        self._open.callback(runner.close)
+        return Opened(replace(prepared, job=job), runner)
+
+    def close(self) -> None:
+        """End the sequence that is open, and switch off what is virtual."""
+        self._open.close()
+
+    def after(self, session: Path) -> After:
+        """Return what can be done with a session that is measured."""
+        return After(session, self.last_model(session), self.settings)
+
+    def last_model(self, session: Path) -> Path | None:
+        """Return the model that was made last beside a session, by this program's names; None where there is none."""
+        found = [
+            (path.stat().st_mtime, path.name == JOINT, path)
+            for name in (KINEMATIC, JOINT)
+            for path in session.absolute().parent.glob(f"*-results*/{name}")
+        ]
+        return max(found)[2] if found else None
+
+    def _with_given(self, line: Line) -> Line:
+        given = {key: value for key, value in self.given.line.model_dump().items() if value not in {"", None}}
+        if "instrument" in given and given["instrument"] != line.instrument:
+            line = line.model_copy(update={"profile": "", "zero_mm": None})
+        return line.model_copy(update=given)
+
+    def _remember(self, choice: Choice) -> None:
+        last = self.memory.read()
+        if choice.folder is None:
+            return
+        kept = replace(
+            last,
+            machine=last.machine if choice.machine is None else choice.machine.absolute(),
+            plan=last.plan if choice.plan is None else choice.plan.absolute(),
+            operator=choice.operator or last.operator,
+            serial_number=choice.serial_number or last.serial_number,
+        )
+        self.memory.write(kept.with_session(choice.folder, choice.line))
+
+
+def _not_there(folder: Path, name: str, suffix: str = "") -> Path:
+    """Return a path of that name that does not exist, with a number where it has to."""
+    numbered = (folder / f"{name if k == 1 else f'{name}-{k}'}{suffix}" for k in range(1, 10_000))
+    return next(path for path in numbered if not path.exists())
+
+
+def _number(values: Mapping[str, str], name: str) -> float:
+    text = values.get(name, "").replace(",", ".")
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError(f"{name}: `{text}` is no number")
+    return number

@@ -1,0 +1,137 @@
+"""What was chosen last, and which sessions were open: kept in the user's folder for states, so that the next start offers it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from dbbstation.errors import OutputError
+from dbbstation.files.atomic import write_text
+
+FILE = "station.json"
+"""Name of the file in the user's folder for states."""
+
+MOST = 20
+"""Sessions that are remembered: more than anybody looks through."""
+
+
+class Line(BaseModel):
+    """Which instrument answers where."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    instrument: str = ""
+    """Name or protocol file."""
+    profile: str = ""
+    """Variant of the instrument; empty: the usual one."""
+    port: str = ""
+    """Name or URL of the port; one of `VIRTUAL`: a virtual machine in this program."""
+    baud: int | None = None
+    """Baud rate where it is not the usual one."""
+    zero_mm: float | None = None
+    """Where a relative instrument shows zero [mm]."""
+
+    @property
+    def virtual(self) -> bool:
+        """Whether machine and instrument are virtual."""
+        return self.port in VIRTUAL
+
+    @property
+    def time_scale(self) -> float:
+        """How much faster than real time it goes."""
+        return VIRTUAL.get(self.port, 1.0)
+
+
+VIRTUAL = {"virtual machine": 1.0, "virtual machine, 10 times faster": 10.0}
+"""What stands where the name of a port stands, and how much faster than real time it then goes."""
+
+_NO_LINE = Line()
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    machine: str = ""
+    plan: str = ""
+    line: Line = Line()
+    operator: str = ""
+    serial_number: str = ""
+    sessions: dict[str, Line] = {}
+
+
+@dataclass(frozen=True)
+class Remembered:
+    """Last choices.
+
+    Attributes:
+        machine: file of the nominal machine; None: none yet.
+        plan: file of the plan; None: none yet.
+        line: instrument and port.
+        operator: name.
+        serial_number: of the machine.
+        sessions: folders, the last first, each with what it was measured by.
+    """
+
+    machine: Path | None = None
+    plan: Path | None = None
+    line: Line = _NO_LINE
+    operator: str = ""
+    serial_number: str = ""
+    sessions: tuple[tuple[Path, Line], ...] = ()
+
+    def line_of(self, folder: Path) -> Line:
+        """Return what a session was measured by; the last choice where it is not remembered."""
+        return dict(self.sessions).get(folder.absolute(), self.line)
+
+    def with_session(self, folder: Path, line: Line) -> Remembered:
+        """Return the same with a session that was opened just now."""
+        folder = folder.absolute()
+        others = [(other, by) for other, by in self.sessions if other != folder]
+        return replace(self, line=line, sessions=((folder, line), *others)[:MOST])
+
+
+class Memory:
+    """The file of last choices.
+
+    Args:
+        path: of the file; None: that of the user.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self._path = path
+
+    @property
+    def path(self) -> Path:
+        """Where it is."""
+        if self._path is None:
+            import platformdirs  # noqa: PLC0415 - only who remembers looks for the user's folders
+
+            self._path = platformdirs.user_state_path("dbbstation", appauthor=False) / FILE
+        return self._path
+
+    def read(self) -> Remembered:
+        """Return the last choices; none where the file is missing or not understood: it is only a convenience."""
+        try:
+            file = _File.model_validate_json(self.path.read_bytes())
+        except (OSError, ValidationError):
+            return Remembered()
+        sessions = tuple((Path(folder), line) for folder, line in file.sessions.items())
+        machine, plan = (Path(name) if name else None for name in (file.machine, file.plan))
+        return Remembered(machine, plan, file.line, file.operator, file.serial_number, sessions)
+
+    def write(self, remembered: Remembered) -> None:
+        """Keep the last choices; where they cannot be kept, nothing else suffers."""
+        file = _File(
+            machine=str(remembered.machine or ""),
+            plan=str(remembered.plan or ""),
+            line=remembered.line,
+            operator=remembered.operator,
+            serial_number=remembered.serial_number,
+            sessions={str(folder): line for folder, line in remembered.sessions},
+        )
+        with suppress(OSError, OutputError):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            write_text(self.path, file.model_dump_json(indent=1) + "\n", force=True, rewrites=True)

@@ -1,0 +1,64 @@
+"""What answers at a port: opened, one reading waited for, closed again."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import StationError
+from dbbstation.instrument.driver import Instrument
+from dbbstation.instrument.link import connected_ports
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.protocol import Protocol
+
+PATIENCE_S = 4.0
+"""So long is waited for a reading: a display answers in a tenth of a second, a stream sends by itself [s]."""
+
+_LOOK_S = 0.02
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came from a port.
+
+    Attributes:
+        port: name or URL.
+        answers: whether readings came that the protocol understands.
+        text: the reading, what the instrument says in place of one, or what is wrong and what helps.
+    """
+
+    port: str
+    answers: bool
+    text: str
+
+
+def ports() -> list[tuple[str, str]]:
+    """Return name and description of every serial port of this computer."""
+    return [(name, description) for name, description, _ in connected_ports()]
+
+
+def probe(protocol: Protocol, port: str, baud: int | None = None, patience_s: float = PATIENCE_S) -> Answer:
+    """Ask a port for a reading of an instrument.
+
+    Args:
+        protocol: of the instrument that is expected.
+        port: name or URL.
+        baud: where the instrument is not set to the usual rate.
+        patience_s: how long to wait [s].
+    """
+    try:
+        with Instrument(protocol, port, baud=baud, timeout_s=patience_s) as source:
+            end_s = time.monotonic() + patience_s
+            while time.monotonic() < end_s:
+                readings = source.drain()
+                if readings:
+                    last = readings[-1]
+                    if last.length_mm is not None:
+                        return Answer(port, answers=True, text=f"{last.length_mm:.4f} mm")
+                    return Answer(port, answers=True, text=f"no bar: {last.said or last.status}")
+                time.sleep(_LOOK_S)
+    except StationError as error:
+        return Answer(port, answers=False, text=f"{error.what}; {error.remedy}" if error.remedy else error.what)
+    return Answer(port, answers=False, text="nothing came")

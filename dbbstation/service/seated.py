@@ -1,0 +1,36 @@
+"""Whether the bar stands where a run begins, before anything is recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.station.detector import HYSTERESIS
+
+if TYPE_CHECKING:
+    from dbbstation.plan.circle import Circle
+
+
+@dataclass(frozen=True)
+class Seat:
+    """How the bar stands at the feed-in point.
+
+    Attributes:
+        long_mm: reading less what it reads there, bar and feed-in [mm].
+        seated: whether the sequence takes it for standing there: on the far side of the middle of the feed-in,
+            by the margin of its detector.
+    """
+
+    long_mm: float
+    seated: bool
+
+
+def seat(length_mm: float, circle: Circle) -> Seat:
+    """Return how the bar stands at the feed-in point of a circle.
+
+    Args:
+        length_mm: reading [mm].
+        circle: that is run next.
+    """
+    long_mm = length_mm - (circle.bar_mm + circle.feed_in_mm)
+    return Seat(long_mm, abs(long_mm) < (0.5 - HYSTERESIS) * circle.feed_in_mm)

@@ -1,0 +1,91 @@
+"""Questions whose answer is chosen from a list, or typed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.containers import Vertical
+from textual.content import Content
+from textual.screen import ModalScreen
+from textual.widgets import Input, OptionList, Static
+from textual.widgets.option_list import Option
+
+from dbbstation.tui.texts import TYPED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from textual.app import ComposeResult
+    from textual.binding import BindingType
+
+
+class ChooseQuestion(ModalScreen[int | None]):
+    """Returns the place of what was chosen; None where nothing was.
+
+    Args:
+        title: what is asked for.
+        labels: what can be chosen.
+        at: place that is offered first.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [("escape,q,ctrl+c", "dismiss(None)", "Back")]
+
+    DEFAULT_CSS = """
+    ChooseQuestion {
+        align: center middle;
+        & > Vertical { width: 76; max-width: 95%; height: auto; max-height: 95%; padding: 0 1; background: $panel; border: thick $primary; }
+        & OptionList { height: auto; max-height: 16; }
+    }
+    """
+
+    def __init__(self, title: str, labels: Sequence[str], at: int = 0) -> None:
+        super().__init__()
+        self._title, self._labels, self._at = title, labels, at
+
+    def compose(self) -> ComposeResult:
+        """Ask."""
+        with Vertical():
+            yield Static(self._title, markup=False)
+            yield OptionList(*(Option(Content(label)) for label in self._labels))
+
+    def on_mount(self) -> None:
+        """Offer what was chosen before."""
+        options = self.query_one(OptionList)
+        options.highlighted = min(max(self._at, 0), len(self._labels) - 1) if self._labels else None
+        options.focus()
+
+    def on_option_list_option_selected(self, chosen: OptionList.OptionSelected) -> None:
+        """Close with the place of what was chosen."""
+        self.dismiss(chosen.option_index)
+
+
+class TypeQuestion(ModalScreen[str | None]):
+    """Returns what was typed, without blanks about it; None where nothing was asked of it.
+
+    Args:
+        title: what is asked for.
+        text: what stands there first.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [("escape,ctrl+c", "dismiss(None)", "Back")]
+
+    DEFAULT_CSS = """
+    TypeQuestion {
+        align: center middle;
+        & > Vertical { width: 76; max-width: 95%; height: auto; padding: 0 1; background: $panel; border: thick $primary; }
+    }
+    """
+
+    def __init__(self, title: str, text: str = "") -> None:
+        super().__init__()
+        self._title, self._text = title, text
+
+    def compose(self) -> ComposeResult:
+        """Ask."""
+        with Vertical():
+            yield Static(self._title, markup=False)
+            yield Input(value=self._text, placeholder=TYPED)
+
+    def on_input_submitted(self, submitted: Input.Submitted) -> None:
+        """Close with what was typed."""
+        self.dismiss(submitted.value.strip())

@@ -1,0 +1,146 @@
+"""The bar on its calibrator: live reading, what is stated of both, and the calibration."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.content import Content
+
+from dbbstation.errors import StationError
+from dbbstation.tui import texts
+from dbbstation.tui.asking import TypeQuestion
+from dbbstation.tui.row_screen import RowScreen
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from textual.binding import BindingType
+    from textual.widgets import OptionList
+
+    from dbbstation.service.bar_calibration import BarCalibration
+    from dbbstation.service.front import Front
+    from dbbstation.service.memory import Line
+
+_NAME = 30
+
+
+class BarScreen(RowScreen):
+    """Owns the instrument until it is left.
+
+    Args:
+        front: opens the instrument.
+        line: which, and where.
+        then: told the file of the calibration when it is left with one.
+    """
+
+    help_name = "bar"
+
+    BINDINGS: ClassVar[list[BindingType]] = [("b", "begin", "Read the bar"), ("escape,q", "back", "Back")]
+
+    def __init__(self, front: Front, line: Line, then: Callable[[Path], None]) -> None:
+        super().__init__()
+        self._front, self._line, self._then = front, line, then
+        self._values = dict.fromkeys(texts.BAR_ROWS, "")
+        self._calibration: BarCalibration | None = None
+        self._problem = ""
+
+    def on_mount(self) -> None:
+        """Open the instrument."""
+        self._show()
+        self._reopen()
+
+    def on_unmount(self) -> None:
+        """Give the instrument back."""
+        if self._calibration is not None:
+            self._calibration.close()
+
+    def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
+        """Change the chosen row."""
+        name = list(texts.BAR_ROWS)[self.at]
+
+        def answered(text: str | None) -> None:
+            if text is not None:
+                had_length = self._values["calibrator_mm"]
+                self._values[name], self._problem = text, ""
+                if self._values["calibrator_mm"] != had_length:
+                    self._reopen()
+                self._show()
+
+        self.app.push_screen(TypeQuestion(texts.BAR_ROWS[name], self._values[name]), answered)
+
+    def action_begin(self) -> None:
+        """Read the bar, once everything is stated."""
+        if self._calibration is None or self._missing():
+            return
+        try:
+            stated = self._front.stated_bar(self._values)
+        except ValueError as error:
+            self._problem = str(error)
+            self.look()
+            return
+        self._problem = ""
+        self._calibration.begin(stated, self._front.new_bar_file())
+
+    def action_back(self) -> None:
+        """Go back, with the calibration where there is one."""
+        found = None if self._calibration is None else self._calibration.found
+        self.dismiss()
+        if found is not None:
+            self._then(found.path)
+
+    def look(self) -> None:
+        """Show the live reading, and how the calibration stands."""
+        calibration = self._calibration
+        if not self.stands:
+            return
+        if calibration is None:
+            self.say(self._problem, wrong=True)
+            return
+        failure = calibration.failure
+        if self._problem or failure is not None:
+            self.say(self._problem or str(failure), wrong=True)
+        elif calibration.busy:
+            self.say(texts.BAR_READS.format(done=calibration.done, of=calibration.count))
+        elif calibration.found is not None:
+            found = calibration.found
+            text = texts.BAR_DONE.format(long=found.long_um, u=found.u_um, path=found.path.name)
+            self.say(text + (texts.BAR_DRIFTED.format(drift=found.drift_um) if found.drifted else ""))
+        elif self._missing():
+            self.say(texts.BAR_MISSING.format(rows=", ".join(texts.BAR_ROWS[name] for name in self._missing())))
+        else:
+            self.say(texts.BAR_READY)
+        self.about(Content.styled(self._live(), "bold"))
+
+    def _reopen(self) -> None:
+        if self._calibration is not None:
+            self._calibration.close()
+        self._calibration = None
+        try:
+            self._calibration = self._front.bar_calibration(self._line, self._values)
+        except (ValueError, StationError) as error:
+            self._problem = str(error)
+
+    def _live(self) -> str:
+        reading = None if self._calibration is None else self._calibration.latest
+        if reading is None:
+            return ""
+        if reading.length_mm is None:
+            return texts.BAR_NO_BAR.format(said=reading.said or reading.status)
+        off_um = self._front.off_calibrator_um(reading.length_mm, self._values)
+        return (
+            texts.BAR_LIVE.format(length=reading.length_mm, off=off_um)
+            if off_um is not None
+            else f"{reading.length_mm:.4f} mm"
+        )
+
+    def _missing(self) -> list[str]:
+        return [name for name, value in self._values.items() if not value]
+
+    def _show(self) -> None:
+        self.put(
+            [
+                Content.assemble(f"{'·' if self._values[name] else '!'} {title:{_NAME}} ", (self._values[name], "bold"))
+                for name, title in texts.BAR_ROWS.items()
+            ]
+        )

@@ -1,0 +1,305 @@
+"""What is measured: a row for each thing that a session needs, and a sentence that says what is missing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.content import Content
+
+from dbbstation.service.choice import Part
+from dbbstation.service.order import Order
+from dbbstation.tui import texts
+from dbbstation.tui.asking import ChooseQuestion, TypeQuestion
+from dbbstation.tui.bar_screen import BarScreen
+from dbbstation.tui.prepare_screen import PrepareScreen
+from dbbstation.tui.row_screen import RowScreen
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from textual.binding import BindingType
+    from textual.widgets import OptionList
+
+    from dbbstation.service.choice import Choice, Prepared
+    from dbbstation.service.front import Front
+    from dbbstation.service.port_probe import Answer
+    from dbbstation.tui.reception import Reception
+
+ROWS = tuple(Part)
+_OF_LINE = (Part.INSTRUMENT, Part.PORT)
+_NAME = 15
+
+
+class NewScreen(RowScreen):
+    """Pushed over the sessions.
+
+    Args:
+        reception: does work in the background, opens jobs.
+        front: knows what can be chosen.
+        choice: what stands there first.
+    """
+
+    help_name = "new"
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("b", "begin", "Begin"),
+        ("t", "probe", "Ask the port"),
+        ("delete", "empty", "Empty"),
+        ("escape,q", "back", "Back"),
+    ]
+
+    def __init__(self, reception: Reception, front: Front, choice: Choice) -> None:
+        super().__init__()
+        self.choice = choice
+        self._reception, self._front = reception, front
+
+    def on_mount(self) -> None:
+        """Show what stands there."""
+        self._show()
+
+    def action_back(self) -> None:
+        """Go back to the sessions."""
+        self.dismiss()
+
+    def action_begin(self) -> None:
+        """Read and check everything, then show the checklist."""
+        missing = self.choice.missing()
+        if missing:
+            self._show()
+            return
+        self.say(texts.NEW_CHECKS)
+        choice = self.choice
+        self._reception.do(lambda: self._front.prepare(choice), self._prepared, self._failed)
+
+    def action_probe(self) -> None:
+        """Ask the port for a reading."""
+        line = self.choice.line
+        if not line.instrument or not line.port:
+            self._show()
+            return
+        self.say(texts.NEW_ASKS.format(port=line.port, instrument=line.instrument))
+        self._reception.do(lambda: self._front.probe(line), self._answered, self._failed)
+
+    def action_empty(self) -> None:
+        """Take back what stands in the row."""
+        part = ROWS[self.at]
+        if part is Part.INSTRUMENT:
+            self._line(instrument="", profile="", zero_mm=None)
+        elif part is Part.PORT:
+            self._line(port="", baud=None)
+        elif part is Part.BAR:
+            self._take(bar=None, bar_waiver="")
+        elif part in _EMPTY and part not in self._kept():
+            self._take(**{_FIELDS[part]: _EMPTY[part]})
+
+    def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
+        """Change the chosen row."""
+        part = ROWS[self.at]
+        if part in self._kept():
+            return
+        match part:
+            case Part.MACHINE | Part.PLAN:
+                self._choose_file(part)
+            case Part.BAR:
+                self._choose_bar()
+            case Part.INSTRUMENT:
+                self._choose_instrument()
+            case Part.PORT:
+                self._choose_port()
+            case Part.ORDER:
+                orders = list(Order)
+                self._take(order=orders[(orders.index(self.choice.order) + 1) % len(orders)])
+            case Part.GATE:
+                self._take(gate=not self.choice.gate)
+            case _:
+                self._type(part, str(getattr(self.choice, _FIELDS[part]) or ""), lambda text: self._typed(part, text))
+
+    def _kept(self) -> frozenset[Part]:
+        """Rows that a session which exists has by itself."""
+        return frozenset(ROWS) - frozenset(_OF_LINE) if self.choice.goes_on else frozenset()
+
+    def _choose_file(self, part: Part) -> None:
+        files = self._front.files(part)
+        labels = [*(f"{path.name:28} {path.parent}" for path in files), texts.TYPE_ANOTHER]
+        now = getattr(self.choice, _FIELDS[part])
+
+        def answered(at: int | None) -> None:
+            if at is None:
+                return
+            if at < len(files):
+                self._take(**{_FIELDS[part]: files[at]})
+            else:
+                self._type(part, str(now or ""), lambda text: self._typed(part, text))
+
+        self._ask(part, labels, files.index(now) if now in files else 0, answered)
+
+    def _choose_bar(self) -> None:
+        files = self._front.files(Part.BAR)
+        labels = [*(f"{path.name:28} {path.parent}" for path in files), texts.MEASURE_BAR, texts.TYPE_REASON]
+
+        def answered(at: int | None) -> None:
+            if at is None:
+                return
+            if at < len(files):
+                self._take(bar=files[at], bar_waiver="")
+            elif at == len(files):
+                self._measure_bar()
+            else:
+                self._type(Part.BAR, self.choice.bar_waiver, lambda text: self._take(bar=None, bar_waiver=text))
+
+        self._ask(Part.BAR, labels, 0, answered)
+
+    def _measure_bar(self) -> None:
+        line = self.choice.line
+        if not line.instrument or not line.port:
+            self._show()
+            return
+        screen = BarScreen(self._front, line, lambda path: self._take(bar=path, bar_waiver=""))
+        self.app.push_screen(screen)
+
+    def _choose_instrument(self) -> None:
+        choices = self._front.instruments()
+        labels = [f"{name:26} {profile or texts.NO_PROFILE}" for name, profile in choices]
+        now = (self.choice.line.instrument, self.choice.line.profile)
+
+        def answered(at: int | None) -> None:
+            if at is None:
+                return
+            if at < len(choices):
+                name, profile = choices[at]
+                self._line(instrument=name, profile=profile, zero_mm=None)
+            else:
+                self._type(Part.INSTRUMENT, "", lambda text: self._line(instrument=text, profile="", zero_mm=None))
+
+        self._ask(Part.INSTRUMENT, [*labels, texts.TYPE_ANOTHER], choices.index(now) if now in choices else 0, answered)
+
+    def _choose_port(self) -> None:
+        found = self._front.ports()
+        names = [name for name, _ in found]
+        labels = [*(f"{name:34} {description}" for name, description in found), texts.TYPE_ANOTHER]
+
+        def answered(at: int | None) -> None:
+            if at is None:
+                return
+            if at < len(names):
+                self._line(port=names[at], baud=self.choice.line.baud)
+                self.action_probe()
+            else:
+                self._type(Part.PORT, self.choice.line.port, lambda text: self._line(port=text))
+
+        self._ask(
+            Part.PORT, labels, names.index(self.choice.line.port) if self.choice.line.port in names else 0, answered
+        )
+
+    def _ask(self, part: Part, labels: list[str], at: int, then: Callable[[int | None], None]) -> None:
+        self.app.push_screen(ChooseQuestion(texts.CHOOSE_TITLE.format(part=texts.PARTS[part]), labels, at), then)
+
+    def _type(self, part: Part, text: str, then: Callable[[str], None]) -> None:
+        def answered(typed: str | None) -> None:
+            if typed:
+                then(typed)
+
+        self.app.push_screen(TypeQuestion(texts.PARTS[part], text), answered)
+
+    def _typed(self, part: Part, text: str) -> None:
+        if part is Part.TEMPERATURE:
+            temp_c = _temperature(text)
+            if temp_c is None:
+                self.say(texts.NO_NUMBER.format(text=text), wrong=True)
+            else:
+                self._take(ambient_temp_c=temp_c)
+        elif part in {Part.MACHINE, Part.PLAN, Part.FOLDER, Part.PROGRAMS}:
+            self._take(**{_FIELDS[part]: (self._front.under / Path(text).expanduser())})
+        else:
+            self._take(**{_FIELDS[part]: text})
+
+    def _take(self, **changed: object) -> None:
+        self.choice = replace(self.choice, **changed)  # type: ignore[arg-type]  # the fields of a row, checked by its kind
+        self._show()
+
+    def _line(self, **changed: object) -> None:
+        self._take(line=self.choice.line.model_copy(update=changed))
+
+    def _show(self) -> None:
+        missing = self.choice.missing()
+        self.put([self._row(part, missing=part in missing) for part in ROWS])
+        if missing:
+            self.say(texts.NEW_MISSING.format(parts=", ".join(texts.MISSING_PARTS[part] for part in missing)))
+        else:
+            self.say(texts.NEW_COMPLETE)
+
+    def _row(self, part: Part, *, missing: bool) -> Content:
+        sign = "!" if missing else "·"
+        value = texts.NEW_KEPT if part in self._kept() and part is not Part.FOLDER else self._value(part)
+        style = "$text-warning" if missing else ""
+        return Content.assemble((f"{sign} {texts.PARTS[part]:{_NAME}} ", style), (value, "bold"))
+
+    def _value(self, part: Part) -> str:
+        choice, line = self.choice, self.choice.line
+        said = {
+            Part.INSTRUMENT: " ".join(filter(None, (line.instrument, line.profile))) or texts.NOT_CHOSEN,
+            Part.PORT: line.port or texts.NOT_CHOSEN,
+            Part.ORDER: choice.order.value,
+            Part.GATE: texts.GATE_WORDS[choice.gate],
+        }
+        if line.virtual:
+            said[Part.BAR] = texts.VIRTUAL_BAR
+        elif choice.bar_waiver:
+            said[Part.BAR] = texts.WITHOUT_BAR.format(reason=choice.bar_waiver)
+        return said.get(part) or self._field(part)
+
+    def _field(self, part: Part) -> str:
+        value = getattr(self.choice, _FIELDS[part])
+        if value in {None, ""}:
+            return texts.NEW_EMPTY.get(part, texts.NOT_CHOSEN)
+        if part is Part.TEMPERATURE:
+            return f"{value:g} °C"
+        return f"{value.name}  ({value.parent})" if isinstance(value, Path) else str(value)
+
+    def _prepared(self, prepared: Prepared) -> None:
+        if not self.is_current:  # somebody went back meanwhile
+            return
+        self._show()
+        self.app.push_screen(PrepareScreen(self._reception, self._front, self.choice, prepared))
+
+    def _answered(self, answer: Answer) -> None:
+        form = texts.NEW_ANSWERS if answer.answers else texts.NEW_SILENT
+        self.say(form.format(port=answer.port, text=answer.text), wrong=not answer.answers)
+
+    def _failed(self, error: Exception) -> None:
+        self.say(str(error), wrong=True)
+
+
+_FIELDS = {
+    Part.MACHINE: "machine",
+    Part.PLAN: "plan",
+    Part.FOLDER: "folder",
+    Part.BAR: "bar",
+    Part.PROGRAMS: "programs",
+    Part.OPERATOR: "operator",
+    Part.SERIAL_NUMBER: "serial_number",
+    Part.TEMPERATURE: "ambient_temp_c",
+}
+"""Field of the choice that a row shows."""
+
+_EMPTY: dict[Part, object] = {
+    Part.MACHINE: None,
+    Part.PLAN: None,
+    Part.FOLDER: None,
+    Part.PROGRAMS: None,
+    Part.OPERATOR: "",
+    Part.SERIAL_NUMBER: "",
+    Part.TEMPERATURE: None,
+}
+
+_COLDEST_C, _WARMEST_C = -30.0, 80.0
+
+
+def _temperature(text: str) -> float | None:
+    try:
+        temp_c = float(text.replace(",", "."))
+    except ValueError:
+        return None
+    return temp_c if _COLDEST_C <= temp_c <= _WARMEST_C else None

@@ -1,0 +1,78 @@
+"""What the steps after a session found, line by line; the numbers are those that their commands print."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.service.after import Step
+from dbbstation.tui import texts
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+_MOST = 6
+"""Causes, and sentences of a kind, that are shown; the files have all."""
+
+
+def result_lines(step: Step, answer: Mapping[str, Any]) -> list[str]:
+    """Return what is worth reading of the answer of a step's command."""
+    return list(_LINES[step](answer))
+
+
+def _calibrated(answer: Mapping[str, Any]) -> Iterator[str]:
+    yield texts.FITTED.format(
+        count=answer["parameters_identified"],
+        nominal=answer["nominal_rms_um"],
+        left=answer["residual_rms_um"],
+        within=answer["residual_within_mounting_rms_um"],
+        noise=answer["noise_um"],
+    )
+    if answer["misfit"]["missing_physics"]:
+        yield texts.PHYSICS_MISSING.format(rms=answer["misfit"]["rms_um"])
+    for outlier in answer["outliers"][:_MOST]:
+        yield texts.OUTLIER.format(text=outlier["text"])
+    unseen = answer["directions_lost"]
+    for text in unseen[:_MOST]:
+        yield texts.UNSEEN.format(text=text)
+    for text in answer["gaps"][:_MOST]:
+        yield texts.GAP.format(text=text)
+    if not unseen:
+        yield texts.ALL_SEEN
+    if not answer["plan_check"]["enough"]:
+        yield texts.TOO_FEW.format(tests=answer["plan_check"]["tests"], left=answer["plan_check"]["left"])
+
+
+def _diagnosed(answer: Mapping[str, Any]) -> Iterator[str]:
+    form = texts.MISMATCH if answer["mismatch"] else texts.NO_MISMATCH
+    yield form.format(rms=answer["misfit_rms_um"], noise=answer["noise_um"])
+    for verdict, words in texts.VERDICT_WORDS.items():
+        names = [source["name"] for source in answer["sources"] if source["verdict"] == verdict]
+        if names:
+            yield texts.CAUSES.format(verdict=words, names=", ".join(names))
+    yield answer["unexplained"]["text"]
+    if answer["next_test"]:
+        yield texts.MEASURE_NEXT.format(text=answer["next_test"]["text"])
+
+
+def _programmed(answer: Mapping[str, Any]) -> Iterator[str]:
+    programs = answer["programs"]
+    yield texts.PROGRAMMED.format(count=len(programs), dialect=answer["dialect"])
+    greatest = [one["greatest_correction_um"] for one in programs if one["greatest_correction_um"] is not None]
+    if greatest:
+        yield texts.CORRECTED.format(most=max(greatest))
+
+
+def _reported(answer: Mapping[str, Any]) -> Iterator[str]:
+    verdict = answer["verdict"]
+    yield texts.REPORT_VERDICT[verdict["kind"]]
+    yield verdict["headline"]
+    yield from verdict["reasons"][:_MOST]
+    yield from verdict["to_do"][:_MOST]
+
+
+_LINES = {
+    Step.CALIBRATE: _calibrated,
+    Step.DIAGNOSE: _diagnosed,
+    Step.PROGRAMS: _programmed,
+    Step.REPORT: _reported,
+}

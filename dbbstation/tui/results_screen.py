@@ -1,0 +1,154 @@
+"""After a session, without leaving: calibrate, diagnose, programs, report; what they found, and where it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.content import Content
+from textual.widgets import OptionList
+
+from dbbstation.service.after import Step
+from dbbstation.service.work import Progress
+from dbbstation.tui import texts
+from dbbstation.tui.durations import duration
+from dbbstation.tui.panel import lines
+from dbbstation.tui.question import YesQuestion
+from dbbstation.tui.result_lines import result_lines
+from dbbstation.tui.row_screen import RowScreen
+
+if TYPE_CHECKING:
+    from textual.binding import BindingType
+
+    from dbbstation.service.after import After, Result
+
+STEPS = tuple(Step)
+_STYLES = {Progress.DONE: "$text-success", Progress.FAILED: "$text-error", Progress.CANCELLED: "$text-warning"}
+
+
+class ResultsScreen(RowScreen):
+    """Pushed over the sessions or the screen beside the machine.
+
+    Args:
+        after: does the work.
+    """
+
+    help_name = "results"
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("a", "every", "All"),
+        ("c", "step('calibrate')", "Calibrate"),
+        ("d", "step('diagnose')", "Diagnose"),
+        ("p", "step('programs')", "Programs"),
+        ("r", "step('report')", "Report"),
+        ("x", "cancel", "End"),
+        ("escape,q", "back", "Back"),
+    ]
+
+    def __init__(self, after: After) -> None:
+        super().__init__()
+        self._after = after
+        self._seen: object = None
+
+    def on_mount(self) -> None:
+        """Show how the steps stand."""
+        self._draw()
+
+    def look(self) -> None:
+        """Take in how far the work has come."""
+        busy = self._after.busy
+        self._after.look()
+        if self._after.busy is not busy and busy is not None and self._after.busy is not None:
+            self._go_to(self._after.busy)
+        self._draw()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Only keys that mean something now stand in the footer and do something."""
+        match action:
+            case "step":
+                return self._after.can(Step(str(parameters[0])))
+            case "every":
+                return self._after.busy is None
+            case "cancel":
+                return self._after.busy is not None
+        return super().check_action(action, parameters)
+
+    def on_option_list_option_highlighted(self, _chosen: OptionList.OptionHighlighted) -> None:
+        """Tell of the step that the cursor is on."""
+        self._draw()
+
+    def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
+        """Do the chosen step."""
+        if self._after.can(STEPS[self.at]):
+            self._begin(STEPS[self.at])
+
+    def action_step(self, name: str) -> None:
+        """Do one step."""
+        self._begin(Step(name))
+
+    def action_every(self) -> None:
+        """Do all steps, one behind the other."""
+        self._begin(*STEPS)
+
+    def action_cancel(self) -> None:
+        """End what is being done."""
+        self._after.cancel()
+
+    def action_back(self) -> None:
+        """Go back; what is being done is ended, after a question."""
+        if self._after.busy is None:
+            self.dismiss()
+            return
+
+        def answered(sure: bool | None) -> None:  # noqa: FBT001 - answer of a question
+            if sure:
+                self._after.cancel()
+                self.dismiss()
+
+        self.app.push_screen(YesQuestion(texts.RESULTS_LEAVE), answered)
+
+    def _begin(self, *steps: Step) -> None:
+        self._go_to(steps[0])
+        self._after.do(*steps)
+        self._draw()
+
+    def _go_to(self, step: Step) -> None:
+        self.query_one("#rows", OptionList).highlighted = STEPS.index(step)
+
+    def _draw(self) -> None:
+        after = self._after
+        if not self.stands:
+            return
+        self.put([_row(step, after.results[step]) for step in STEPS])
+        self.about(self._found(STEPS[self.at]))
+        if after.busy is not None:
+            self.say(texts.RESULTS_BUSY)
+        else:
+            self.say(texts.RESULTS_IDLE.format(folder=after.folder))
+        if self._seen != (after.busy, after.model):
+            self._seen = after.busy, after.model
+            self.refresh_bindings()
+
+    def _found(self, step: Step) -> Content:
+        result = self._after.results[step]
+        match result.progress:
+            case Progress.DONE:
+                rows = [Content.styled(str(result.path), "bold")]
+                return lines(*rows, *(Content(text) for text in result_lines(step, result.answer)))
+            case Progress.FAILED:
+                return Content.styled(result.failure, "$text-error")
+            case Progress.CANCELLED:
+                return Content(texts.RESULTS_CANCELLED)
+            case Progress.RUNNING:
+                return Content("")
+        if step is Step.PROGRAMS and self._after.model is None:
+            return Content(texts.RESULTS_NO_MODEL)
+        return Content.styled(texts.RESULTS_EMPTY, "dim")
+
+
+def _row(step: Step, result: Result) -> Content:
+    key, title = texts.STEPS[step]
+    words = texts.STEP_WORDS[result.progress].format(
+        stage=result.stage or texts.STEP_BEGINS, passed=duration(result.passed_s)
+    )
+    style = _STYLES.get(result.progress, "") if result.progress else "dim"
+    return Content.assemble(f"{texts.STEP_SIGNS[result.progress]} ", (key, "bold"), f"  {title:48} ", (words, style))

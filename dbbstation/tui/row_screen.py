@@ -1,0 +1,80 @@
+"""A screen with a sentence at the top and rows below it, of which one is chosen with the arrow keys."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from textual.containers import VerticalScroll
+from textual.content import Content
+from textual.widgets import Footer, OptionList, Static
+from textual.widgets.option_list import Option
+
+from dbbstation.tui.explained import ExplainedScreen
+from dbbstation.tui.texts import HELP
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from textual.app import ComposeResult
+
+
+class RowScreen(ExplainedScreen):
+    """Title, sentence, rows, a text about the chosen row, keys."""
+
+    DEFAULT_CSS = """
+    RowScreen {
+        & #row-title { height: 1; background: $panel; text-style: bold; }
+        & #row-now { height: auto; min-height: 2; max-height: 7; padding: 0 1; text-style: bold; background: $primary-muted; }
+        & #row-now.-wrong { background: $error-muted; }
+        & #rows { height: auto; max-height: 1fr; border: none; padding: 0 1; }
+        & #row-about { height: 1fr; padding: 0 2; margin-top: 1; }
+    }
+    """
+
+    def compose(self) -> ComposeResult:
+        """Put the parts where they belong."""
+        yield Static(Content(f" dbbstation · {HELP[self.help_name].title}"), id="row-title")
+        yield Static("", id="row-now", markup=False)
+        yield OptionList(id="rows")
+        with VerticalScroll(id="row-about", can_focus=False):
+            yield Static("", id="row-text", markup=False)
+        yield Footer(show_command_palette=False)
+
+    def say(self, text: str, *, wrong: bool = False) -> None:
+        """Show a sentence at the top."""
+        if not self.stands:
+            return
+        now = self.query_one("#row-now", Static)
+        now.update(Content(text))
+        now.set_class(wrong, "-wrong")
+
+    def about(self, text: Content) -> None:
+        """Show a text below the rows."""
+        if not self.stands:
+            return
+        self.query_one("#row-text", Static).update(text)
+
+    @property
+    def stands(self) -> bool:
+        """Whether its parts are there: what was begun in the background may end before, or after it was left."""
+        return bool(self.query("#row-text"))
+
+    @property
+    def at(self) -> int:
+        """Place of the chosen row."""
+        return self.query_one("#rows", OptionList).highlighted or 0
+
+    def put(self, rows: Sequence[Content]) -> None:
+        """Show rows; the chosen place stays chosen."""
+        if not self.stands:
+            return
+        options = self.query_one("#rows", OptionList)
+        if len(rows) == options.option_count:
+            for place, row in enumerate(rows):
+                options.replace_option_prompt_at_index(place, row)
+            return
+        at = options.highlighted or 0
+        options.clear_options()
+        options.add_options([Option(row) for row in rows])
+        options.highlighted = min(at, len(rows) - 1) if rows else None
+        options.focus()

@@ -1,0 +1,146 @@
+"""The first screen: sessions to go on with, a new one, or everything on a virtual machine."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.content import Content
+
+from dbbstation.tui import texts
+from dbbstation.tui.durations import duration
+from dbbstation.tui.new_screen import NewScreen
+from dbbstation.tui.row_screen import RowScreen
+
+if TYPE_CHECKING:
+    from textual.binding import BindingType
+    from textual.widgets import OptionList
+
+    from dbbstation.service.front import Front
+    from dbbstation.service.session_list import SessionLine
+    from dbbstation.tui.reception import Reception
+
+_NAME = 22
+
+
+class StartScreen(RowScreen):
+    """At the bottom of the stack where no job was given.
+
+    Args:
+        reception: opens jobs.
+        front: knows sessions.
+    """
+
+    help_name = "start"
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("n", "new", "New"),
+        ("v", "virtual", "Try it"),
+        ("i", "line", "Instrument"),
+        ("e", "results", "Results"),
+    ]
+
+    def __init__(self, reception: Reception, front: Front) -> None:
+        super().__init__()
+        self._reception, self._front = reception, front
+        self._sessions: tuple[SessionLine, ...] = ()
+
+    def on_mount(self) -> None:
+        """Look for sessions."""
+        self.search()
+
+    def search(self) -> None:
+        """List the sessions anew; what is said at the top about a failure stays."""
+        self.say(texts.START_LOOKS)
+        self._reception.do(self._front.sessions, self._list, self._failed)
+
+    @property
+    def chosen(self) -> SessionLine | None:
+        """The session that the cursor is on."""
+        return self._sessions[self.at] if self._sessions else None
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Only keys that mean something now stand in the footer and do something."""
+        if action in {"line", "results"}:
+            return self.chosen is not None and not self.chosen.problem
+        return super().check_action(action, parameters)
+
+    def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
+        """Go on with the chosen session."""
+        line = self.chosen
+        if line is None:
+            return
+        if line.problem:
+            self.say(texts.START_BROKEN.format(folder=line.folder.name, problem=line.problem), wrong=True)
+            return
+        choice = self._front.goes_on_with(line.folder)
+        if choice.missing():
+            self.app.push_screen(NewScreen(self._reception, self._front, choice))
+        else:
+            self.say(texts.START_OPENS.format(folder=line.folder.name))
+            self._reception.open(choice, None, self._failed)
+
+    def on_option_list_option_highlighted(self, _chosen: OptionList.OptionHighlighted) -> None:
+        """Tell of the session that the cursor is on."""
+        self._tell()
+
+    def action_new(self) -> None:
+        """Choose what is measured into a new session."""
+        self.app.push_screen(NewScreen(self._reception, self._front, self._front.first_choice()))
+
+    def action_virtual(self) -> None:
+        """Choose nothing: everything is virtual."""
+        self.app.push_screen(NewScreen(self._reception, self._front, self._front.virtual_choice()))
+
+    def action_line(self) -> None:
+        """Choose by what the session is gone on with."""
+        if self.chosen is not None:
+            choice = self._front.goes_on_with(self.chosen.folder)
+            self.app.push_screen(NewScreen(self._reception, self._front, choice))
+
+    def action_results(self) -> None:
+        """Work on the chosen session."""
+        if self.chosen is not None:
+            self._reception.show_results(self.chosen.folder)
+
+    def _list(self, sessions: tuple[SessionLine, ...]) -> None:
+        self._sessions = sessions
+        self.put([_row(line) for line in sessions])
+        self.say(texts.START_SOME if sessions else texts.START_NONE)
+        self._tell()
+        self.refresh_bindings()
+
+    def _tell(self) -> None:
+        line = self.chosen
+        if line is None:
+            self.about(Content(""))
+        elif line.problem:
+            self.about(Content(f"{line.folder}\n{line.problem}"))
+        else:
+            by = self._front.goes_on_with(line.folder).line
+            what = texts.START_WHAT.format(folder=line.folder, plan=line.plan, machine=line.machine)
+            known = by.instrument and by.port
+            how = texts.START_BY.format(instrument=by.instrument, port=by.port) if known else texts.START_NO_LINE
+            self.about(Content(f"{what}\n{how}"))
+        self.refresh_bindings()
+
+    def _failed(self, error: Exception) -> None:
+        self.say(str(error), wrong=True)
+
+
+def _row(line: SessionLine) -> Content:
+    when = f"{line.changed.astimezone():%m-%d %H:%M}"
+    name = f"{_cut(line.folder.name, _NAME):{_NAME}}"
+    if line.problem:
+        return Content.assemble((f"! {name} ", "$text-error"), f"{_cut(line.problem, 52)}")
+    if line.complete:
+        state = texts.START_COMPLETE
+    else:
+        state = texts.START_RUNS.format(accepted=line.accepted, planned=line.planned)
+        state += texts.START_LEFT.format(time=duration(line.left_s)) if line.left_s else ""
+    state += texts.START_UNJUDGED.format(count=line.unjudged) if line.unjudged else ""
+    sign = "✓" if line.complete else "▶"
+    return Content.assemble(f"{sign} {name} {when}  ", (state, "bold"))
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else f"{text[: width - 1]}…"

@@ -1,0 +1,172 @@
+"""How often a history raises a false alarm, and how soon it finds a change: simulated tables of quantities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy import stats
+
+from dbbstation.history.run_length import REFERENCE, SINGLE_SHARE, Chart, chart_for, signalled_within
+from dbbstation.history.standardised import BASELINE
+from dbbstation.history.watch import watch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+COVERAGE_FACTOR = 2.0
+SCATTERS = (0.5, 1.0, 1.5, 4.0)
+"""How much sessions really scatter, in stated uncertainties."""
+
+STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)
+"""Sizes of steps [standard deviations of a session]."""
+
+DRIFT = 0.05
+"""Of a drift, per session [standard deviations]."""
+
+BEFORE = (10, 20, 50, 200)
+"""Sessions before a change."""
+
+WAIT = 104
+"""Sessions after a change in which it is to be found: two years of weekly ones."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """Size of a study.
+
+    Attributes:
+        tables: histories without a change.
+        quantities: of each.
+        sessions: of each.
+        false_alarms: stated rate per session, of the whole table.
+        changes: histories of one quantity for each kind of change.
+        seed: of all of them.
+    """
+
+    tables: int
+    quantities: int
+    sessions: int
+    false_alarms: float
+    changes: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to watch, of which one is the program's.
+
+    Attributes:
+        name: in words.
+        reference: k.
+        single_share: share of the false alarms for single sessions.
+        baseline: sessions.
+    """
+
+    name: str
+    reference: float = REFERENCE
+    single_share: float = SINGLE_SHARE
+    baseline: int = BASELINE
+
+
+WAYS = (
+    Way("as it is"),
+    Way("k 0.25", reference=0.25),
+    Way("k 1", reference=1.0),
+    Way("no limit for single sessions", single_share=0.0),
+    Way("baseline 5", baseline=5),
+    Way("baseline 20", baseline=20),
+)
+
+
+def study(size: Size, progress: Callable[[int, int], None] = lambda _done, _of: None) -> dict[str, Any]:
+    """Simulate, and return shares and delays as plain numbers.
+
+    Args:
+        size: how much of it.
+        progress: told how many of how many parts are done.
+    """
+    of = len(SCATTERS) + len(WAYS)
+    rng = np.random.default_rng(size.seed)
+    alarms, delays = [], []
+    for done, scatter in enumerate(SCATTERS):
+        progress(done, of)
+        alarms.append(_false_alarms(size, scatter, rng))
+    for done, way in enumerate(WAYS, start=len(SCATTERS)):
+        progress(done, of)
+        delays += _delays(size, way, np.random.default_rng(size.seed))
+    progress(of, of)
+    return {
+        "seed": size.seed,
+        "tables": size.tables,
+        "quantities": size.quantities,
+        "sessions": size.sessions,
+        "false_alarms_per_session": size.false_alarms,
+        "false_alarms": alarms,
+        "histories_per_change": size.changes,
+        "delays": delays,
+    }
+
+
+def _false_alarms(size: Size, scatter: float, rng: np.random.Generator) -> dict[str, Any]:
+    chart = chart_for(size.false_alarms / size.quantities)
+    found = 0
+    for _ in range(size.tables):
+        u = rng.uniform(0.5, 2.0, (size.quantities, size.sessions))
+        values = scatter * u * rng.standard_normal(u.shape)
+        found += any(watch(row, of, chart, COVERAGE_FACTOR).events for row, of in zip(values, u, strict=True))
+    stated = stated_share(chart, size.quantities, size.sessions)
+    low, high = stats.binomtest(found, size.tables).proportion_ci(0.95)
+    return {
+        "scatter_in_u": scatter,
+        "stated": stated,
+        "found": found / size.tables,
+        "interval": [float(low), float(high)],
+    }
+
+
+def stated_share(chart: Chart, quantities: int, sessions: int) -> float:
+    """Return the share of tables without a change that raise an alarm, by the Markov chain.
+
+    Args:
+        chart: limits of one quantity.
+        quantities: of a table.
+        sessions: of a history, its baseline among them.
+    """
+    quiet = 1.0 - signalled_within(chart, [0.0] * (sessions - BASELINE))[-1]
+    return float(1.0 - quiet ** (2 * quantities))
+
+
+def _delays(size: Size, way: Way, rng: np.random.Generator) -> list[dict[str, Any]]:
+    chart = chart_for(size.false_alarms / size.quantities, way.reference, way.single_share)
+    rows = []
+    for before in BEFORE:
+        kinds = {f"step of {step:g}": [step] * WAIT for step in STEPS}
+        kinds[f"drift of {DRIFT:g} per session"] = [DRIFT * k for k in range(WAIT)]
+        for kind, change in kinds.items():
+            values = rng.standard_normal((size.changes, before + WAIT))
+            values[:, before:] += change
+            found = [_delay(row, before, chart, way.baseline) for row in values]
+            delays = [delay for delay in found if delay is not None]
+            seen = [delay for delay in delays if np.isfinite(delay)]
+            rows.append(
+                {
+                    "way": way.name,
+                    "change": kind,
+                    "sessions_before": before,
+                    "found": len(seen) / len(delays) if delays else None,
+                    "median_delay": float(np.median(delays)) if len(seen) > len(delays) / 2 else None,
+                }
+            )
+    return rows
+
+
+def _delay(values: NDArray[np.float64], before: int, chart: Chart, baseline: int) -> float | None:
+    """Return after how many sessions a change is found, infinite where it is not; None after an alarm before it."""
+    events = watch(values, np.ones(len(values)), chart, COVERAGE_FACTOR, baseline).events
+    if not events:
+        return float("inf")
+    return None if events[0].found < before else float(events[0].found - before + 1)

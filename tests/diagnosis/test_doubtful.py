@@ -1,0 +1,36 @@
+"""What is rather not there than there stays out of the joint model, though the most probable set of causes has it."""
+
+from __future__ import annotations
+
+from dbbstation.diagnosis.diagnose import diagnose, doubtful
+from dbbstation.diagnosis.explain import explain
+from dbbstation.diagnosis.findings import Verdict
+from dbbstation.diagnosis.verdicts import EVEN, judge
+from dbbstation.recorded import load_sessions
+from dbbstation.sources.registry import sources_named
+from tests.plant.mechanisms.gravity import Gravity
+from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.mechanisms.thermal import ThermalFrame
+from tests.plant.mechanisms.warming import Warming
+from tests.plant.session import record
+
+NAMES = ("gravity", "thermal-frame", "thermal-struts", "bar-drift")
+
+
+def test_a_drift_of_nobody_knows_what_is_named_by_nobody_and_not_modelled(tmp_path):
+    """A frame that warms by a hundredth of a kelvin: three causes share the probability, and none of them has half of it."""
+    kinematics = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
+    faint = ThermalFrame(Warming(0.01, time_constant_s=600.0))
+    record(tmp_path / "s", seed=200, mechanisms=[kinematics, Gravity(), faint], rate_hz=10.0)
+    recorded = load_sessions([tmp_path / "s"])
+    sources = sources_named(NAMES)
+    explained = explain(recorded.machine, recorded.observations, sources, lambda _: None)
+    assert doubtful(explained, judge(explained)) == {"thermal-frame"}
+    diagnosis = diagnose(recorded.machine, recorded.observations, sources)
+    modelled = {term.source.name for term in diagnosis.after.layout.terms} & set(NAMES)
+    assert modelled == {"gravity"}
+    found = {finding.name: finding for finding in diagnosis.sources}
+    drifts = [found[name] for name in NAMES[1:]]
+    assert all(drift.verdict is Verdict.NOT_TESTABLE and drift.probability < EVEN for drift in drifts)
+    # What was given up is still said: together they are rather there than not.
+    assert sum(drift.probability for drift in drifts) > EVEN

@@ -1,0 +1,270 @@
+"""Sessions that are found, choices that are remembered, ports that answer, work that can be ended."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from dbbstation.errors import InputError, TravelError
+from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.instrument.library import load_instrument
+from dbbstation.plan.duration import circle_s
+from dbbstation.service.after import After, Result, Step
+from dbbstation.service.candidates import Kind, candidates
+from dbbstation.service.choice import Choice, Part
+from dbbstation.service.front import Front
+from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
+from dbbstation.service.port_probe import probe
+from dbbstation.service.session_list import list_sessions
+from dbbstation.service.work import Progress, Work
+from dbbstation.virtual.wire import VirtualInstrument
+from tests.cli.conftest import call
+
+SMALL = shipped_folder("fixtures") / "sessions" / "small"
+MACHINE = shipped_folder("fixtures") / "machines" / "reference.yaml"
+PLAN = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
+REAL = Line(instrument="heidenhain-nd281b", port="/dev/ttyUSB7")
+PATIENCE_S = 60.0
+
+
+@pytest.fixture
+def front(tmp_path: Path) -> Front:
+    return Front(tmp_path / "shop", Memory(tmp_path / "state" / "station.json"))
+
+
+@pytest.fixture
+def session(front: Front) -> Path:
+    """A session with runs, two folders below the working folder."""
+    folder = front.under / "hexapod-7" / "monday"
+    shutil.copytree(SMALL, folder)
+    return folder
+
+
+def ended(work: Work) -> Progress:
+    end_s = time.monotonic() + PATIENCE_S
+    while work.progress is Progress.RUNNING:
+        assert time.monotonic() < end_s
+        time.sleep(0.02)
+    return work.progress
+
+
+def test_sessions_are_found_with_what_is_left_of_them(front: Front, session: Path) -> None:
+    (line,) = front.sessions()
+    assert (line.folder, line.problem) == (session, "")
+    plan = read_plan(SMALL / "plan.yaml")
+    assert line.plan == plan.name
+    planned = sum(len(test.directions) for test in plan.tests.values()) + sum(
+        len(plan.tests[name].directions) for name in plan.repeat_at_end
+    )
+    assert line.planned == planned
+    # Once rejected, a run is left again, and its circle's time with it.
+    assert line.complete
+    assert line.left_s == 0.0
+    first = next(iter(plan.tests.values()))
+    done = call("session", "reject", session, f"{first.name}-{first.directions[0]}-1", "--reason", "seen later")
+    assert done.code == 0, done.err
+    (line,) = front.sessions()
+    assert (line.planned - line.accepted, line.complete) == (1, False)
+    assert line.left_s == pytest.approx(circle_s(first.run(first.directions[0])))
+
+
+def test_a_session_with_faults_says_so_and_hides_no_other(front: Front, session: Path) -> None:
+    broken = front.under / "tuesday"
+    shutil.copytree(session, broken)
+    (broken / "machine.yaml").unlink()
+    lines = {line.folder: line for line in front.sessions()}
+    assert lines[session].problem == ""
+    assert lines[broken].problem
+
+
+def test_remembered_sessions_are_listed_wherever_they_are_and_gone_ones_are_not(
+    front: Front, session: Path, tmp_path: Path
+) -> None:
+    elsewhere = tmp_path / "elsewhere" / "here"
+    shutil.copytree(session, elsewhere)
+    found = list_sessions(front.under, [elsewhere, session, tmp_path / "gone"])
+    assert {line.folder for line in found} == {session, elsewhere}
+
+
+def test_choices_are_remembered(front: Front, session: Path, tmp_path: Path) -> None:
+    remembered = Remembered(MACHINE, PLAN, REAL, "me", "H-7").with_session(session, REAL)
+    front.memory.write(remembered)
+    assert front.memory.read() == remembered
+    choice = front.first_choice()
+    assert (choice.machine, choice.plan, choice.line, choice.operator) == (MACHINE, PLAN, REAL, "me")
+    assert choice.folder == front.under / "session"
+    again = front.goes_on_with(session)
+    assert again.missing() == ()
+    assert again.line == REAL
+    # A port that the shop's settings name holds over the one of last time.
+    told = replace(front, given=Choice(line=Line(port="COM3")))
+    assert told.goes_on_with(session).line == REAL.model_copy(update={"port": "COM3"})
+    for number in range(2 * MOST):
+        remembered = remembered.with_session(tmp_path / str(number), REAL)
+    assert len(remembered.sessions) == MOST
+    assert remembered.sessions[0][0] == tmp_path / str(2 * MOST - 1)
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b'{"machine": 7}', b"\xff\xfe", b'{"unknown": 1}'])
+def test_a_memory_that_is_not_understood_is_none(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "station.json"
+    file.write_bytes(content)
+    assert Memory(file).read() == Remembered()
+
+
+def test_a_memory_that_cannot_be_kept_harms_nobody(tmp_path: Path) -> None:
+    (tmp_path / "a-file").write_text("")
+    Memory(tmp_path / "a-file" / "station.json").write(Remembered(operator="me"))
+
+
+def test_files_to_choose_from_are_known_by_their_format(front: Front, session: Path) -> None:
+    shutil.copy(PLAN, front.under / "mine.yaml")
+    (front.under / "notes.yaml").write_text("a: 1\n")
+    plans = candidates(Kind.PLAN, front.under)
+    assert plans[0] == front.under / "mine.yaml"
+    assert PLAN in plans
+    assert not [path for path in plans if session in path.parents]
+    assert candidates(Kind.PLAN, front.under, shipped=False) == (front.under / "mine.yaml",)
+    assert MACHINE in candidates(Kind.MACHINE, front.under)
+
+
+def test_a_port_answers_with_its_reading_or_says_what_is_wrong() -> None:
+    protocol = load_instrument("heidenhain-nd281b")
+    with VirtualInstrument(protocol, lambda _t_s: 150.0123) as wire:
+        answer = probe(protocol, wire.port)
+    assert (answer.answers, answer.text) == (True, "150.0123 mm")
+    with VirtualInstrument(protocol, lambda _t_s: None) as wire:
+        assert probe(protocol, wire.port).text.startswith("no bar")
+    gone = probe(protocol, "/dev/no-such-port")
+    assert not gone.answers
+    assert "no such port" in gone.text
+
+
+def test_what_is_missing_is_told_in_the_order_it_is_asked_for(front: Front) -> None:
+    assert Choice().missing() == (Part.MACHINE, Part.PLAN, Part.INSTRUMENT, Part.PORT, Part.BAR, Part.FOLDER)
+    assert front.virtual_choice().missing() == ()
+    with pytest.raises(ValueError, match="port"):
+        front.prepare(Choice())
+
+
+def test_a_choice_is_dry_run_and_timed(front: Front) -> None:
+    choice = replace(front.virtual_choice(), plan=PLAN)
+    prepared = front.prepare(choice)
+    plan = read_plan(PLAN)
+    each = [circle_s(test.run(way)) for test in plan.tests.values() for way in test.directions]
+    assert prepared.circles_s == pytest.approx(sum(each))
+    assert choice.folder is not None
+    assert not choice.folder.exists()
+
+
+def test_a_plan_beyond_the_travel_is_refused(front: Front) -> None:
+    front.under.mkdir()
+    far = front.under / "far.yaml"
+    far.write_text(PLAN.read_text("utf-8").replace("[0, 0, -1150]", "[900, 0, -1150]"), "utf-8")
+    with pytest.raises(TravelError):
+        front.prepare(replace(front.virtual_choice(), plan=far))
+
+
+def test_a_real_session_needs_the_bar_or_a_reason(front: Front) -> None:
+    choice = Choice(front.new_folder(), MACHINE, PLAN, REAL)
+    assert choice.missing() == (Part.BAR,)
+    bar = shipped_folder("fixtures") / "bars" / "zerodur.yaml"
+    with pytest.raises(InputError, match="last on its calibrator"):
+        front.prepare(replace(choice, bar=bar))
+    waived = front.prepare(replace(choice, bar_waiver="a first look"))
+    assert waived.job.details.bar_waiver == "a first look"
+
+
+def test_work_answers_with_what_its_command_prints(tmp_path: Path) -> None:
+    work = Work(["evaluate", str(SMALL), "--model", str(tmp_path / "none.yaml")], tmp_path)
+    assert ended(work) is Progress.FAILED
+    assert "none.yaml" in work.failure()
+    work.close()
+    work = Work(["check", str(MACHINE)], tmp_path)
+    assert ended(work) is Progress.DONE
+    assert "provenance" in work.answer()
+    work.close()
+
+
+def test_work_can_be_ended(tmp_path: Path) -> None:
+    work = Work(["demo", "--out", str(tmp_path / "demo")], tmp_path)
+    time.sleep(1.0)
+    assert work.progress is Progress.RUNNING
+    work.cancel()
+    assert ended(work) is Progress.CANCELLED
+    work.close()
+    assert work.passed_s < PATIENCE_S
+
+
+class Scripted:
+    """Stands where a command runs: ends as it is told to."""
+
+    stage = "fit of 6 runs"
+    passed_s = 1.0
+
+    def __init__(self, arguments: list[str], folder: Path) -> None:
+        self.arguments, self.folder = arguments, folder
+        self.progress = Progress.RUNNING
+
+    def answer(self) -> dict[str, str]:
+        return {"from": self.arguments[0]}
+
+    def failure(self) -> str:
+        return "it failed"
+
+    def cancel(self) -> None:
+        self.progress = Progress.CANCELLED
+
+    def close(self) -> None:
+        pass
+
+
+def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session: Path) -> None:
+    begun: list[Scripted] = []
+
+    def start(arguments: list[str], folder: Path) -> Scripted:
+        begun.append(Scripted(arguments, folder))
+        return begun[-1]
+
+    after = After(session, start=start)  # type: ignore[arg-type]
+    assert not after.can(Step.PROGRAMS)
+    after.do(Step.CALIBRATE, Step.PROGRAMS, Step.REPORT)
+    for work in range(3):
+        after.look()
+        assert after.busy is not None
+        assert after.results[after.busy].stage == "fit of 6 runs"
+        begun[work].progress = Progress.DONE
+        after.look()
+    results = session.parent / "monday-results"
+    assert after.busy is None
+    assert after.folder == results
+    assert [one.arguments[0] for one in begun] == ["calibrate", "program", "report"]
+    assert all(str(results / "model.yaml") in one.arguments for one in begun[1:])
+    assert after.results[Step.REPORT].path == results / "report.html"
+    after.do(Step.DIAGNOSE, Step.REPORT)
+    after.look()
+    after.cancel()
+    after.look()
+    assert (after.busy, after.results[Step.DIAGNOSE].progress) == (None, Progress.CANCELLED)
+    assert after.model == results / "model.yaml"
+    # Another sitting has another folder: nothing is overwritten.
+    assert After(session).folder == session.parent / "monday-results-2"
+
+
+def test_a_failure_ends_the_row_and_says_why(session: Path) -> None:
+    after = After(session, start=Scripted)  # type: ignore[arg-type]
+    after.do(Step.CALIBRATE, Step.REPORT)
+    after._running[1].progress = Progress.FAILED
+    after.look()
+    assert after.results[Step.CALIBRATE].failure == "it failed"
+    assert after.results[Step.REPORT] == Result()
+
+
+def test_virtual_ports_are_offered(front: Front) -> None:
+    assert {name for name, _ in front.ports()} >= set(VIRTUAL)
+    assert front.probe(Line(instrument="streaming-encoder", port=next(iter(VIRTUAL)))).answers

@@ -1,0 +1,322 @@
+"""A whole session by keys alone: from the start screen over the checklist and the circles to the path of the report."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+from textual.widgets import OptionList, Static
+
+from dbbstation.errors import InstrumentError
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.session import read_session
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.service.after import Step
+from dbbstation.service.choice import Part
+from dbbstation.service.front import Front
+from dbbstation.service.memory import Memory
+from dbbstation.service.work import Progress
+from dbbstation.station.states import State
+from dbbstation.tui.app import StationApp
+from dbbstation.tui.asking import ChooseQuestion, TypeQuestion
+from dbbstation.tui.help_screen import HelpScreen
+from dbbstation.tui.measure_screen import MeasureScreen
+from dbbstation.tui.new_screen import ROWS, NewScreen
+from dbbstation.tui.prepare_screen import PrepareScreen
+from dbbstation.tui.question import YesQuestion
+from dbbstation.tui.results_screen import ResultsScreen
+from dbbstation.tui.start_screen import StartScreen
+from tests.tui.test_screen import one_circle, press
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+    from pathlib import Path
+
+    from textual.pilot import Pilot
+
+    Play = Callable[[Pilot[None], StationApp], Awaitable[None]]
+
+PATIENCE_S = 60.0
+
+
+def now(app: StationApp) -> str:
+    """The sentence at the top of the screen on top."""
+    return " ".join(str(app.screen.query_one("#row-now", Static).visual).split())
+
+
+def rows(app: StationApp) -> list[str]:
+    options = app.screen.query_one("#rows", OptionList)
+    return [str(options.get_option_at_index(place).prompt) for place in range(options.option_count)]
+
+
+async def until(_pilot: Pilot[None], condition: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s, "it did not happen in time"
+        await asyncio.sleep(0.02)
+
+
+def on(app: StationApp, kind: type) -> Callable[[], bool]:
+    return lambda: isinstance(app.screen, kind) and app.screen.is_mounted
+
+
+def play(front: Front, keys: Play, size: tuple[int, int] = (80, 24)) -> StationApp:
+    """Open the start screen and press keys on it."""
+    app = StationApp(None, None, front=front)
+
+    async def run() -> None:
+        async with app.run_test(size=size) as pilot:
+            await until_start(pilot, app)
+            await keys(pilot, app)
+
+    asyncio.run(run())
+    return app
+
+
+async def until_start(pilot: Pilot[None], app: StationApp) -> None:
+    await until(pilot, lambda: isinstance(app.screen, StartScreen) and "Looking" not in now(app))
+
+
+async def choose(pilot: Pilot[None], app: StationApp, part: Part, wanted: str) -> None:
+    """Choose for a row of the new session, with arrow keys and Enter."""
+    options = app.screen.query_one("#rows", OptionList)
+    while options.highlighted != ROWS.index(part):
+        await press(app, "down" if (options.highlighted or 0) < ROWS.index(part) else "up")
+    await press(app, "enter")
+    await until(pilot, on(app, ChooseQuestion))
+    labels = app.screen._labels
+    place = next(place for place, label in enumerate(labels) if wanted in label)
+    offered = app.screen.query_one(OptionList)
+    await until(pilot, lambda: offered.highlighted is not None)
+    while offered.highlighted != place:
+        await press(app, "down" if (offered.highlighted or 0) < place else "up")
+    await press(app, "enter")
+    await until(pilot, on(app, NewScreen))
+
+
+async def choose_all(pilot: Pilot[None], app: StationApp) -> None:
+    """Choose what a virtual session needs, where nothing is remembered."""
+    await choose(pilot, app, Part.MACHINE, "reference.yaml")
+    await choose(pilot, app, Part.PLAN, "three.yaml")
+    await choose(pilot, app, Part.INSTRUMENT, "streaming-encoder ")
+    await choose(pilot, app, Part.PORT, "10 times")
+    await until(pilot, lambda: "is switched on when it is needed" in now(app))
+
+
+async def measured(pilot: Pilot[None], app: StationApp) -> None:
+    """Run and accept every circle that is left."""
+    while app.board.finished is None:
+        await until(
+            pilot, lambda: app.board.state in {State.ANNOUNCED, State.FINISHED} or app.board.finished is not None
+        )
+        if app.board.finished is not None:
+            break
+        await press(app, "enter")
+        await until(pilot, lambda: app.board.state in {State.COMPLETE, State.FLAWED})
+        # Sped up so much, a computer that is busy for a moment leaves a hole in a circle; then once more.
+        await press(app, "a" if app.board.state is State.COMPLETE else "r")
+        await until(pilot, lambda: app.board.state not in {State.COMPLETE, State.FLAWED})
+
+
+@pytest.fixture
+def front(tmp_path: Path) -> Front:
+    shop = tmp_path / "shop"
+    shop.mkdir()
+    one_circle(shop, feed_mm_min=6000)
+    text = (shipped_folder("protocols") / "plans" / "ten-minute-check.yaml").read_text("utf-8")
+    fast = text.replace("feed_mm_min: 1000", "feed_mm_min: 6000").replace("overshoot_deg: 20", "overshoot_deg: 5")
+    (shop / "three.yaml").write_text(fast.replace("[ccw, cw]", "[ccw]"), "utf-8")
+    return Front(shop, Memory(tmp_path / "state" / "station.json"))
+
+
+@pytest.mark.slow
+def test_from_the_start_screen_to_the_path_of_the_report(front: Front) -> None:
+    async def keys(pilot: Pilot[None], app: StationApp) -> None:
+        assert "No session yet" in now(app)
+        await press(app, "enter", "e", "i", "c")  # mean nothing here
+        await press(app, "n")
+        await until(pilot, on(app, NewScreen))
+        assert "Still missing: the machine's file, the plan, the instrument, the port" in now(app)
+        await press(app, "b", "t")  # nothing to begin with
+        assert isinstance(app.screen, NewScreen)
+        await choose_all(pilot, app)
+        await press(app, "b")
+        await until(pilot, on(app, PrepareScreen))
+        assert "4 of 4" in now(app)
+        await press(app, "b")  # not before everything is confirmed
+        await press(app, "enter", "down", "enter", "enter")
+        await until(pilot, lambda: "3 of 4" in now(app))
+        await press(app, "y", "b")
+        await until(pilot, on(app, MeasureScreen))
+        await measured(pilot, app)
+        assert app.board.accepted == len(app.board.tasks) == 3
+        await press(app, "e")
+        await until(pilot, on(app, ResultsScreen))
+        await press(app, "p")  # there is no model yet
+        await press(app, "c")
+        after = app.screen._after
+        await until(pilot, lambda: after.results[Step.CALIBRATE].progress is Progress.DONE)
+        await press(app, "r")
+        await until(pilot, lambda: after.results[Step.REPORT].progress is Progress.DONE)
+        await until(pilot, lambda: "report.html" in str(app.screen.query_one("#row-text", Static).visual))
+        shown = " ".join(str(app.screen.query_one("#row-text", Static).visual).split())
+        assert "NO VERDICT" in shown
+        await press(app, "escape")
+        await until(pilot, on(app, MeasureScreen))
+        await press(app, "q")
+        await until_start(pilot, app)
+        await until(pilot, lambda: len(rows(app)) == 1)
+        assert "session" in rows(app)[0]
+        assert "complete" in rows(app)[0]
+        await press(app, "q")
+
+    play(front, keys)
+    runs = read_session(front.under / "session").runs
+    assert [run.state for run in runs].count(RunState.ACCEPTED) == 3
+    results = front.under / "session-results"
+    assert {path.name for path in results.iterdir()} >= {"model.yaml", "report.html"}
+    # The command that the model names is one that anybody can type.
+    assert "dbbstation calibrate session" in (results / "model.yaml").read_text("utf-8")
+    remembered = front.memory.read()
+    assert remembered.sessions[0][0] == front.under / "session"
+    assert remembered.line.time_scale == 10.0
+
+
+@pytest.mark.slow
+def test_a_session_is_gone_on_with_where_it_was_left(front: Front) -> None:
+    async def first(pilot: Pilot[None], app: StationApp) -> None:
+        await press(app, "v")
+        await until(pilot, on(app, NewScreen))
+        await choose(pilot, app, Part.PLAN, "plan.yaml")
+        await press(app, "b")
+        await until(pilot, on(app, PrepareScreen))
+        await press(app, "y", "b")
+        await until(pilot, on(app, MeasureScreen))
+        await until(pilot, lambda: app.board.state is State.ANNOUNCED)
+        await press(app, "enter")
+        await until(pilot, lambda: app.board.state in {State.COMPLETE, State.FLAWED})
+        await press(app, "a" if app.board.state is State.COMPLETE else "x")
+        await until(pilot, lambda: app.board.state is State.ANNOUNCED)
+        await press(app, "q")
+        await until_start(pilot, app)
+
+    async def second(pilot: Pilot[None], app: StationApp) -> None:
+        assert "1 of 2 runs" in rows(app)[0]
+        await press(app, "enter")
+        await until(pilot, on(app, MeasureScreen))
+        await until(pilot, lambda: app.board.state is State.ANNOUNCED)
+        assert app.board.accepted == 1
+        await press(app, "q")
+        await until_start(pilot, app)
+
+    play(front, first)
+    play(front, second)
+
+
+def test_every_key_goes_back_and_wrong_ones_do_nothing(front: Front) -> None:
+    async def keys(pilot: Pilot[None], app: StationApp) -> None:
+        await press(app, "x", "o", "f", "1", "space", "left", "delete")
+        assert isinstance(app.screen, StartScreen)
+        await press(app, "f1")
+        await until(pilot, on(app, HelpScreen))
+        await press(app, "escape")
+        await press(app, "n")
+        await until(pilot, on(app, NewScreen))
+        await press(app, "o", "f", "e", "x", "a")
+        assert isinstance(app.screen, NewScreen)
+        await press(app, "enter")
+        await until(pilot, on(app, ChooseQuestion))
+        await press(app, "escape")
+        await until(pilot, on(app, NewScreen))
+        at = app.screen.query_one("#rows", OptionList)
+        while at.highlighted != ROWS.index(Part.TEMPERATURE):
+            await press(app, "up" if (at.highlighted or 0) > ROWS.index(Part.TEMPERATURE) else "down")
+        for typed, said in (("warm", "warm is no temperature"), ("20,5", "Still missing")):
+            await press(app, "enter")
+            await until(pilot, on(app, TypeQuestion))
+            app.screen.query_one("Input").value = typed
+            await press(app, "enter")
+            await until(pilot, on(app, NewScreen))
+            await until(pilot, lambda said=said: said in now(app))
+        assert any("20.5 °C" in row for row in rows(app))
+        await press(app, "delete")
+        await until(pilot, lambda: not any("20.5 °C" in row for row in rows(app)))
+        await press(app, "q")
+        await until_start(pilot, app)
+
+    play(front, keys)
+
+
+def test_what_a_file_lacks_is_said_and_nothing_is_opened(front: Front) -> None:
+    far = front.under / "far.yaml"
+    far.write_text((front.under / "plan.yaml").read_text("utf-8").replace("[0, 0, -1150]", "[900, 0, -1150]"), "utf-8")
+
+    async def keys(pilot: Pilot[None], app: StationApp) -> None:
+        await press(app, "v")
+        await until(pilot, on(app, NewScreen))
+        await choose(pilot, app, Part.PLAN, "far.yaml")
+        await press(app, "b")
+        await until(pilot, lambda: "test low ccw" in now(app))
+        assert isinstance(app.screen, NewScreen)
+
+    play(front, keys)
+    assert not (front.under / "virtual").exists()
+
+
+def test_a_port_that_does_not_answer_says_so(front: Front) -> None:
+    async def keys(pilot: Pilot[None], app: StationApp) -> None:
+        await press(app, "n")
+        await until(pilot, on(app, NewScreen))
+        app.screen._line(instrument="heidenhain-nd281b", port="/dev/no-such-port")
+        await press(app, "t")
+        await until(pilot, lambda: "there is no such port" in now(app))
+
+    play(front, keys)
+
+
+def test_work_can_be_ended_and_leaving_it_asks_first(front: Front) -> None:
+    async def keys(pilot: Pilot[None], app: StationApp) -> None:
+        await press(app, "e")
+        await until(pilot, on(app, ResultsScreen))
+        after = app.screen._after
+        await press(app, "d")
+        await until(pilot, lambda: after.busy is Step.DIAGNOSE)
+        await press(app, "x")
+        await until(pilot, lambda: after.results[Step.DIAGNOSE].progress is Progress.CANCELLED)
+        await until(pilot, lambda: "ended" in rows(app)[1])
+        await press(app, "d")
+        await until(pilot, lambda: after.busy is Step.DIAGNOSE)
+        await press(app, "escape")
+        await until(pilot, on(app, YesQuestion))
+        await press(app, "n")
+        await until(pilot, on(app, ResultsScreen))
+        assert after.busy is Step.DIAGNOSE
+        await press(app, "escape")
+        await until(pilot, on(app, YesQuestion))
+        await press(app, "y")
+        await until_start(pilot, app)
+
+    shutil.copytree(shipped_folder("fixtures") / "sessions" / "small", front.under / "small")
+    play(front, keys)
+    assert not list((front.under / "small-results").iterdir())
+
+
+def test_an_error_of_the_virtual_machine_stays_on_the_screen(front: Front, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuses(*_: object, **__: object) -> None:
+        raise InstrumentError("no pseudo-terminal is left", where="here", remedy="close another program")
+
+    monkeypatch.setattr("dbbstation.service.front.virtual_place", refuses)
+
+    async def keys(pilot: Pilot[None], app: StationApp) -> None:
+        await press(app, "v")
+        await until(pilot, on(app, NewScreen))
+        await press(app, "b")
+        await until(pilot, on(app, PrepareScreen))
+        await press(app, "y", "b")
+        await until(pilot, lambda: "no pseudo-terminal is left" in now(app))
+        assert isinstance(app.screen, PrepareScreen)
+
+    play(front, keys)

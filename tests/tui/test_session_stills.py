@@ -1,0 +1,161 @@
+"""Pictures of the screens before and after a sequence, compared with those that were looked at and kept.
+
+    DBBSTATION_KEEP_STILLS=1 pytest tests/tui/test_session_stills.py
+
+keeps new ones; look at them before committing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.instrument.reading import Reading
+from dbbstation.service.after import After, Result, Step
+from dbbstation.service.bar_calibration import Calibrated
+from dbbstation.service.choice import Choice
+from dbbstation.service.front import Front
+from dbbstation.service.memory import Line, Memory, Remembered
+from dbbstation.service.session_list import SessionLine
+from dbbstation.service.work import Progress
+from dbbstation.tui import texts
+from dbbstation.tui.app import StationApp
+from dbbstation.tui.bar_screen import BarScreen
+from dbbstation.tui.new_screen import NewScreen
+from dbbstation.tui.prepare_screen import PrepareScreen
+from dbbstation.tui.results_screen import ResultsScreen
+from dbbstation.tui.row_screen import RowScreen
+from tests.tui.test_stills import KEEP, KEPT, drawn
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+SIZES = [(80, 24), (120, 40), (200, 60)]
+SHOP = Path("/shop")
+MEASURED = datetime(2026, 11, 20, 15, 30, tzinfo=UTC)
+DISPLAY = Line(instrument="heidenhain-nd281b", port="/dev/ttyUSB0")
+
+SESSIONS = (
+    SessionLine(SHOP / "2026-11-20-hexapod-7", MEASURED, "Table II", "Hexapod 7", 11, 30, 1, 2530.0),
+    SessionLine(SHOP / "monday", MEASURED, "Ten-minute check", "Hexapod 7", 6, 6),
+    SessionLine(SHOP / "broken", MEASURED, problem="the machine's file cannot be read"),
+)
+
+
+class Memorised(Memory):
+    """What was chosen last, without a file."""
+
+    def read(self) -> Remembered:
+        return Remembered(line=DISPLAY)
+
+
+@dataclass(frozen=True, eq=False)
+class StillFront(Front):
+    """A front desk at which everything has been found already."""
+
+    def sessions(self) -> tuple[SessionLine, ...]:
+        return SESSIONS
+
+
+class StillCalibration:
+    """A bar that has been read on its calibrator."""
+
+    latest = Reading(1.0, 150.0021)
+    failure = None
+    busy = False
+    done = count = 200
+    found = Calibrated(SHOP / "bar-2026-11-20.yaml", 1.84, 0.27, 0.05, drifted=False)
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def front() -> StillFront:
+    return StillFront(SHOP, Memorised())
+
+
+def start(_app: StationApp) -> None:
+    return None
+
+
+def new(app: StationApp) -> RowScreen:
+    choice = Choice(SHOP / "session", plan=SHOP / "table2.yaml", line=DISPLAY, operator="A. Machinist")
+    return NewScreen(app, front(), choice)
+
+
+def prepare(app: StationApp) -> RowScreen:
+    desk = front()
+    choice = replace(desk.virtual_choice(), folder=SHOP / "session", ambient_temp_c=20.5, operator="A. Machinist")
+    screen = PrepareScreen(app, desk, choice, desk.prepare(choice))
+    screen._confirmed = {"bar", "jig"}
+    return screen
+
+
+def bar(_app: StationApp) -> RowScreen:
+    screen = BarScreen(front(), DISPLAY, lambda _path: None)
+    values = dict(zip(texts.BAR_ROWS, ("DBB-0042", "ZB-17", "150.0003", "0.25", "2026-03-01", "20.3"), strict=True))
+    screen._values = values
+    screen._reopen = lambda: setattr(screen, "_calibration", StillCalibration())
+    return screen
+
+
+def results(_app: StationApp) -> RowScreen:
+    after = After(SHOP / "monday")
+    answer = {
+        "verdict": {
+            "kind": "exceeded",
+            "headline": "The machine is NOT within the shop's tolerances.",
+            "reasons": [
+                "Circular deviation: run high ccw 1 has 21.4 µm, U 1.2 µm; at most 15 µm. 2 of 6 circles exceed it."
+            ],
+            "to_do": ["Calibrate the machine: `dbbstation calibrate monday --out model.yaml`."],
+        }
+    }
+    after.results[Step.REPORT] = Result(Progress.DONE, "", 4.2, answer, "", SHOP / "monday-results" / "report.html")
+    after.results[Step.CALIBRATE] = Result(Progress.CANCELLED, "fit of 6 runs", 1.3)
+    return ResultsScreen(after)
+
+
+async def still(make: Callable[[StationApp], RowScreen | None], size: tuple[int, int]) -> str:
+    app = StationApp(None, None, front=front())
+    async with app.run_test(size=size) as pilot:
+        await pilot.pause()
+        while app._works:
+            await pilot.pause(0.02)
+            app.look()
+        screen = make(app)
+        if screen is not None:
+            await app.push_screen(screen)
+        if isinstance(screen, ResultsScreen):
+            await pilot.press("down", "down", "down")
+        for _ in range(4):
+            await pilot.pause()
+            app.look()
+        return app.export_screenshot(title="dbbstation station")
+
+
+@pytest.fixture(autouse=True)
+def one_time_zone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TZ", "UTC")
+    if hasattr(time, "tzset"):
+        time.tzset()
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("make", [start, new, prepare, bar, results], ids=lambda make: make.__name__)
+def test_screens_before_and_after_look_as_they_did(
+    make: Callable[[StationApp], RowScreen | None], size: tuple[int, int]
+) -> None:
+    text, _ = drawn(asyncio.run(still(make, size)))
+    text = text.replace(str(shipped_folder("fixtures").parent), "…")
+    kept = KEPT / f"{make.__name__}-{size[0]}x{size[1]}.txt"
+    if KEEP:
+        kept.write_text(text, encoding="utf-8")
+    assert text.splitlines() == kept.read_text(encoding="utf-8").splitlines()

@@ -33,6 +33,9 @@ MOST_ROUNDS = 12
 MOST_LOOKS = 15
 """Looks at what is left, one beside what the other brought, at the most."""
 
+BETTER = 3.0
+"""Log probability that another look must add, noise included, to be followed by one more: odds of twenty."""
+
 SEEDS = 3
 """Most probable hypotheses that are looked at again after each change."""
 
@@ -113,6 +116,7 @@ def settle(
     most_expanded: int = MOST_EXPANDED,
     most_looks: int = MOST_LOOKS,
     in_time: bool = True,
+    white_start: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns on a channel.
@@ -124,9 +128,17 @@ def settle(
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
         most_looks: looks at what is left, one beside what the other brought, at the most.
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
+        white_start: look in white noise, too, where it is coloured, and take what is more probable, noise included.
         progress: told what is being done.
     """
-    options = _Options(look=look, static=static, most_expanded=most_expanded, most_looks=most_looks, in_time=in_time)
+    options = _Options(
+        look=look,
+        static=static,
+        most_expanded=most_expanded,
+        most_looks=most_looks,
+        in_time=in_time,
+        white_start=white_start,
+    )
     return _settled(_begun(channel, options), options, progress)
 
 
@@ -137,6 +149,7 @@ class _Options:
     most_expanded: int
     most_looks: int
     in_time: bool
+    white_start: bool
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
@@ -166,20 +179,15 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
     laid_out: set[str] = set()
     refused: dict[str, str] = {}
     looked: set[frozenset[str]] = set()
+    started, most_probable = False, -np.inf
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
     looking = look and not channel.laws
     for number in range(MOST_ROUNDS):
         bank.measure_noise()
         starts: list[tuple[Member, ...]] = []
-        if looking and options.in_time and not looked:
-            # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
-            # follow variables have a start of their own, and what comes at once has one beside the laws alone.
-            begun = _grown_in(bank)
-            starts.append(_looked(bank, begun, refused, progress, options.most_looks, in_time=False))
-            laws = tuple(member for member in begun if member.cause.name in bank.laws)
-            starts.append(_looked(bank, laws, refused, progress, options.most_looks) if laws else ())
         if looking:
-            best = _looked(bank, best, refused, progress, options.most_looks, in_time=options.in_time)
+            best, starts = _looked_about(bank, best, refused, progress, options, first=not started)
+            started = True
         progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
@@ -209,6 +217,10 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
             break
         if looking:
             looked.add(posterior.best.names)
+            # Looks that go on finding other places for the same do not make it more probable.
+            before, most_probable = most_probable, max(most_probable, _log_probability(bank, best))
+            if most_probable < before + BETTER:
+                break
         looking = look
     return settled
 
@@ -221,6 +233,7 @@ def _looked(
     most_looks: int,
     *,
     in_time: bool = True,
+    white: bool = False,
 ) -> tuple[Member, ...]:
     """Look at what is left, take in what is worth it, and look again beside that, until nothing more stands out.
 
@@ -231,12 +244,13 @@ def _looked(
         progress: told what is being done.
         most_looks: looks at the most.
         in_time: look for steps and pulses in time, too.
+        white: take noise for white meanwhile.
     """
     before = _log_probability(bank, members)
     for number in range(most_looks):
         known = set(bank.patterns)
         new = bank.add(seen(bank, members, in_time=in_time))
-        noise = bank.measure_noise()
+        noise = bank.measure_noise(white=white)
         progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
         comparison = bank.beside().comparison(bank.target)
         more = edges_anew(bank, grown(comparison, bank.but_for(refused), members), set(new))
@@ -246,10 +260,58 @@ def _looked(
         after = _log_probability(bank, more)
         if not taken & fresh or after <= before:
             bank.drop(fresh)
-            bank.measure_noise()
+            bank.measure_noise(white=white)
             break
         bank.drop(fresh - taken)
         members, before = more, after
+    return members
+
+
+def _looked_about(
+    bank: Bank,
+    best: tuple[Member, ...],
+    refused: Mapping[str, str],
+    progress: Callable[[str], None],
+    options: _Options,
+    *,
+    first: bool,
+) -> tuple[tuple[Member, ...], list[tuple[Member, ...]]]:
+    """Members with what stands out beside them; the first time, other places for a search to start from, too."""
+    starts: list[tuple[Member, ...]] = []
+    if first and options.in_time:
+        # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
+        # follow variables have a start of their own, and what comes at once has one beside the laws alone.
+        begun = _grown_in(bank)
+        starts.append(_looked(bank, begun, refused, progress, options.most_looks, in_time=False))
+        laws = tuple(member for member in begun if member.cause.name in bank.laws)
+        starts.append(_looked(bank, laws, refused, progress, options.most_looks) if laws else ())
+    best = _looked(bank, best, refused, progress, options.most_looks, in_time=options.in_time)
+    if first and options.white_start:
+        best = _or_in_white_noise(bank, best, refused, progress, options)
+    return best, starts
+
+
+def _or_in_white_noise(
+    bank: Bank,
+    members: tuple[Member, ...],
+    refused: Mapping[str, str],
+    progress: Callable[[str], None],
+    options: _Options,
+) -> tuple[Member, ...]:
+    """Members, or those that a look finds that begins with white noise, if these and the noise beside them are more probable.
+
+    One step among few rows makes their noise look coloured, and in that noise it does not stand out.
+    """
+    if bank.channel.time is None or bank.noise.is_white:
+        return members
+    known, before = set(bank.patterns), _log_probability(bank, members)
+    bank.measure_noise(white=True)
+    found = _looked(bank, members, refused, progress, options.most_looks, in_time=options.in_time, white=True)
+    bank.measure_noise()
+    if _log_probability(bank, found) > before:
+        return found
+    bank.drop(set(bank.patterns) - known)
+    bank.measure_noise()
     return members
 
 

@@ -330,6 +330,6 @@ def _squares_of_edges(noise: Coloured, longest: int) -> NDArray[np.float64]:
     step = np.concatenate([np.cumsum(taps), np.full(longest, taps.sum())])
     inside = np.concatenate([[0.0], np.cumsum(step[:longest] ** 2 - taps.sum() ** 2)])
     reach = min(len(taps), longest + 1)  # longer ones have all of it
-    behind = [np.sum((step[k : k + len(taps)] - step[: len(taps)]) ** 2) for k in range(reach + 1)]
-    behind = np.pad(behind, (0, max(longest - reach, 0)), mode="edge")[: longest + 1]
+    near = [np.sum((step[k : k + len(taps)] - step[: len(taps)]) ** 2) for k in range(reach + 1)]
+    behind = np.pad(near, (0, max(longest - reach, 0)), mode="edge")[: longest + 1]
     return np.asarray(inside + behind, dtype=np.float64)

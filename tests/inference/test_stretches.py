@@ -10,9 +10,11 @@ from scipy.special import ndtr
 
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.curves import Clock, Stretches
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.settle import settle
+from dbbstation.inference.stretches import _squares_of_edges
 
 ROWS = 1200
 
@@ -85,3 +87,47 @@ def test_noise_that_is_the_same_everywhere_does_not_grow(rng):
     bank = Bank(made(rng.normal(0.0, 0.1, ROWS), grows=np.abs(np.sin(np.arange(ROWS) / 20.0))))
     bank.measure_noise()
     assert np.ptp(bank.spread) == 0.0
+
+
+def test_noise_may_grow_with_two_things_at_once(rng):
+    """0.1 everywhere, 0.4 on top of it where one size is 1, 3.2 where another one is: each has a spread of its own."""
+    often = (np.arange(ROWS) // 60 % 4 == 0).astype(float)
+    seldom = (np.arange(ROWS) % 150 == 7).astype(float)
+    sigma = np.sqrt(0.01 + (0.4 * often) ** 2 + (3.2 * seldom) ** 2)
+    bank = Bank(made(rng.normal(0.0, 1.0, ROWS) * sigma, grows=np.column_stack([often, seldom])))
+    bank.measure_noise()
+    quiet = bank.spread[(often == 0) & (seldom == 0)].mean()
+    assert bank.spread[(often > 0) & (seldom == 0)].mean() / quiet == pytest.approx(np.sqrt(17.0), rel=0.5)
+    assert bank.spread[(often == 0) & (seldom > 0)].mean() / quiet == pytest.approx(32.0, rel=1.0)
+
+
+@pytest.mark.parametrize("longest", [5, 200])
+def test_sums_of_squares_of_a_stretch_are_those_of_its_whitened_rows(longest):
+    """By brute force: ones between zeros, filtered row by row."""
+    noise = Coloured(1.0, 0.6, 0.8)
+    taps = noise.filter
+    found = _squares_of_edges(noise, longest)
+    for length in range(1, longest + 1, 13):
+        rows = np.concatenate([np.ones(length), np.zeros(len(taps))])
+        whitened = np.convolve(rows, taps)[: len(rows)]
+        assert found[length] + length * taps.sum() ** 2 == pytest.approx(float(whitened @ whitened))
+
+
+NILE = """1120 1160 963 1210 1160 1160 813 1230 1370 1140 995 935 1110 994 1020 960 1180 799 958 1140 1100 1210 1150 1250 1260 1220
+1030 1100 774 840 874 694 940 833 701 916 692 1020 1050 969 831 726 456 824 702 1120 1100 832 764 821 768 845 864 862 698 845 744
+796 1040 759 781 865 845 944 984 897 822 1010 771 676 649 846 812 742 801 1040 860 874 848 890 744 749 838 1050 918 986 797 923
+975 815 1020 906 901 1170 912 746 919 718 714 740"""
+"""Yearly flow of the Nile at Aswan, 1871 to 1970, 1e8 m³ [Cobb, Biometrika 65 (1978) 243]."""
+
+
+def test_the_nile_steps_down_in_1899():
+    """A hundred real values, of which the literature finds one change, from 1098 to 850 behind 1898 [Cobb 1978]."""
+    flow = np.array([float(value) for value in NILE.split()])
+    years = np.arange(1871.0, 1971.0)
+    base = Base.flat(("mean",), np.ones((len(flow), 1)))
+    channel = Channel(flow, "", (slice(0, 100),), ("nile",), (), base, time=years, static=())
+    settled = settle(channel)
+    ((_, first, last),) = forms(settled)
+    assert {1871.0 + np.ceil(first), 1871.0 + np.ceil(last)} & {1899.0}
+    effect = settled.effect()
+    assert effect[years >= 1899].mean() - effect[years < 1899].mean() == pytest.approx(-247.8, abs=25.0)

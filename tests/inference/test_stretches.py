@@ -89,18 +89,6 @@ def test_noise_that_is_the_same_everywhere_does_not_grow(rng):
     assert np.ptp(bank.spread) == 0.0
 
 
-def test_noise_may_grow_with_two_things_at_once(rng):
-    """0.1 everywhere, 0.4 on top of it where one size is 1, 3.2 where another one is: each has a spread of its own."""
-    often = (np.arange(ROWS) // 60 % 4 == 0).astype(float)
-    seldom = (np.arange(ROWS) % 150 == 7).astype(float)
-    sigma = np.sqrt(0.01 + (0.4 * often) ** 2 + (3.2 * seldom) ** 2)
-    bank = Bank(made(rng.normal(0.0, 1.0, ROWS) * sigma, grows=np.column_stack([often, seldom])))
-    bank.measure_noise()
-    quiet = bank.spread[(often == 0) & (seldom == 0)].mean()
-    assert bank.spread[(often > 0) & (seldom == 0)].mean() / quiet == pytest.approx(np.sqrt(17.0), rel=0.5)
-    assert bank.spread[(often == 0) & (seldom > 0)].mean() / quiet == pytest.approx(32.0, rel=1.0)
-
-
 @pytest.mark.parametrize("longest", [5, 200])
 def test_sums_of_squares_of_a_stretch_are_those_of_its_whitened_rows(longest):
     """By brute force: ones between zeros, filtered row by row."""

@@ -126,23 +126,6 @@ class Signals:
         return np.where(last >= 0, travel, np.inf)
 
     @cached_property
-    def beside_standstill(self) -> NDArray[np.float64]:
-        """Size of what a standstill does to the samples about it, one in it, a third from one sample of the comparison to the next, (n,).
-
-        What friction does while a drive sticks, and when exactly it lets go, no model of motion knows.
-        """
-        standing = self.direction == 0.0
-        standing[1:] |= self.direction[1:] * self.direction[:-1] < 0.0
-        at, own = np.flatnonzero(standing), np.arange(len(self.t_s))
-        if not len(at):
-            return np.zeros(len(own))
-        next_one = np.searchsorted(at, own)
-        after = at[np.minimum(next_one, len(at) - 1)] - own
-        before = own - at[np.maximum(next_one - 1, 0)]
-        nearest = np.minimum(np.abs(after), np.abs(before))
-        return np.exp(-nearest * PER_CUTOFF * self.cutoff_hz / self.rate_hz)
-
-    @cached_property
     def turns(self) -> NDArray[np.bool_]:
         """Where the drive starts, stops or reverses, as far as the filters reach, shape (n,).
 

@@ -40,6 +40,3 @@ def test_turns_are_starts_stops_and_reversals_and_no_push_on_the_way():
     assert signals.turns[highest - 50 : highest + 50].all()
     assert not signals.turns[(seconds > 4.7) & (seconds < 5.4)].any()
     assert 0.05 < signals.turns.mean() < 0.25
-    beside = signals.beside_standstill
-    assert beside[signals.reversals] == pytest.approx(1.0, abs=0.3)
-    assert beside[(seconds > 4.7) & (seconds < 5.4)].max() < 1e-3

@@ -158,8 +158,6 @@ class Bank:
             white: take it for white, whatever it is.
         """
         least = max(QUIETEST * self.channel.size, self.channel.least_noise)
-        if white:
-            self._take(Coloured(self.noise.sigma), self.spread)
         stretches = self.channel.stretches
         for _ in range(NOISE_ROUNDS):
             beside = self.beside()

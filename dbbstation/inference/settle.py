@@ -116,7 +116,6 @@ def settle(
     most_expanded: int = MOST_EXPANDED,
     most_looks: int = MOST_LOOKS,
     in_time: bool = True,
-    white_start: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns on a channel.
@@ -128,7 +127,6 @@ def settle(
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
         most_looks: looks at what is left, one beside what the other brought, at the most.
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
-        white_start: look in white noise, too, where it is coloured, and take what is more probable, noise included.
         progress: told what is being done.
     """
     options = _Options(
@@ -137,7 +135,6 @@ def settle(
         most_expanded=most_expanded,
         most_looks=most_looks,
         in_time=in_time,
-        white_start=white_start,
     )
     return _settled(_begun(channel, options), options, progress)
 
@@ -149,7 +146,6 @@ class _Options:
     most_expanded: int
     most_looks: int
     in_time: bool
-    white_start: bool
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
@@ -233,7 +229,6 @@ def _looked(
     most_looks: int,
     *,
     in_time: bool = True,
-    white: bool = False,
 ) -> tuple[Member, ...]:
     """Look at what is left, take in what is worth it, and look again beside that, until nothing more stands out.
 
@@ -244,13 +239,12 @@ def _looked(
         progress: told what is being done.
         most_looks: looks at the most.
         in_time: look for steps and pulses in time, too.
-        white: take noise for white meanwhile.
     """
     before = _log_probability(bank, members)
     for number in range(most_looks):
         known = set(bank.patterns)
         new = bank.add(seen(bank, members, in_time=in_time))
-        noise = bank.measure_noise(white=white)
+        noise = bank.measure_noise()
         progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
         comparison = bank.beside().comparison(bank.target)
         more = edges_anew(bank, grown(comparison, bank.but_for(refused), members), set(new))
@@ -260,7 +254,7 @@ def _looked(
         after = _log_probability(bank, more)
         if not taken & fresh or after <= before:
             bank.drop(fresh)
-            bank.measure_noise(white=white)
+            bank.measure_noise()
             break
         bank.drop(fresh - taken)
         members, before = more, after
@@ -286,33 +280,7 @@ def _looked_about(
         laws = tuple(member for member in begun if member.cause.name in bank.laws)
         starts.append(_looked(bank, laws, refused, progress, options.most_looks) if laws else ())
     best = _looked(bank, best, refused, progress, options.most_looks, in_time=options.in_time)
-    if first and options.white_start:
-        best = _or_in_white_noise(bank, best, refused, progress, options)
     return best, starts
-
-
-def _or_in_white_noise(
-    bank: Bank,
-    members: tuple[Member, ...],
-    refused: Mapping[str, str],
-    progress: Callable[[str], None],
-    options: _Options,
-) -> tuple[Member, ...]:
-    """Members, or those that a look finds that begins with white noise, if these and the noise beside them are more probable.
-
-    One step among few rows makes their noise look coloured, and in that noise it does not stand out.
-    """
-    if bank.channel.time is None or bank.noise.is_white:
-        return members
-    known, before = set(bank.patterns), _log_probability(bank, members)
-    bank.measure_noise(white=True)
-    found = _looked(bank, members, refused, progress, options.most_looks, in_time=options.in_time, white=True)
-    bank.measure_noise()
-    if _log_probability(bank, found) > before:
-        return found
-    bank.drop(set(bank.patterns) - known)
-    bank.measure_noise()
-    return members
 
 
 def _log_probability(bank: Bank, members: Sequence[Member]) -> float:

@@ -99,23 +99,3 @@ def test_sums_of_squares_of_a_stretch_are_those_of_its_whitened_rows(longest):
         rows = np.concatenate([np.ones(length), np.zeros(len(taps))])
         whitened = np.convolve(rows, taps)[: len(rows)]
         assert found[length] + length * taps.sum() ** 2 == pytest.approx(float(whitened @ whitened))
-
-
-NILE = """1120 1160 963 1210 1160 1160 813 1230 1370 1140 995 935 1110 994 1020 960 1180 799 958 1140 1100 1210 1150 1250 1260 1220
-1030 1100 774 840 874 694 940 833 701 916 692 1020 1050 969 831 726 456 824 702 1120 1100 832 764 821 768 845 864 862 698 845 744
-796 1040 759 781 865 845 944 984 897 822 1010 771 676 649 846 812 742 801 1040 860 874 848 890 744 749 838 1050 918 986 797 923
-975 815 1020 906 901 1170 912 746 919 718 714 740"""
-"""Yearly flow of the Nile at Aswan, 1871 to 1970, 1e8 m³ [Cobb, Biometrika 65 (1978) 243]."""
-
-
-def test_the_nile_steps_down_in_1899():
-    """A hundred real values, of which the literature finds one change, from 1098 to 850 behind 1898 [Cobb 1978]."""
-    flow = np.array([float(value) for value in NILE.split()])
-    years = np.arange(1871.0, 1971.0)
-    base = Base.flat(("mean",), np.ones((len(flow), 1)))
-    channel = Channel(flow, "", (slice(0, 100),), ("nile",), (), base, time=years, static=())
-    settled = settle(channel)
-    ((_, first, last),) = forms(settled)
-    assert {1871.0 + np.ceil(first), 1871.0 + np.ceil(last)} & {1899.0}
-    effect = settled.effect()
-    assert effect[years >= 1899].mean() - effect[years < 1899].mean() == pytest.approx(-247.8, abs=25.0)

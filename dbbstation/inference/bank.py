@@ -390,7 +390,7 @@ def _alike(one: Coloured, other: Coloured) -> bool:
     return all(abs(a - b) < SETTLED * max(a, b) for a, b in pairs)
 
 
-GROWN = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 """Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
 
 NOISE_ROUNDS = 5

@@ -127,8 +127,8 @@ class Channel:
             leaves of a perfect object, in the unit of the residual.
         surely: probability that the noise is not more than it is taken for [interval of a variance by chi-square; JCGM 101:2008,
             sec. 6.4.9.4]; None: its estimate is taken, for which half of that is as good.
-        grows: sizes of what parts of the noise may be in proportion to, beside a constant part, shape (n,) or (n, p); None: noise is
-            the same in all rows.
+        grows: size of what a part of the noise may be in proportion to, beside a constant part, shape (n,); None: noise is the same
+            in all rows.
         clock: of all rows, where some were left out or where they show a step by and by; None: they show it at once.
         direction: of travel as the rows show it, shape (n,); None: nothing is looked for in time that turns with it.
     """

@@ -249,9 +249,11 @@ def play(values: NDArray[np.float64], blocks: Sequence[slice], width: float) -> 
 def _speed(
     variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], unit: str, family: Family = Family.SPEED
 ) -> Pattern:
-    """In proportion to how fast it changes; of the simulated value this is what a lag does."""
+    """In proportion to how fast it changes; of the simulated value less that, times the delay, is what a lag does."""
     rate = variable.rates(time, blocks)
     size = float(np.abs(rate).max(initial=0.0)) or 1.0
+    if family is Family.LAG:
+        rate = -rate
     return Pattern(family, (variable,), rate[:, None] / size, None, (unit,), (size,))
 
 

@@ -33,6 +33,9 @@ MOST_ROUNDS = 12
 MOST_LOOKS = 15
 """Looks at what is left, one beside what the other brought, at the most."""
 
+BETTER = 3.0
+"""Log probability that another look must add, noise included, to be followed by one more: odds of twenty."""
+
 SEEDS = 3
 """Most probable hypotheses that are looked at again after each change."""
 
@@ -126,7 +129,13 @@ def settle(
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
         progress: told what is being done.
     """
-    options = _Options(look=look, static=static, most_expanded=most_expanded, most_looks=most_looks, in_time=in_time)
+    options = _Options(
+        look=look,
+        static=static,
+        most_expanded=most_expanded,
+        most_looks=most_looks,
+        in_time=in_time,
+    )
     return _settled(_begun(channel, options), options, progress)
 
 
@@ -166,20 +175,15 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
     laid_out: set[str] = set()
     refused: dict[str, str] = {}
     looked: set[frozenset[str]] = set()
+    started, most_probable = False, -np.inf
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
     looking = look and not channel.laws
     for number in range(MOST_ROUNDS):
         bank.measure_noise()
         starts: list[tuple[Member, ...]] = []
-        if looking and options.in_time and not looked:
-            # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
-            # follow variables have a start of their own, and what comes at once has one beside the laws alone.
-            begun = _grown_in(bank)
-            starts.append(_looked(bank, begun, refused, progress, options.most_looks, in_time=False))
-            laws = tuple(member for member in begun if member.cause.name in bank.laws)
-            starts.append(_looked(bank, laws, refused, progress, options.most_looks) if laws else ())
         if looking:
-            best = _looked(bank, best, refused, progress, options.most_looks, in_time=options.in_time)
+            best, starts = _looked_about(bank, best, refused, progress, options, first=not started)
+            started = True
         progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
@@ -209,6 +213,10 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
             break
         if looking:
             looked.add(posterior.best.names)
+            # Looks that go on finding other places for the same do not make it more probable.
+            before, most_probable = most_probable, max(most_probable, _log_probability(bank, best))
+            if most_probable < before + BETTER:
+                break
         looking = look
     return settled
 
@@ -251,6 +259,28 @@ def _looked(
         bank.drop(fresh - taken)
         members, before = more, after
     return members
+
+
+def _looked_about(
+    bank: Bank,
+    best: tuple[Member, ...],
+    refused: Mapping[str, str],
+    progress: Callable[[str], None],
+    options: _Options,
+    *,
+    first: bool,
+) -> tuple[tuple[Member, ...], list[tuple[Member, ...]]]:
+    """Members with what stands out beside them; the first time, other places for a search to start from, too."""
+    starts: list[tuple[Member, ...]] = []
+    if first and options.in_time:
+        # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
+        # follow variables have a start of their own, and what comes at once has one beside the laws alone.
+        begun = _grown_in(bank)
+        starts.append(_looked(bank, begun, refused, progress, options.most_looks, in_time=False))
+        laws = tuple(member for member in begun if member.cause.name in bank.laws)
+        starts.append(_looked(bank, laws, refused, progress, options.most_looks) if laws else ())
+    best = _looked(bank, best, refused, progress, options.most_looks, in_time=options.in_time)
+    return best, starts
 
 
 def _log_probability(bank: Bank, members: Sequence[Member]) -> float:

@@ -329,7 +329,7 @@ def _squares_of_edges(noise: Coloured, longest: int) -> NDArray[np.float64]:
     taps = noise.filter
     step = np.concatenate([np.cumsum(taps), np.full(longest, taps.sum())])
     inside = np.concatenate([[0.0], np.cumsum(step[:longest] ** 2 - taps.sum() ** 2)])
-    reach = min(len(taps), longest + 1)  # longer ones have all of it
-    ends = [np.sum((step[k : k + len(taps)] - step[: len(taps)]) ** 2) for k in range(reach + 1)]
-    behind = np.pad(ends, (0, max(longest - reach, 0)), mode="edge")[: longest + 1]
+    reach = min(len(taps), longest)  # longer ones have all of it
+    near = [np.sum((step[k : k + len(taps)] - step[: len(taps)]) ** 2) for k in range(reach + 1)]
+    behind = np.pad(near, (0, longest - reach), mode="edge")
     return np.asarray(inside + behind, dtype=np.float64)

@@ -10,9 +10,11 @@ from scipy.special import ndtr
 
 from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.curves import Clock, Stretches
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.settle import settle
+from dbbstation.inference.stretches import _squares_of_edges
 
 ROWS = 1200
 
@@ -109,3 +111,15 @@ def test_the_likelihood_of_uneven_noise_is_that_of_its_covariance(rng):
         found.append(bank.log_likelihood())
     wanted = [dense(spread, level) for spread, level in cases]
     assert np.diff(found) == pytest.approx(np.diff(wanted), rel=1e-6)
+
+
+@pytest.mark.parametrize("longest", [5, 200])
+def test_sums_of_squares_of_a_stretch_are_those_of_its_whitened_rows(longest):
+    """By brute force: ones between zeros, filtered row by row."""
+    noise = Coloured(1.0, 0.6, 0.8)
+    taps = noise.filter
+    found = _squares_of_edges(noise, longest)
+    for length in range(1, longest + 1, 13):
+        rows = np.concatenate([np.ones(length), np.zeros(len(taps))])
+        whitened = np.convolve(rows, taps)[: len(rows)]
+        assert found[length] + length * taps.sum() ** 2 == pytest.approx(float(whitened @ whitened))

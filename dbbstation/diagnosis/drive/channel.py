@@ -118,7 +118,7 @@ def drive_channel(
         least_noise=METHOD_SHARE * scale.force_n,
         static=curves,
         surely=SURE,
-        grows=np.column_stack([np.abs(recordings.motion[:, 0]), recordings.at(lambda s: s.beside_standstill)]),
+        grows=np.abs(recordings.motion[:, 0]),
         clock=Clock(recordings.time_s / recordings.samples_apart_s, recordings.step_response),
         direction=recordings.compared(lambda s: s.direction),
     )

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.special import betaincc, betaln, expit
 
 from dbbstation.diagnosis.drive.findings import Part
 from dbbstation.diagnosis.drive.fit import fit
+from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.curves import Stretches
 from dbbstation.inference.verdict import Value
 
@@ -18,9 +21,68 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.diagnosis.drive.recordings import Recordings
 
 APART = 4.0
 """Standard uncertainties by which levels of a force in time must differ to be two: one in 15,000 by chance."""
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Where stretches of time begin and end.
+
+    Attributes:
+        count: of beginnings and ends within the recordings.
+        at_turns: how many of them lie where the drive starts, stops or reverses.
+        share: of the time in which it does so.
+    """
+
+    count: int
+    at_turns: int
+    share: float
+
+    @property
+    def pushed(self) -> float:
+        """Probability that what begins and ends there does not know of the motion, against a law that is wrong at turns.
+
+        The one has its edges anywhere, the other more often at turns, how much more is not known [binomial likelihood, uniform prior];
+        before, the latter has the odds of any cause, one in twenty.
+        """
+        turns, others = self.at_turns + 1.0, self.count - self.at_turns + 1.0
+        share = float(np.clip(self.share, EDGE, 1.0 - EDGE))
+        anywhere = self.at_turns * np.log(share) + (self.count - self.at_turns) * np.log1p(-share)
+        more_often = (
+            betaln(turns, others) + np.log(max(float(betaincc(turns, others, share)), 1e-300)) - np.log1p(-share)
+        )
+        return float(expit(anywhere - more_often - NAMED_ODDS))
+
+
+EDGE = 1e-6
+"""Share of turns that is none, or all of the time."""
+
+
+def edges_of(recordings: Recordings, parts: Sequence[Part]) -> Edges:
+    """Where stretches of time begin and end.
+
+    Args:
+        recordings: of the drive.
+        parts: that `pulse_parts` found.
+    """
+    times = np.array([edge for part in parts for edge in part.t_s or ()])
+    times = times[(times > recordings.time_s[0]) & (times < recordings.time_s[-1])]
+    every = np.concatenate([one.turns[one.kept[0] : one.kept[-1]] for one in recordings.signals])
+    return Edges(len(times), int(np.sum(_at_turns(recordings, times))), float(every.mean()))
+
+
+def _at_turns(recordings: Recordings, times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether a drive starts, stops or reverses at times of all recordings, one after the other, shape (t,)."""
+    found = np.zeros(len(times), dtype=bool)
+    for rows, one in zip(recordings.blocks, recordings.signals, strict=True):
+        begins, ends = recordings.time_s[rows.start], recordings.time_s[rows.stop - 1]
+        own = (times >= begins) & (times <= ends)
+        at = one.kept[0] + np.round((times[own] - begins) * one.rate_hz).astype(np.int64)
+        found[own] = one.turns[np.clip(at, 0, len(one.t_s) - 1)]
+    return found
 
 
 def pulse_parts(explained: Explained, names: Sequence[str]) -> list[Part]:

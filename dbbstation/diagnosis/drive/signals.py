@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.ndimage import label
 from scipy.signal import butter, sosfiltfilt, welch
 
 from dbbstation.diagnosis.drive.sampling import evenly_sampled
@@ -50,11 +51,18 @@ small by the square of this, a thousandth."""
 MOVING_SHARE = 0.005
 """Speed, of the greatest, below which the drive counts as standing: friction has no known value there."""
 
+ACCELERATING_SHARE = 0.1
+"""Acceleration, of the greatest, above which the drive counts as accelerating."""
+
 REACH = 2
 """Samples of the comparison beside a standstill that are left out: the main lobe of the filters."""
 
 SLOW_HZ = 5.0
 """Band that strokes of a second need, for friction if not for the mass: slow recordings get up to it."""
+
+MOST = 4000
+"""Samples that are compared, at the most: a long recording says more of slow things, not of faster ones. What looks for pulses and
+waves takes grows with the square of them; half a minute keeps the widest band of 1000 samples a second."""
 
 FEWEST = 60
 """Samples in the band that an identification needs."""
@@ -118,21 +126,16 @@ class Signals:
         return np.where(last >= 0, travel, np.inf)
 
     @cached_property
-    def beside_standstill(self) -> NDArray[np.float64]:
-        """Size of what the filters blur of a standstill into the samples beside it, one in it, shape (n,).
+    def turns(self) -> NDArray[np.bool_]:
+        """Where the drive starts, stops or reverses, as far as the filters reach, shape (n,).
 
-        What friction does while a drive sticks, and when exactly it lets go, no model of motion knows.
+        What it accelerates by on its way is none: a force from elsewhere does that, too.
         """
-        standing = self.direction == 0.0
-        standing[1:] |= self.direction[1:] * self.direction[:-1] < 0.0
-        at, own = np.flatnonzero(standing), np.arange(len(self.t_s))
-        if not len(at):
-            return np.zeros(len(own))
-        next_one = np.searchsorted(at, own)
-        after = at[np.minimum(next_one, len(at) - 1)] - own
-        before = own - at[np.maximum(next_one - 1, 0)]
-        nearest = np.minimum(np.abs(after), np.abs(before))
-        return np.exp(-nearest * PER_CUTOFF * self.cutoff_hz / (REACH * self.rate_hz))
+        acceleration = np.abs(self.acceleration_m_s2)
+        changing = (self.direction == 0.0) | (acceleration > ACCELERATING_SHARE * acceleration.max())
+        stretch, _ = label(changing)
+        stands = np.unique(stretch[self.direction == 0.0])
+        return _widened(np.isin(stretch, stands[stands > 0]), int(REACH * self.rate_hz / (PER_CUTOFF * self.cutoff_hz)))
 
     @cached_property
     def standing_m_s(self) -> float:
@@ -273,5 +276,6 @@ def _chosen_cutoff(position_m: NDArray[np.float64], rate_hz: float, floor: float
     seconds = np.count_nonzero(moving > MOVING_SHARE * moving.max()) / rate_hz
     needed = (2.0 * FEWEST / PER_CUTOFF + 2.0 * EDGE_PERIODS) / max(seconds, 1.0 / rate_hz)
     chosen = float(tried[good[-1]]) if len(good) else min(widest, max(needed, SLOW_HZ))
-    # A slow recording would leave too few samples in a band that its differences follow to a hundredth.
-    return float(min(max(chosen, min(needed, SLOW_HZ)), rate_hz / (2.5 * POSITION_BAND)))
+    # A slow recording would leave too few samples in a band that its differences follow to a hundredth, a long one too many.
+    most = max(MOST / (PER_CUTOFF * seconds), min(needed, SLOW_HZ)) if seconds > 0.0 else chosen
+    return float(min(max(min(chosen, most), min(needed, SLOW_HZ)), rate_hz / (2.5 * POSITION_BAND)))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.diagnosis.drive.channel import METHOD_SHARE
 from dbbstation.diagnosis.drive.findings import DriveFinding, Effect, Part
-from dbbstation.diagnosis.drive.pulses import pulse_parts
+from dbbstation.diagnosis.drive.pulses import edges_of, pulse_parts
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.read_off import OUT, read_off
+from dbbstation.inference.read_off import OUT, SURE, read_off
 from dbbstation.inference.verdict import Value, Verdict
 
 if TYPE_CHECKING:
@@ -121,15 +122,16 @@ class Verdicts:
                 )
         best = max(there or own, key=lambda f: f.log_factor, default=None)
         pulses = [f for f in there if f.family is Family.PULSES]
+        pushed = max((f.probability for f in pulses), default=0.0)
         parts = tuple(part for f in there if f not in pulses for part in self._parts(f))
-        parts += tuple(pulse_parts(self._explained, [f.name for f in pulses])) if pulses else ()
+        parts += self._pulses if pulses else ()
         parameters = self._values(best) if best is not None else {}
         if len(there) > 1 and best is not None and best.family is None:
             parameters = {k: v for f in reversed(there) for k, v in self._values(f).items()}
         return DriveFinding(
             name=source.name,
             verdict=verdict,
-            probability=self._probability([f.name for f in own], own),
+            probability=pushed if pulses else self._probability([f.name for f in own], own),
             ambiguous_with=alike,
             gain=best.log_factor if best is not None else 0.0,
             concealed=best.confounded if best is not None else 0.0,
@@ -142,6 +144,8 @@ class Verdicts:
 
     def _as_sure_as_it_is(self, finding: Finding) -> Finding:
         """A finding whose values are known as well as stretches and bands agree on them: noise alone would call them surer."""
+        if finding.verdict is Verdict.IDENTIFIED and finding.family is Family.PULSES:
+            return self._as_sure_as_its_edges(finding)
         if finding.verdict is not Verdict.IDENTIFIED or finding.name not in self._drive.of_law:
             return finding
         after = self._explained.after
@@ -155,6 +159,26 @@ class Verdicts:
             "uncertainties out: something that is not in the model changes it, or stands behind it."
         )
         return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
+
+    def _as_sure_as_its_edges(self, finding: Finding) -> Finding:
+        """Stretches of time, which begin and end with the motion where a law is wrong and no force comes from elsewhere."""
+        edges = edges_of(self._drive.recordings, self._pulses)
+        probability = finding.probability * edges.pushed
+        if probability >= SURE:
+            return replace(finding, probability=probability)
+        why = (
+            f"{edges.at_turns} of {edges.count} beginnings and ends are where the drive starts, stops or reverses, which it does "
+            f"in {100.0 * edges.share:.0f} % of the time: friction or inertia that no law describes there is as likely."
+        )
+        return replace(finding, verdict=Verdict.AMBIGUOUS, probability=probability, text=why)
+
+    @cached_property
+    def _pulses(self) -> tuple[Part, ...]:
+        """Levels of all stretches of time that are there and do not turn with the travel."""
+        names = [
+            f.name for f in self._raw if f.family is Family.PULSES and f.verdict in CLAIMS and f.name in self.named
+        ]
+        return tuple(pulse_parts(self._explained, names)) if names else ()
 
     def _is_member(self, finding: Finding) -> bool:
         return finding.name in self._explained.settled.best.names

@@ -27,9 +27,37 @@ class Meaning:
 PLAIN = Meaning("", Kind.ANY)
 
 _LENGTHS = {"mm": "mm", "um": "µm", "µm": "µm", "nm": "nm", "cm": "cm", "m": "m", "inch": "inch"}
-_TIMES = {"s": "s", "ms": "ms", "us": "µs", "min": "min", "h": "h", "days": "days"}
+_TIMES = {
+    "s": "s",
+    "ms": "ms",
+    "us": "µs",
+    "min": "min",
+    "h": "h",
+    "d": "days",
+    "day": "days",
+    "days": "days",
+    "years": "years",
+    "yr": "years",
+}
 _FORCES = {"n": "N", "kn": "kN"}
-_OTHERS = {"a": "A", "v": "V", "bar": "bar", "pa": "Pa", "w": "W", "hz": "Hz", "kg": "kg", "percent": "%", "g": "g"}
+_OTHERS = {
+    "a": "A",
+    "v": "V",
+    "bar": "bar",
+    "mbar": "mbar",
+    "pa": "Pa",
+    "hpa": "hPa",
+    "kpa": "kPa",
+    "mpa": "MPa",
+    "kw": "kW",
+    "j": "J",
+    "ppm": "ppm",
+    "w": "W",
+    "hz": "Hz",
+    "kg": "kg",
+    "percent": "%",
+    "g": "g",
+}
 _TEMPERATURES = {"c": "degC", "degc": "degC", "celsius": "degC", "k": "K", "kelvin": "K"}
 
 UNITS: dict[str, Meaning] = {
@@ -44,6 +72,7 @@ UNITS: dict[str, Meaning] = {
         for time in ("s", "min")
     },
     "n_m": Meaning("N m", Kind.FORCE),
+    "kg_m3": Meaning("kg/m³", Kind.ANY),
     "rpm": Meaning("rpm", Kind.SPEED),
     "deg": Meaning("deg", Kind.ANGLE, 360.0),
     "rad": Meaning("rad", Kind.ANGLE, 2.0 * math.pi),
@@ -55,6 +84,8 @@ UNITS: dict[str, Meaning] = {
 """What a name ends in, or what is stated, in small letters."""
 
 _CLOCKS = {"t", "time", "timestamp", "clock", "elapsed", "date"}
+_CALENDAR = {"year", "years", "day", "days", "jd", "mjd", "bjd"}
+"""Columns that count by themselves when a row was measured, and are called no more than that."""
 _THERMOMETERS = ("temp", "temperature")
 _WORDS = re.compile(r"[^a-z0-9µ%]+")
 
@@ -69,6 +100,8 @@ def meaning_of(name: str) -> Meaning:
             if found.kind is Kind.TIME and not _CLOCKS & set(words[:-count]):
                 return Meaning(found.unit, Kind.ANY)  # a duration, no clock
             return found
+    if len(words) == 1 and words[0] in _CALENDAR:
+        return Meaning("years" if words[0].startswith("year") else "days", Kind.TIME)
     if words and words[-1] in _CLOCKS:
         return Meaning("", Kind.TIME)
     if any(word.startswith(_THERMOMETERS) for word in words):

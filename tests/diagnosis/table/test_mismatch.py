@@ -10,6 +10,11 @@ import pytest
 from dbbstation.diagnosis.table.mismatch import Mismatch, find_mismatch
 from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.diagnosis.table.summary import mismatch_summary
+from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.read_off import read_off
+from dbbstation.inference.settle import settle
+from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.verdict import Verdict
 from dbbstation.tabulated import Asked, load_tables
 from tests.diagnosis.table.plant import PULSE_S, Truth, record
 
@@ -21,7 +26,7 @@ ASKED = Asked("measured_mm", "simulated_mm")
 FOUND = {
     "play": (Truth(play_um=8.0), {"hysteresis of place_mm", "hysteresis of simulated_mm"}, ("half width", 4e-3)),
     "twice": (Truth(twice_um=3.0), {"twice per turn of screw_deg"}, None),
-    "lag": (Truth(lag_ms=0.3), {"lag of simulated_mm", "speed of place_mm"}, ("delay", -0.3e-3)),
+    "lag": (Truth(lag_ms=0.3), {"lag of simulated_mm", "speed of place_mm"}, ("delay", 0.3e-3)),
     "temperature": (Truth(expansion_um_k=1.5), {"linear in oil_temp_c"}, ("slope", 1.5e-3)),
     "product": (
         Truth(load_by_place_um=6.0),
@@ -65,6 +70,25 @@ def test_a_form_is_found_by_its_name_with_its_size(tmp_path, name):
     if value is not None and value[0] in finding.values:
         known = finding.values[value[0]]
         assert abs(known.value - value[1]) < 4.0 * known.uncertainty
+
+
+def test_what_is_measured_late_has_a_delay_that_is_positive(rng):
+    """The same function of time, 30 ms later."""
+    seconds = np.arange(2000) * 0.01
+
+    def value(at):
+        return np.sin(at) + 0.4 * np.cos(2.7 * at + 1.0)
+
+    measured = value(seconds - 0.03) + rng.normal(0.0, 0.01, len(seconds))
+    base = Base.flat(("offset",), np.ones((len(seconds), 1)))
+    simulated = Variable("model", "N", Kind.ANY, value(seconds))
+    blocks = (slice(0, len(seconds)),)
+    channel = Channel(
+        measured - value(seconds), "N", blocks, ("one",), (simulated,), base, time=seconds, simulated=simulated
+    )
+    (finding,) = [one for one in read_off(settle(channel)) if one.verdict is Verdict.IDENTIFIED]
+    assert finding.name == "lag of model"
+    assert finding.values["delay"].value == pytest.approx(0.03, rel=0.05)
 
 
 def test_a_step_and_a_pulse_are_placed_in_time(tmp_path):

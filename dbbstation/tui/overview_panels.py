@@ -153,7 +153,7 @@ class PlateMap(Panel):
         self, name: str, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int
     ) -> list[Content]:
         """Rows of a test in words, a direction each; what is repeated at the end of the plan stands in the list."""
-        rows = []
+        rows: list[Content] = []
         for task, mark in signs.get(name, []):
             if task.occurrence > 1:
                 continue
@@ -161,7 +161,7 @@ class PlateMap(Panel):
             before = self._titled(name) if not rows else Content(" " * (self._name_room + 2))
             text = before + Content.assemble(f"{task.direction.value:3} ", (f"{sign} {mark.value:9}", style))
             known = board.figures_of(name, task.direction)
-            rows.append(_filled(text, "" if known is None else f"{known.circularity_um:5.1f}", width))
+            rows.append(_filled(text, None if known is None else known.circularity_um, width))
         return rows
 
     def _test(self, name: str, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int) -> Content:
@@ -170,7 +170,7 @@ class PlateMap(Panel):
             text += Content.styled(*SIGNS[mark])
         figures = [board.figures_of(name, way) for way in self._show.tests[name].directions]
         known = [one.circularity_um for one in figures if one is not None]
-        return _filled(text, f"{max(known):6.1f}" if known else "", width)
+        return _filled(text, max(known) if known else None, width)
 
     def _titled(self, name: str) -> Content:
         chosen = name == self._choice.test
@@ -178,12 +178,11 @@ class PlateMap(Panel):
         return Content.styled(text, "reverse bold" if chosen else "")
 
 
-def _filled(text: Content, figure: str, width: int) -> Content:
-    """Return a cell of the map: the figure with its unit, without it, or not at all, as there is room."""
-    for told in (f"{figure} µm", figure):
-        if figure and len(text.plain) + len(told) < width:
-            text += Content(told)
-            break
+def _filled(text: Content, figure_um: float | None, width: int) -> Content:
+    """Return a cell of the map: with the figure and its unit, without unit, in whole µm, or without it, as there is room."""
+    told = () if figure_um is None else (f"{figure_um:5.1f} µm", f"{figure_um:5.1f}", f" {figure_um:.0f}")
+    fitting = [figure for figure in told if len(text.plain) + len(figure) < width]
+    text += Content(fitting[0] if fitting else "")
     return text + Content(" " * max(width - len(text.plain), 0))
 
 

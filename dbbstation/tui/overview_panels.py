@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from dbbstation.plan.circle import Direction
 from dbbstation.plan.duration import circles_s
 from dbbstation.service.board import Mark, Verdict
 from dbbstation.service.messages import problem_alone
@@ -20,7 +21,6 @@ from dbbstation.tui.run_list import SIGNS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.plan.circle import Direction
     from dbbstation.service.board import Board
     from dbbstation.station.events import RunCompleted
     from dbbstation.station.schedule import Task
@@ -34,6 +34,9 @@ _WORD = 15
 
 _FIGURE = 8
 """Columns of a run's circularity, where there is room."""
+
+_IN_WORDS = 22
+"""Columns of a direction on the map beside the test's name: direction, sign, longest word, circularity."""
 
 _SHORTEST_NAME = 5
 
@@ -95,14 +98,18 @@ class LeftLine(Panel):
 
 
 class PlateMap(Panel):
-    """Bores where they are, under each its tests with a sign per direction and, where there is room, the greatest circularity."""
+    """Bores where they are, under each its tests: a row per direction with sign, word and circularity where there is room for that.
 
-    DEFAULT_CSS = "PlateMap { height: 1fr; padding: 0 1; }"
+    Where there is not, a row per test with a sign for each direction and the greater circularity; the list has the words.
+    """
+
+    DEFAULT_CSS = "PlateMap { height: 1fr; }"
 
     def __init__(self, shown: Shown, choice: Choice, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._show = shown
         self._choice = choice
+        self._name_room = min(max(map(len, shown.tests), default=0), _CELL - 7)
 
     def text(self, board: Board) -> Content:
         """Return the map; balls in no bore stand side by side below it."""
@@ -111,13 +118,15 @@ class PlateMap(Panel):
         xs = sorted({x for x, _ in bores.values()})
         ys = sorted({y for _, y in bores.values()}, reverse=True)
         width = max(self.content_size.width // max(len(xs), 1), _CELL)
-        gap = max((self.content_size.height - _rows_needed(self._show)) // max(len(ys), 1), 0)
+        height = self.content_size.height
+        words = width > self._name_room + _IN_WORDS and height >= _rows_needed(self._show, per_test=len(Direction))
+        gap = max((height - _rows_needed(self._show, per_test=len(Direction) if words else 1)) // max(len(ys), 1), 0)
         # Rows stand no further apart than columns: a cell of the terminal is about twice as high as wide.
         gap = min(gap, width // 2 - 1)
         rows: list[Content] = []
         for y in ys:
             in_row = {x: number for number, (x, at) in bores.items() if at == y}
-            cells = [self._bore(in_row.get(x), board, signs, width) for x in xs]
+            cells = [self._bore(in_row.get(x), board, signs, width, words=words) for x in xs]
             deepest = max(len(cell) for cell in cells)
             empty = Content(" " * width)
             rows += [Content("").join([cell[k] if k < len(cell) else empty for cell in cells]) for k in range(deepest)]
@@ -128,29 +137,53 @@ class PlateMap(Panel):
             rows += [self._test(name, board, signs, width) for name in elsewhere]
         return lines(*rows)
 
-    def _bore(self, number: int | None, board: Board, signs: dict[str, list[Mark]], width: int) -> list[Content]:
+    def _bore(
+        self, number: int | None, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int, *, words: bool
+    ) -> list[Content]:
         if number is None:
             return []
         mine = [name for name, test in self._show.tests.items() if test.ball.bore == number]
         title = texts.BORE.format(number=number)
-        return [
-            Content.styled(f"{title:{width}}", "bold" if mine else "dim"),
-            *(self._test(name, board, signs, width) for name in mine),
-        ]
+        rows = [Content.styled(f" {title:{width - 1}}", "bold" if mine else "dim")]
+        for name in mine:
+            rows += self._directions(name, board, signs, width) if words else [self._test(name, board, signs, width)]
+        return rows
 
-    def _test(self, name: str, board: Board, signs: dict[str, list[Mark]], width: int) -> Content:
-        chosen = name == self._choice.test
-        room = _CELL - 7
-        parts = [
-            Content.styled(f"{'▸' if chosen else ' '}{_cut(name, room):{room}} ", "reverse bold" if chosen else "")
-        ]
-        parts += [Content.styled(*SIGNS[mark]) for mark in signs.get(name, [])]
+    def _directions(
+        self, name: str, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int
+    ) -> list[Content]:
+        """Rows of a test in words, a direction each; what is repeated at the end of the plan stands in the list."""
+        rows: list[Content] = []
+        for task, mark in signs.get(name, []):
+            if task.occurrence > 1:
+                continue
+            sign, style = SIGNS[mark]
+            before = self._titled(name) if not rows else Content(" " * (self._name_room + 2))
+            text = before + Content.assemble(f"{task.direction.value:3} ", (f"{sign} {mark.value:9}", style))
+            known = board.figures_of(name, task.direction)
+            rows.append(_filled(text, None if known is None else known.circularity_um, width))
+        return rows
+
+    def _test(self, name: str, board: Board, signs: dict[str, list[tuple[Task, Mark]]], width: int) -> Content:
+        text = self._titled(name)
+        for _, mark in signs.get(name, []):
+            text += Content.styled(*SIGNS[mark])
         figures = [board.figures_of(name, way) for way in self._show.tests[name].directions]
         known = [one.circularity_um for one in figures if one is not None]
-        if known and width >= _CELL + _FIGURE:
-            parts.append(Content(f"{max(known):6.1f} µm"[: _FIGURE + 1]))
-        text = Content("").join(parts)
-        return text + Content(" " * max(width - len(text.plain), 0))
+        return _filled(text, max(known) if known else None, width)
+
+    def _titled(self, name: str) -> Content:
+        chosen = name == self._choice.test
+        text = f"{'▸' if chosen else ' '}{_cut(name, self._name_room):{self._name_room}} "
+        return Content.styled(text, "reverse bold" if chosen else "")
+
+
+def _filled(text: Content, figure_um: float | None, width: int) -> Content:
+    """Return a cell of the map: with the figure and its unit, without unit, in whole µm, or without it, as there is room."""
+    told = () if figure_um is None else (f"{figure_um:5.1f} µm", f"{figure_um:5.1f}", f" {figure_um:.0f}")
+    fitting = [figure for figure in told if len(text.plain) + len(figure) < width]
+    text += Content(fitting[0] if fitting else "")
+    return text + Content(" " * max(width - len(text.plain), 0))
 
 
 class TestList(Panel):
@@ -241,11 +274,11 @@ def _decided(board: Board, completed: RunCompleted) -> Content:
     return Content(" · ").join(parts)
 
 
-def _signs(board: Board) -> dict[str, list[Mark]]:
-    """Marks of each test's runs, those that are repeated at the end behind the others."""
-    marks: dict[str, list[Mark]] = {}
+def _signs(board: Board) -> dict[str, list[tuple[Task, Mark]]]:
+    """Runs of each test with their marks, those that are repeated at the end behind the others."""
+    marks: dict[str, list[tuple[Task, Mark]]] = {}
     for task, mark in zip(board.tasks, board.marks, strict=True):
-        marks.setdefault(task.test, []).append(mark)
+        marks.setdefault(task.test, []).append((task, mark))
     return marks
 
 
@@ -265,13 +298,15 @@ def _run(board: Board, task: Task, mark: Mark, *, marked: bool, wide: bool) -> C
     return cell + Content(f"{figure:{_FIGURE}}")
 
 
-def _rows_needed(shown: Shown) -> int:
+def _rows_needed(shown: Shown, per_test: int) -> int:
     """Rows of the map without any empty row between bores."""
     ys = {y for _, y in shown.bores.values()}
     deepest = 0
     for y in ys:
         in_row = [number for number, (_, at) in shown.bores.items() if at == y]
-        deepest += 1 + max(sum(test.ball.bore == number for test in shown.tests.values()) for number in in_row)
+        deepest += 1 + per_test * max(
+            sum(test.ball.bore == number for test in shown.tests.values()) for number in in_row
+        )
     return deepest
 
 

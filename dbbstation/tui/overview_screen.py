@@ -54,8 +54,8 @@ class OverviewScreen(BoardScreen):
     DEFAULT_CSS = """
     OverviewScreen {
         #plate-and-tests { height: 1fr; }
-        #plate { width: 55%; min-width: 38; }
-        #tests { width: 1fr; min-width: 40; }
+        #plate { width: 1fr; min-width: 38; }
+        #tests { width: 40%; min-width: 40; }
     }
     """
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _STALE_S = 1.5
 """Without a new reading for so long the last one is shown as old: it must not look live [s]."""
 
-_WITHOUT_BAR = {None, State.BETWEEN, State.ANNOUNCED, State.PAUSED}
+_WITHOUT_BAR = {None, State.BETWEEN, State.ANNOUNCED, State.PAUSED, State.COMPLETE, State.FLAWED, State.FINISHED}
 """States in which no bar need be in its place."""
 
 _BEFORE_RUN = {State.ANNOUNCED, State.ARMED}

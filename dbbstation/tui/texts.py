@@ -79,8 +79,9 @@ HELP = {
         "Overview",
         (
             (
-                "The map shows the plate from above, X to the right and Y up. Under each bore stand its tests with a sign for each "
-                "direction and, where there is room, the greatest circularity. The list has the same signs with a word."
+                "The map shows the plate from above, X to the right and Y up. Under each bore stand its tests: where there is room, a "
+                "row for each direction with sign, word and circularity; else a sign for each direction and the greater circularity. "
+                "The list has signs and words always."
             ),
             (
                 "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict with its "

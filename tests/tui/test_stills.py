@@ -11,12 +11,15 @@ import asyncio
 import html
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from dbbstation.errors import InstrumentError
+from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.quality.finding import Name, found, untold
 from dbbstation.station.commands import Accept
@@ -169,3 +172,17 @@ def test_light_is_light_and_dark_is_dark() -> None:
     assert drawn(dark)[0] == drawn(light)[0]
     assert "#121212" in dark
     assert "#121212" not in light
+
+
+def test_fifteen_tests_stand_on_the_map_with_word_and_figure() -> None:
+    plan = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
+    happening = Happening(plan)
+    happening.circle("a", Direction.CCW).command(Accept())
+    shown = replace(happening.shown(), bores={test.ball.bore: test.ball.centre_mm[:2] for test in plan.tests.values()})
+    text, _ = drawn(asyncio.run(still_svg(shown, happening.events, size=(120, 40), press=("o",))))
+    on_map = "\n".join(row[:72] for row in text.splitlines())
+    assert on_map.count("ccw ·") == 14
+    assert on_map.count("cw  · open") == 14
+    assert re.search(r"a ccw ✓ accepted +24\.0", on_map)
+    assert re.search(r"cw +› next", on_map)
+    assert all(re.search(rf"\b{name} ccw", on_map) for name in plan.tests)

@@ -209,8 +209,8 @@ def test_a_session_is_gone_on_with_where_it_was_left(front: Front) -> None:
         await until(pilot, on(app, MeasureScreen))
         await until(pilot, lambda: app.board.state is State.ANNOUNCED)
         assert app.board.accepted == 1
-        await press(app, "q")
-        await until_start(pilot, app)
+        app.close_down()  # as a polite kill does: not back to the start screen, but to the end
+        await until(pilot, lambda: app._exit)
 
     play(front, first)
     play(front, second)

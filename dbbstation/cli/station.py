@@ -287,7 +287,7 @@ def _stopped_politely(app: StationApp) -> Iterator[threading.Event]:
 
     def stop(_number: int, _frame: FrameType | None) -> None:
         stopped.set()
-        app.leave(sure=True)
+        app.close_down()
 
     numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
     before = {number: signal.signal(number, stop) for number in numbers}

@@ -175,7 +175,7 @@ class Front:
 
         Raises:
             StationError: no such instrument.
-            ValueError: a relative instrument, and the calibrator's length is no number.
+            NoNumberError: a relative instrument, and the calibrator's length is no number.
         """
         protocol = load_instrument(line.instrument, line.profile or None)
         zero_mm = line.zero_mm
@@ -191,7 +191,7 @@ class Front:
             values: texts by the names of `Stated`.
 
         Raises:
-            ValueError: one that should be a number is none.
+            NoNumberError: one that should be a number is none.
         """
         numbers = {name: _number(values, name) for name in ("calibrator_mm", "calibrator_u_um", "temp_c")}
         return Stated(values["serial_number"], values["calibrator"], certified=values["certified"], **numbers)
@@ -272,6 +272,19 @@ class Front:
         self.memory.write(kept.with_session(choice.folder, choice.line))
 
 
+class NoNumberError(ValueError):
+    """A text that should be a number is none.
+
+    Args:
+        name: of the value.
+        text: that was given.
+    """
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name, self.text = name, text
+        super().__init__(f"{name}: `{text}` is no number")
+
+
 def _not_there(folder: Path, name: str, suffix: str = "") -> Path:
     """Return a path of that name that does not exist, with a number where it has to."""
     numbered = (folder / f"{name if k == 1 else f'{name}-{k}'}{suffix}" for k in range(1, 10_000))
@@ -285,5 +298,5 @@ def _number(values: Mapping[str, str], name: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise ValueError(f"{name}: `{text}` is no number")
+        raise NoNumberError(name, text)
     return number

@@ -115,7 +115,7 @@ class StationApp(App[None]):
         self._show = shown or Shown("")
         self._runner = runner
         self._front = front
-        self._leaving = self._opening = False
+        self._leaving = self._opening = self._wholly = False
         self._works: list[tuple[Background[Any], Callable[[Any], None], Callable[[Exception], None]]] = []
         self._after: dict[Path, After] = {}
 
@@ -222,7 +222,7 @@ class StationApp(App[None]):
         """Close what was measured: back to the start screen where there is one."""
         self._leaving = False
         start = self.screen_stack[0] if self.screen_stack else None
-        if self._front is None or self._runner is None or not isinstance(start, StartScreen):
+        if self._wholly or self._front is None or self._runner is None or not isinstance(start, StartScreen):
             self.exit()
             return
         self._front.close()
@@ -329,6 +329,11 @@ class StationApp(App[None]):
             ask_to_give_up(self.drawn, "Quit", self.leave)
         else:
             self.leave(sure=True)
+
+    def close_down(self) -> None:
+        """End the sequence and the screen without a question, whatever screen is on top."""
+        self._wholly = True
+        self.leave(sure=True)
 
     def leave(self, sure: bool | None) -> None:  # noqa: FBT001 - answer of a question
         """End the sequence, if they are sure; the screen closes when it has ended."""

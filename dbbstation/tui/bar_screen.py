@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from textual.content import Content
+from textual.widgets import OptionList
 
 from dbbstation.errors import StationError
+from dbbstation.service.front import NoNumberError
 from dbbstation.tui import texts
 from dbbstation.tui.asking import TypeQuestion
 from dbbstation.tui.row_screen import RowScreen
@@ -16,7 +18,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from textual.binding import BindingType
-    from textual.widgets import OptionList
 
     from dbbstation.service.bar_calibration import BarCalibration
     from dbbstation.service.front import Front
@@ -66,6 +67,9 @@ class BarScreen(RowScreen):
                 if self._values["calibrator_mm"] != had_length:
                     self._reopen()
                 self._show()
+                rows = self.query_one("#rows", OptionList)
+                if self.at + 1 < rows.option_count:
+                    rows.action_cursor_down()
 
         self.app.push_screen(TypeQuestion(texts.BAR_ROWS[name], self._values[name]), answered)
 
@@ -75,8 +79,8 @@ class BarScreen(RowScreen):
             return
         try:
             stated = self._front.stated_bar(self._values)
-        except ValueError as error:
-            self._problem = str(error)
+        except NoNumberError as error:
+            self._problem = texts.BAR_NO_NUMBER.format(row=texts.BAR_ROWS[error.name], text=error.text)
             self.look()
             return
         self._problem = ""
@@ -118,7 +122,9 @@ class BarScreen(RowScreen):
         self._calibration = None
         try:
             self._calibration = self._front.bar_calibration(self._line, self._values)
-        except (ValueError, StationError) as error:
+        except NoNumberError as error:
+            self._problem = texts.BAR_NO_NUMBER.format(row=texts.BAR_ROWS[error.name], text=error.text)
+        except StationError as error:
             self._problem = str(error)
 
     def _live(self) -> str:

@@ -187,11 +187,15 @@ class NewScreen(RowScreen):
                 self._line(port=names[at], baud=self.choice.line.baud)
                 self.action_probe()
             else:
-                self._type(Part.PORT, self.choice.line.port, lambda text: self._line(port=text))
+                self._type(Part.PORT, self.choice.line.port, self._port_typed)
 
         self._ask(
             Part.PORT, labels, names.index(self.choice.line.port) if self.choice.line.port in names else 0, answered
         )
+
+    def _port_typed(self, port: str) -> None:
+        self._line(port=port)
+        self.action_probe()
 
     def _ask(self, part: Part, labels: list[str], at: int, then: Callable[[int | None], None]) -> None:
         self.app.push_screen(ChooseQuestion(texts.CHOOSE_TITLE.format(part=texts.PARTS[part]), labels, at), then)

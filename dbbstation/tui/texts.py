@@ -377,6 +377,7 @@ BAR_ROWS: Mapping[str, str] = {
 }
 BAR_MISSING = "Still missing: {rows}. Enter changes a row."
 BAR_READY = "Put the bar on the calibrator, wait until it is as warm as the shop; then B reads it."
+BAR_NO_NUMBER = "{row}: `{text}` is no number."
 BAR_LIVE = "now {length:.4f} mm, {off:+.1f} µm against the calibrator"
 BAR_NO_BAR = "no length yet: {said}"
 BAR_READS = "Reading: {done} of {of}. Leave the bar alone."

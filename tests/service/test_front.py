@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from dbbstation.errors import InputError, TravelError
-from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.formats.plan import read_inline_plan, read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.duration import circle_s
@@ -19,6 +19,7 @@ from dbbstation.service.candidates import Kind, candidates
 from dbbstation.service.choice import Choice, Part
 from dbbstation.service.front import Front
 from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
+from dbbstation.service.order import Order, ordered
 from dbbstation.service.port_probe import probe
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.work import Progress, Work
@@ -268,3 +269,29 @@ def test_a_failure_ends_the_row_and_says_why(session: Path) -> None:
 def test_virtual_ports_are_offered(front: Front) -> None:
     assert {name for name, _ in front.ports()} >= set(VIRTUAL)
     assert front.probe(Line(instrument="streaming-encoder", port=next(iter(VIRTUAL)))).answers
+
+
+def test_programs_are_written_beside_the_session_and_commanded_by(front: Front) -> None:
+    front.under.mkdir()
+    choice = front.virtual_choice()
+    count, folder = front.write_programs(choice)
+    again, other = front.write_programs(choice)
+    plan = read_plan(PLAN)
+    runs = [(name, way) for name, test in plan.tests.items() for way in test.directions]
+    assert count == again == len(runs)
+    assert (Path(folder).name, Path(other).name) == ("virtual-programs", "virtual-programs-2")
+    prepared = front.prepare(replace(choice, programs=Path(folder)))
+    assert set(prepared.job.programs) == set(runs)
+
+
+def test_the_order_by_holder_puts_each_up_once(tmp_path: Path) -> None:
+    text = PLAN.read_text("utf-8")
+    low = "  - {name: low, ball: 9-short, a_deg: 0, b_deg: 0}\n"
+    file = tmp_path / "plan.yaml"
+    file.write_text(f"{text.rstrip()}\n{low.replace('name: low', 'name: last')}", "utf-8")
+    plan = read_inline_plan(file)
+    assert list(ordered(plan, Order.PLAN).to_domain().tests) == ["low", "side", "high", "last"]
+    by_holder = ordered(plan, Order.HOLDER, gate=True).to_domain()
+    assert list(by_holder.tests) == ["low", "last", "side", "high"]
+    assert by_holder.repeat_at_end == ("low",)
+    assert ordered(plan, Order.PLAN).to_domain().repeat_at_end == ()

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.hang_up import ended_when_hung_up
 from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
 from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
@@ -263,7 +264,7 @@ def _shown(app: StationApp) -> int:
         StationError: the fault that ended the sequence, where nothing was done about it.
         click.Abort: a signal ended it.
     """
-    with _stopped_politely(app) as stopped:
+    with _stopped_politely(app) as stopped, ended_when_hung_up(app.give_up):
         app.run()
     if app.crash is not None:
         raise app.crash

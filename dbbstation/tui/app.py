@@ -335,6 +335,11 @@ class StationApp(App[None]):
         self._wholly = True
         self.leave(sure=True)
 
+    def give_up(self) -> None:
+        """End the sequence from another thread, where the screen is stuck; what was read is on the disk then."""
+        if self._runner is not None:
+            self._runner.close()
+
     def leave(self, sure: bool | None) -> None:  # noqa: FBT001 - answer of a question
         """End the sequence, if they are sure; the screen closes when it has ended."""
         if not sure:

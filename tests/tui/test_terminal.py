@@ -44,6 +44,7 @@ class Terminal:
             start_new_session=True,
         )
         self._slave = slave
+        self._ends: tuple[int, ...] = (self._master, slave)
         self.shown = ""
 
     def until(self, text: str) -> None:
@@ -72,12 +73,20 @@ class Terminal:
             and termios.tcgetattr(self._slave) == self.modes
         )
 
+    def vanish(self, *, signals: bool) -> None:
+        """Go away as a window that is closed: nothing can be written or read; the kernel sends two signals, to a shell perhaps."""
+        for end in self._ends:
+            os.close(end)
+        self._ends = ()
+        for number in (signal.SIGHUP, signal.SIGCONT) if signals else ():
+            self.process.send_signal(number)
+
     def close(self) -> None:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
-        os.close(self._master)
-        os.close(self._slave)
+        for end in self._ends:
+            os.close(end)
 
     def _read(self) -> bool:
         if not select.select([self._master], [], [], 0.1)[0]:
@@ -130,6 +139,20 @@ def test_a_polite_kill_in_mid_circle_keeps_the_recording_and_the_terminal(termin
     (run,) = read_session(tmp_path / "session").runs
     assert run.state is RunState.RECORDING
     assert run.path.stat().st_size > 1000
+
+
+@pytest.mark.parametrize(("begun", "signals"), [(False, True), (True, False)], ids=["waiting", "mid-circle, no signal"])
+def test_a_terminal_that_vanishes_ends_it_and_the_recording_is_kept(
+    terminal: Terminal, tmp_path: Path, *, begun: bool, signals: bool
+) -> None:
+    terminal.until("then press Enter")
+    if begun:
+        terminal.press("\r")
+        terminal.until("touch nothing until it has fed out")
+    terminal.vanish(signals=signals)
+    assert terminal.process.wait(PATIENCE_S) == 1
+    runs = read_session(tmp_path / "session").runs
+    assert [run.state for run in runs] == [RunState.RECORDING] * begun
 
 
 def test_what_is_wrong_with_the_files_is_said_before_the_screen_opens(tmp_path: Path) -> None:

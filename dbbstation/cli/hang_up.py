@@ -1,0 +1,56 @@
+"""A terminal that vanishes: the window was closed, the line to a remote computer broke, its server was killed."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import sys
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from dbbstation.cli import FAILED
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+_LOOK_MS = 500
+_PATIENCE_S = 10.0
+"""The screen has so long to end by itself; it may be stuck in writing to what is no longer there [s]."""
+
+
+@contextmanager
+def ended_when_hung_up(last: Callable[[], None]) -> Iterator[None]:
+    """Watch the terminal, and leave the program when it has gone; does nothing where input is no terminal.
+
+    The screen's own output stops at the first write that fails and then makes the program wait for ever, and the kernel's
+    signal may go to a shell that keeps it.
+
+    Args:
+        last: ends what is being done, called in a thread of its own where the screen does not end by itself.
+    """
+    if not hasattr(select, "poll") or not sys.stdin.isatty():
+        yield
+        return
+    over = threading.Event()
+    threading.Thread(target=_watch, args=(sys.stdin.fileno(), over, last), name="hang-up", daemon=True).start()
+    try:
+        yield
+    finally:
+        over.set()
+
+
+def _watch(terminal: int, over: threading.Event, last: Callable[[], None]) -> None:
+    poll = select.poll()
+    poll.register(terminal, 0)  # a hang-up is told whatever is asked for
+    while not poll.poll(_LOOK_MS):
+        if over.is_set():
+            return
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in (0, 1, 2):
+        os.dup2(nowhere, stream)
+    os.kill(os.getpid(), signal.SIGHUP)
+    if not over.wait(_PATIENCE_S):
+        last()
+        os._exit(FAILED)

@@ -35,7 +35,7 @@ CHECKS = (
     ("types", ["mypy"]),
     ("walls", ["lint-imports"]),
     ("docs", ["sphinx-build", "-q", "-W", "-b", "html", "docs", "docs/_build"]),
-    ("tests", ["pytest", "-q", "-n", "auto"]),
+    ("tests", ["pytest", "-q", "-n", "auto", "--dist", "worksteal"]),
 )
 """What `test` runs, in this order; the first failure stops it."""
 

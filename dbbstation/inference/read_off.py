@@ -326,23 +326,30 @@ class _Judge:
         found = [member.cause.name]
         for cause in rivals:
             same = [v for v in cause.variants if len(v.columns) == size]
-            alike = any(self._same(member.variant.columns, variant.columns, others) for variant in same)
-            if alike and not self._is_decided(member, cause, others):
+            cosine = max((self._cosine(member.variant.columns, v.columns, others) for v in same), default=0.0)
+            if cosine > EQUIVALENT and not self._is_decided(member, cause, others, cosine):
                 found.append(cause.name)
         return tuple(found)
 
-    def _is_decided(self, member: Member, rival: Cause, others: tuple[Member, ...]) -> bool:
-        """Whether the rows decide between a member and a cause in its place: a thousandth of a very large effect is seen, too."""
+    def _is_decided(self, member: Member, rival: Cause, others: tuple[Member, ...], cosine: float) -> bool:
+        """Whether the rows decide between a member and a cause in its place: a thousandth of a very large effect is seen, too.
+
+        They decide nothing by what the formulas themselves may be off by.
+        """
+        laws = self._settled.bank.laws
+        own, other = (laws[n].form_uncertainty if n in laws else 0.0 for n in (member.cause.name, rival.name))
+        if np.sqrt(1.0 - cosine**2) <= np.hypot(own, other):
+            return False
         in_place = self._settled.comparison.scan(others, [rival])
         return self._best.log_factor(member.cause.name) - float(in_place.log_factor.max(initial=-np.inf)) > NEGLIGIBLE
 
-    def _same(self, one: NDArray[np.int64], other: NDArray[np.int64], others: tuple[Member, ...]) -> bool:
-        """Whether two causes of as many amplitudes span the same effects beside base and others."""
+    def _cosine(self, one: NDArray[np.int64], other: NDArray[np.int64], others: tuple[Member, ...]) -> float:
+        """Least cosine between what two causes of as many amplitudes span beside base and others; 1: the same effects."""
         products = self._settled.comparison.beside(others, np.concatenate([one, other]))
         size = len(one)
         a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
         cosines = np.linalg.svd(_inverse_root(a) @ across @ _inverse_root(b), compute_uv=False)
-        return bool(len(cosines) and cosines.min() > EQUIVALENT)
+        return float(min(cosines.min(), 1.0)) if len(cosines) else 0.0
 
 
 NEGLIGIBLE = 30.0

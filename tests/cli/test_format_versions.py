@@ -28,6 +28,7 @@ STORED = {
     "dbb-settings/1": FIXTURES / "settings" / "version-1.yaml",
     "dbb-settings/2": FIXTURES / "settings" / "every-key.yaml",
     "dbb-bar/1": FIXTURES / "bars" / "zerodur.yaml",
+    "dbb-mapping/1": FIXTURES / "mappings" / "every-key.yaml",
     "dbb-session/1": FIXTURES / "sessions" / "under-spindle",
     "dbb-session/2": FIXTURES / "sessions" / "small",
     "dbb-session/3": FIXTURES / "sessions" / "sealed",

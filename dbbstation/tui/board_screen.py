@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from dbbstation.station.commands import Accept, Command, Pause, Reject, Repeat, Resume, Skip, Start
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from textual.binding import BindingType
 
     from dbbstation.service.board import Board
+    from dbbstation.tui.shown import Shown
 
 COMMANDS: dict[str, Command] = {
     "start": Start(),
@@ -72,7 +74,13 @@ class BoardScreen(ExplainedScreen):
 
 
 class RunScreen(BoardScreen):
-    """A screen in front of the machine: its keys send what is told to the run of now."""
+    """A screen in front of the machine: its keys send what is told to the run of now.
+
+    Args:
+        desk: has the board, and takes commands.
+        shown: plan and plate.
+        clock: real time, for telling an old reading [s].
+    """
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("enter", "tell('start')", "Start"),
@@ -84,6 +92,11 @@ class RunScreen(BoardScreen):
         ("p", "tell('pause')", "Pause"),
         ("p", "tell('resume')", "Go on"),
     ]
+
+    def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(desk)
+        self._show = shown
+        self._clock = clock
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Only keys that mean something now stand in the footer and do something."""

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from textual.binding import BindingType
 
     from dbbstation.service.board import Board
-    from dbbstation.tui.board_screen import Desk
-    from dbbstation.tui.shown import Shown
 
 NO_LENGTH = "---.----"
 _WIDEST = "hands off"
@@ -69,22 +67,11 @@ class LargeFigures(Panel):
 
 
 class LargeScreen(RunScreen):
-    """The trace makes room for letters; the keys are those beside the machine.
-
-    Args:
-        desk: has the board, and takes commands.
-        shown: plan and plate.
-        clock: real time, for telling an old reading [s].
-    """
+    """The trace makes room for letters; the keys are those beside the machine."""
 
     help_name = "large"
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape", "app.large", "Back")]
-
-    def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
-        super().__init__(desk)
-        self._show = shown
-        self._clock = clock
 
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""

@@ -65,9 +65,7 @@ class MeasureScreen(RunScreen):
     """
 
     def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
-        super().__init__(desk)
-        self._clock = clock
-        self._show = shown
+        super().__init__(desk, shown, clock=clock)
         self._view = View.MEASURED
 
     def compose(self) -> ComposeResult:

@@ -10,6 +10,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 
 from dbbstation.cli import DONE, FAILED, USAGE
 from dbbstation.files.recordings.session import read_session
@@ -120,7 +121,6 @@ def test_rows_say_angle_and_deviation_as_the_circle_has_them(run, tmp_path):
 
 
 def test_parquet_has_the_same_values_with_meaning_and_origin(run, tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
     done = run("export", SEALED, "--out", tmp_path / "t.parquet", "--json")
     assert done.code == DONE, done.err
     assert run("export", SEALED, "--out", tmp_path / "t.csv").code == DONE

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 from textual.app import App, SystemCommand
 from textual.binding import Binding
+from textual.events import InputEvent, Paste
 from textual.screen import ModalScreen
 
 from dbbstation.errors import StationError
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from textual.binding import BindingType
+    from textual.events import Event as ScreenEvent
     from textual.screen import Screen
 
     from dbbstation.service.board import SequenceOpened
@@ -130,6 +132,11 @@ class StationApp(App[None]):
         if self._runner is not None:
             self._runner.start()
         self.set_interval(LOOK_S, self.look)
+
+    async def on_event(self, event: ScreenEvent) -> None:
+        """Take what is pressed, as long as there is a screen: Textual asks the screen on top without looking for one."""
+        if self.screen_stack or not isinstance(event, InputEvent | Paste):
+            await super().on_event(event)
 
     def on_unmount(self) -> None:
         """Whatever closed the screen, the sequence and all work end in order."""

@@ -14,6 +14,7 @@ from dbbstation.station.events import Event, RunStarted
 from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
+from dbbstation.station.states import State
 from dbbstation.tui.shown import Shown
 
 BORES = {1: (0.0, 100.0), 2: (-100.0, 100.0), 3: (-100.0, 0.0), 9: (0.0, 0.0), 7: (100.0, 0.0), 5: (0.0, -100.0)}
@@ -90,6 +91,15 @@ class Happening:
     def _next_repeat(self, test: str, direction: Direction) -> int:
         started = [event.run for event in self.events if isinstance(event, RunStarted)]
         return 1 + sum((run.test, run.direction) == (test, direction) for run in started)
+
+    def states(self) -> list[State]:
+        """The board's state after each event."""
+        board = Board()
+        states = []
+        for event in self.events:
+            board.take(event)
+            states.append(board.state)
+        return states
 
     def board(self) -> Board:
         board = Board()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from textual.events import Key
 
 from dbbstation.plan.circle import Direction
 from dbbstation.station.commands import Accept, GoTo, Judge, Quit, Repeat, Skip
@@ -15,6 +16,7 @@ from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.overview_panels import ChosenRun
 from dbbstation.tui.overview_screen import OverviewScreen
+from dbbstation.tui.question import GiveUpQuestion
 from dbbstation.tui.reason_question import ReasonQuestion
 from dbbstation.tui.texts import HELP
 from dbbstation.tui.trace_view import TraceView
@@ -101,6 +103,10 @@ class Waits:
         """Note the command."""
         self.sent.append(command)
         return True
+
+    def post(self, events: list[Event | SequenceOpened]) -> None:
+        """Say what happened next."""
+        self._mail += events
 
     def mail(self) -> list[Event | SequenceOpened]:
         """Return what has not been taken."""
@@ -219,6 +225,45 @@ def test_a_reason_is_typed_and_an_empty_one_is_none() -> None:
     (judged,) = played(happening, play).sent
     assert isinstance(judged, Judge)
     assert (judged.reason, judged.accepted) == ("a chip", False)
+
+
+def test_a_question_goes_with_the_circle_that_it_is_about() -> None:
+    happening = complete()
+    turning_at = happening.states().index(State.TURNING) + 1
+    runner = Waits(happening.events[:turning_at])
+    app = StationApp(happening.shown(), runner, clock=lambda: 0.0)
+
+    async def run() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            app.look()
+            await pilot.press("q")
+            assert isinstance(app.screen, GiveUpQuestion)
+            runner.post(happening.events[turning_at:])
+            app.look()
+            await pilot.pause()
+            assert app.board.state is State.COMPLETE
+            assert len(app.screen_stack) == 1
+            await pilot.press("v")
+            assert "centred" in app.screen.query_one(TraceView)._caption()
+
+    asyncio.run(run())
+    assert runner.sent == []
+
+
+def test_a_key_that_comes_while_the_screens_close_is_harmless() -> None:
+    runner = Waits(announced().events)
+    app = StationApp(announced().shown(), runner, clock=lambda: 0.0)
+
+    async def run() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            app.look()
+            await pilot.pause()
+            taken_down = list(app._screen_stack)
+            app._screen_stack.clear()
+            await app.on_event(Key("v", "v"))
+            app._screen_stack.extend(taken_down)
+
+    asyncio.run(run())
 
 
 def twice() -> Happening:

@@ -273,7 +273,6 @@ def test_a_closed_line_and_a_port_that_is_not_there(short_plan: InlinePlan, tmp_
 def test_closing_while_the_line_is_being_opened_ends_in_order(short_plan: InlinePlan, tmp_path: Path) -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         await press(app, "q")
-        # A key that comes while Textual takes its screens down is an error of Textual's.
         await until(pilot, lambda: app._exit)
 
     with switched_on(short_plan, tmp_path / "session") as bench:
@@ -329,24 +328,6 @@ def test_repeat_and_reject_in_mid_circle_ask_first_one_question_at_a_time(
     with switched_on(slow_plan, tmp_path / "session") as bench:
         bench.press_all(play)
         assert bench.states() == [("low-ccw-1", RunState.REJECTED)]
-
-
-def test_a_question_goes_with_the_circle_that_it_is_about(short_plan: InlinePlan, tmp_path: Path) -> None:
-    async def play(pilot: Pilot[None], app: StationApp) -> None:
-        board = app.board
-        await until(pilot, lambda: board.state is State.ANNOUNCED)
-        await press(app, "enter")
-        await until(pilot, lambda: board.state is State.TURNING)
-        await press(app, "q")
-        await until(pilot, lambda: board.state in {State.COMPLETE, State.FLAWED})
-        await until(pilot, lambda: len(app.screen_stack) == 1)
-        await until(pilot, lambda: board.state is State.FLAWED or len(board.views) > 1)
-        await press(app, "v")
-        if board.state is State.COMPLETE:
-            await until(pilot, lambda: "centred" in app.query_one(TraceView)._caption())
-
-    with switched_on(short_plan, tmp_path / "session") as bench:
-        bench.press_all(play)
 
 
 def test_nothing_is_waited_for_in_a_pause(short_plan: InlinePlan, tmp_path: Path) -> None:

@@ -169,7 +169,6 @@ def test_from_the_start_screen_to_the_path_of_the_report(front: Front) -> None:
         assert "session" in rows(app)[0]
         assert "complete" in rows(app)[0]
         await press(app, "q")
-        # A key that comes while Textual takes its screens down is an error of Textual's.
         await until(pilot, lambda: app._exit)
 
     play(front, keys)

@@ -1,4 +1,4 @@
-"""Compiled loops over poses: strut lengths, forward kinematics, bar sensitivities.
+"""Compiled loops over poses: forward kinematics and bar sensitivities.
 
 Only arrays go in and out; `kinematics.py` is what the rest of the program calls. Every kernel works on the poses
 `start` to `stop`. Joints have the shape (m, 6, 3), balls (m, 3), with m = 1 (the same for every pose) or m = n (one
@@ -268,53 +268,6 @@ def _move(t: NDArray[np.float64], r: NDArray[np.float64], step: NDArray[np.float
             r[0, k, lane] = m00 * x + m01 * y + m02 * z
             r[1, k, lane] = m10 * x + m11 * y + m12 * z
             r[2, k, lane] = m20 * x + m21 * y + m22 * z
-
-
-@compiled
-def strut_lengths(
-    start: int,
-    stop: int,
-    position: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    base: NDArray[np.float64],
-    platform: NDArray[np.float64],
-    lengths: NDArray[np.float64],
-) -> None:
-    """Strut lengths, shape (n, 6) [mm], at positions (n, 3) and rotations (n, 3, 3) [CAL eq 1]."""
-    t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
-    length = np.empty((6, LANES))
-    for first in range(start, stop, LANES):
-        _gather_machine(start, first, stop, position, rotation, base, platform, t, r, q, p)
-        _lengths(t, r, q, p, length)
-        for n in range(first, min(first + LANES, stop)):
-            for i in range(6):
-                lengths[n, i] = length[i, n - first]
-
-
-@compiled
-def strut_vectors(
-    start: int,
-    stop: int,
-    position: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    base: NDArray[np.float64],
-    platform: NDArray[np.float64],
-    lengths: NDArray[np.float64],
-    units: NDArray[np.float64],
-    arms: NDArray[np.float64],
-) -> None:
-    """Strut lengths (n, 6), unit vectors from base to platform and arms R P, both (n, 6, 3) [mm] [CAL eq 1]."""
-    t, r, q, p = np.empty((3, LANES)), np.empty((3, 3, LANES)), np.empty((6, 3, LANES)), np.empty((6, 3, LANES))
-    length, arm, jacobian = np.empty((6, LANES)), np.empty((6, 3, LANES)), np.empty((6, 6, LANES))
-    for first in range(start, stop, LANES):
-        _gather_machine(start, first, stop, position, rotation, base, platform, t, r, q, p)
-        _struts(t, r, q, p, length, arm, jacobian)
-        for n in range(first, min(first + LANES, stop)):
-            for i in range(6):
-                lengths[n, i] = length[i, n - first]
-                for k in range(3):
-                    units[n, i, k] = jacobian[i, k, n - first]
-                    arms[n, i, k] = arm[i, k, n - first]
 
 
 @compiled

@@ -42,39 +42,23 @@ class Struts:
 
 
 def inverse(hexapod: Hexapod, frames: Frames) -> Struts:
-    """Strut lengths and directions at the poses `frames` [CAL eq 1]."""
-    count = len(frames)
-    struts = Struts(np.empty((count, STRUTS)), np.empty((count, STRUTS, 3)), np.empty((count, STRUTS, 3)))
-    base, platform = _joints(hexapod, count)
+    """Strut lengths and directions at the poses `frames` [CAL eq 1].
 
-    def block(start: int, stop: int) -> None:
-        kernels.strut_vectors(
-            start,
-            stop,
-            frames.position_mm,
-            frames.rotation,
-            base,
-            platform,
-            struts.length_mm,
-            struts.unit,
-            struts.arm_mm,
-        )
-
-    in_blocks(block, count)
-    return struts
+    Raises:
+        ValueError: joints that move do not fit the number of poses.
+    """
+    span, arm = _spans(hexapod, frames)
+    length = _lengths(span)
+    return Struts(length, span / length[..., np.newaxis], arm)
 
 
 def strut_lengths(hexapod: Hexapod, frames: Frames) -> NDArray[np.float64]:
-    """Strut lengths alone at the poses `frames`, shape (n, 6) [mm] [CAL eq 1]."""
-    count = len(frames)
-    lengths = np.empty((count, STRUTS))
-    base, platform = _joints(hexapod, count)
+    """Strut lengths alone at the poses `frames`, shape (n, 6) [mm] [CAL eq 1].
 
-    def block(start: int, stop: int) -> None:
-        kernels.strut_lengths(start, stop, frames.position_mm, frames.rotation, base, platform, lengths)
-
-    in_blocks(block, count)
-    return lengths
+    Raises:
+        ValueError: joints that move do not fit the number of poses.
+    """
+    return _lengths(_spans(hexapod, frames)[0])
 
 
 def forward(hexapod: Hexapod, length_mm: NDArray[np.float64], near: Frames) -> Frames:
@@ -247,6 +231,20 @@ def position_responses(hexapod: Hexapod, frames: Frames) -> tuple[Response, Resp
         return Response(np.hstack([gain, per_base]), along, frames.rotation)
 
     return response(0), response(1), response(2)
+
+
+def _spans(hexapod: Hexapod, frames: Frames) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """T + R P - Q and R P, both (n, 6, 3) [mm]: from base joint and from tool tip to platform joint.
+
+    NumPy does here: compiled, it would be three times as fast, and half a second later for what starts the compiler.
+    """
+    base, platform = _joints(hexapod, len(frames))
+    arm = platform @ np.swapaxes(frames.rotation, 1, 2)
+    return frames.position_mm[:, np.newaxis, :] + arm - base, arm
+
+
+def _lengths(span: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.sqrt(np.einsum("nik,nik->ni", span, span))
 
 
 def _joints(hexapod: Hexapod, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

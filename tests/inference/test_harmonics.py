@@ -25,7 +25,7 @@ def about_even(count, seed):
 def test_coefficients_are_the_sums(count, highest):
     phase, values = about_even(count, 1)
     direct = written_out(phase, highest)
-    assert basis(phase, highest) == pytest.approx(direct, abs=1e-12)
+    assert np.abs(basis(phase, highest) - direct).max() < 1e-12  # millions of numbers: pytest.approx takes seconds
     assert coefficients(values, phase, highest) == pytest.approx(direct.T @ values / np.sqrt(count), abs=1e-11)
 
 

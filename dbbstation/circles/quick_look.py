@@ -27,8 +27,8 @@ SECTORS = 2880
 """Means of an eighth of a degree stand for the samples of a longer recording: the shortest shape here, a cyclic error of 40
 periods over the diameter, loses 0.3 % of its amplitude."""
 
-SPIKES_DEG = (1.5, 3.0, 6.0, 12.0)
-"""Lengths of reversal spikes that are tried; that of the least residual is taken for all four [deg]."""
+SPIKES_DEG = (1.5, 2.1, 3.0, 4.2, 6.0, 8.5, 12.0)
+"""Lengths that reversal spikes may have, the same at all four ends; figures are means over them [deg]."""
 
 FREE = 10
 """Undulations per revolution, from 3, that the turn may have in both senses alike without being a signature: the form that any
@@ -131,18 +131,19 @@ def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
     if min(len(one.raw) for one in turns) < FEWEST:
         return None
     cut = [_turn(one) for one in turns]
-    fit = min((_fitted(cut, spike_deg) for spike_deg in SPIKES_DEG), key=lambda one: float(np.sum(one.left_um**2)))
+    fit = _best(_fits(cut))
     waves = {axis: _cyclic(cut, fit, axis) for axis in ("X", "Y")}
     strongest, other = sorted(waves, key=lambda axis: waves[axis].gained, reverse=True)
     shown = [waves[strongest].columns] if waves[strongest].symptom.seen else []
     if shown:
         fit = _fitted(cut, fit.spike_deg, shown)
         waves[other] = _cyclic(cut, fit, other)
-        if waves[other].symptom.seen:
-            fit = _fitted(cut, fit.spike_deg, [*shown, waves[other].columns])
+        shown += [waves[other].columns] if waves[other].symptom.seen else []
+    fits = _fits(cut, shown)
+    fit = _best(fits)
     sigma_um = _sigma_um(cut, fit)
     return QuickLook(
-        symptoms=(*_symptoms(fit, sigma_um, both=len(turns) > 1), *(waves[axis].symptom for axis in sorted(waves))),
+        symptoms=(*_symptoms(fits, sigma_um, both=len(turns) > 1), *(waves[axis].symptom for axis in sorted(waves))),
         form_rms_um=_rms(np.concatenate([turn.deviation_um for turn in cut])),
         left_rms_um=_rms(fit.left_um),
         spike_deg=fit.spike_deg,
@@ -160,6 +161,34 @@ def _turn(one: CircleAnalysis) -> _Turn:
         deviation = means(deviation, sector)
     inside = np.abs(np.mod(theta_deg + 45.0, 90.0) - 45.0) > AT_END_DEG
     return _Turn(one, theta_deg[inside], deviation[inside])
+
+
+def _fits(turns: Sequence[_Turn], waves: Sequence[NDArray[np.float64]] = ()) -> list[_Fit]:
+    """Return a fit with spikes of each length."""
+    return [_fitted(turns, spike_deg, waves) for spike_deg in SPIKES_DEG]
+
+
+def _best(fits: Sequence[_Fit]) -> _Fit:
+    return min(fits, key=lambda one: float(one.left_um @ one.left_um))
+
+
+def _over_lengths(fits: Sequence[_Fit], sigma_um: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return values and standard uncertainties where nobody knows how long the spikes are, shapes (k,).
+
+    Each length counts by its marginal likelihood, all alike beforehand and every height too: exp(-squares / 2 s²) times the root of
+    the determinant of the covariance. The mean over lengths has the variance of each and that between them [law of total
+    variance; Hoeting et al., Stat. Sci. 14 (1999), eqs 2, 3]. The one length that leaves least, taken as if it had been known,
+    would fit its spikes to the noise.
+    """
+    squares = np.array([one.left_um @ one.left_um for one in fits]) / sigma_um**2
+    spread = np.array([np.linalg.slogdet(one.unit_covariance)[1] for one in fits])
+    log_weight = 0.5 * (spread - squares)
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    values = np.array([one.value for one in fits])
+    variances = sigma_um**2 * np.array([np.diag(one.unit_covariance) for one in fits])
+    mean = weight @ values
+    return mean, np.sqrt(weight @ (variances + (values - mean) ** 2))
 
 
 def _fitted(turns: Sequence[_Turn], spike_deg: float, waves: Sequence[NDArray[np.float64]] = ()) -> _Fit:
@@ -205,11 +234,12 @@ def _sigma_um(turns: Sequence[_Turn], fit: _Fit) -> float:
     return float(np.sqrt(max(found.noise**2, rounding, LEAST_UM**2) + found.rms**2 * max(per_undulation, 1.0)))
 
 
-def _symptoms(fit: _Fit, sigma_um: float, *, both: bool) -> list[Symptom]:
-    u = sigma_um * np.sqrt(np.diag(fit.unit_covariance))
+def _symptoms(fits: Sequence[_Fit], sigma_um: float, *, both: bool) -> list[Symptom]:
+    fit = _best(fits)
+    values, u = _over_lengths(fits, sigma_um)
     found = [
         Symptom(shape.signature, shape.place, float(value), float(each), shape.unit, bool(abs(value) > SEEN * each))
-        for shape, value, each in zip(fit.shapes, fit.value, u, strict=True)
+        for shape, value, each in zip(fit.shapes, values, u, strict=True)
     ]
     if both:
         return [_told(one, fit) for one in found]

@@ -23,7 +23,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
 
     Args:
         session: the session.
-        circles: its runs that are shown: their dates and temperatures count.
+        circles: its runs that are shown, of which dates and temperatures are given.
         job: what it was measured for, as typed.
     """
     compensated = sum(1 for run in session.in_state(RunState.ACCEPTED) if run.program is not None)

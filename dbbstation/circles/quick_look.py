@@ -83,7 +83,7 @@ class QuickLook:
         symptoms: all of them.
         form_rms_um: of the deviations from the least-squares circles [µm].
         left_rms_um: of what the signatures leave of them, noise included [µm].
-        spike_deg: length of the spikes [deg].
+        spike_deg: most likely length of the spikes [deg].
         sigma_um: standard deviation of a sample, as these figures feel what is left [µm].
     """
 
@@ -252,7 +252,7 @@ def _symptoms(fits: Sequence[_Fit], sigma_um: float, *, both: bool) -> list[Symp
 
 
 def _told(one: Symptom, fit: _Fit) -> Symptom:
-    return replace(one, text=f"over {fit.spike_deg:g}°") if one.signature is Signature.SPIKE else one
+    return replace(one, text=f"most likely over {fit.spike_deg:g}°") if one.signature is Signature.SPIKE else one
 
 
 @dataclass(frozen=True, eq=False)

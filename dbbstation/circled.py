@@ -96,7 +96,7 @@ def load_circles(
 ) -> Circled:
     """Read sessions and work out the figures of their accepted runs.
 
-    Findings are made beside all accepted runs of a session, also of tests that are left out: these say what is usual.
+    Findings are made beside all accepted runs of a session, also of tests that are left out: they show what is usual.
 
     Args:
         paths: session folders or session files.
@@ -105,7 +105,7 @@ def load_circles(
         exclude: names of tests to leave out.
         findings: whether to judge the runs.
         model: where circles are expected; None: by the nominal machine.
-        progress: told how many of how many runs of a session are done.
+        progress: called with how many of how many runs of a session are done.
 
     Raises:
         InputError: every fault of every file; no accepted run; a test that is named and that no session has.

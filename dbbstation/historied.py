@@ -35,7 +35,7 @@ class Historied:
     Attributes:
         machines: one for each machine.
         left_out: sessions and models that could not be read, by name, with the reason.
-        notes: what else is to be said.
+        notes: remarks on sessions.
         worked_out: sessions and models that were read now; the others came from the index.
     """
 
@@ -65,7 +65,7 @@ def load_history(
         source_files: with error sources of models.
         rebuild: read everything anew.
         now: the time; None: the clock's.
-        progress: told how many of how many files are done.
+        progress: called with how many of how many files are done.
 
     Raises:
         InputError: there is no session in it, or none that can be used; a test that none of them has.
@@ -274,33 +274,33 @@ def model_from(data: dict[str, Any], name: str) -> ModelFigures:
 
 
 MOST_NAMED = 3
-"""Sessions that are named where many have the same to be said of them."""
+"""Sessions that are named where many have the same remark."""
 
 
 def _gathered(sessions: Sequence[SessionFigures]) -> list[str]:
-    """Return what is to be said of sessions, what many have in common once."""
+    """Return remarks on sessions, each once."""
     by_text: dict[str, list[str]] = {}
     for one in sessions:
         for note in one.notes:
             by_text.setdefault(note, []).append(one.name)
-    said = []
+    notes = []
     for note, names in by_text.items():
         more = len(names) - MOST_NAMED
-        said.append(f"{', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}: {note}")
-    return said
+        notes.append(f"{', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}: {note}")
+    return notes
 
 
 def _once(sessions: Iterable[SessionFigures]) -> tuple[list[SessionFigures], list[str]]:
-    """Return each session once, and what is said of its copies."""
+    """Return each session once, and remarks on its copies."""
     first: dict[str, SessionFigures] = {}
-    said = []
+    notes = []
     for one in sessions:
         before = first.setdefault(one.sha256, one)
         if before is not one:
-            said.append(
+            notes.append(
                 f"{one.name} is a copy of {before.name}, by the SHA-256 of its session file: it is counted once"
             )
-    return list(first.values()), said
+    return list(first.values()), notes
 
 
 def _check_tests(folder: Path, sessions: Sequence[SessionFigures], asked: Asked) -> None:
@@ -314,20 +314,20 @@ def _check_tests(folder: Path, sessions: Sequence[SessionFigures], asked: Asked)
 def _of_one_session(
     models: Sequence[ModelFigures], sessions: Sequence[SessionFigures]
 ) -> tuple[dict[str, ModelFigures], list[str]]:
-    """Return the model of each session by the session's hash, and what is said of models that are none's."""
+    """Return the model of each session by the session's hash, and remarks on models of no session."""
     known = {one.sha256: one.name for one in sessions}
     taken: dict[str, ModelFigures] = {}
-    said = []
+    notes = []
     for model in sorted(models, key=lambda one: (-len(one.parameters), one.file)):
         if len(model.sessions) != 1:
-            said.append(
+            notes.append(
                 f"{model.file} comes from {len(model.sessions)} sessions together: it is no value of one of them"
             )
             continue
         ((name, digest),) = model.sessions.items()
         if digest not in known:
-            said.append(f"{model.file} comes from a session {name} that is not here, or was changed since")
+            notes.append(f"{model.file} comes from a session {name} that is not here, or was changed since")
         elif taken.setdefault(digest, model) is not model:
             other = taken[digest].file
-            said.append(f"{model.file} and {other} are of one session, {known[digest]}: {other} is taken")
-    return taken, said
+            notes.append(f"{model.file} and {other} are of one session, {known[digest]}: {other} is taken")
+    return taken, notes

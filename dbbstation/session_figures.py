@@ -16,7 +16,7 @@ from dbbstation.circles.path import Filter
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.inputs import input_book
 from dbbstation.files.own_sources import every_source
-from dbbstation.history.order import told
+from dbbstation.history.order import moment_words
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.sources.contract import Owner
@@ -107,15 +107,15 @@ def _in_words(circle: Circle) -> str:
 
 def _programs(runs: Iterable[RunEntry]) -> str:
     """Return a hash over what was commanded instead of the plan's circles: models of the programs, or themselves."""
-    said = sorted({run.program.model_sha256 or run.program.sha256 for run in runs if run.program is not None})
-    return hashlib.sha256("\n".join(said).encode()).hexdigest()[:16] if said else ""
+    found = sorted({run.program.model_sha256 or run.program.sha256 for run in runs if run.program is not None})
+    return hashlib.sha256("\n".join(found).encode()).hexdigest()[:16] if found else ""
 
 
 def _clock(runs: Sequence[RunEntry]) -> list[str]:
     """Say where a run started before the one that is listed before it."""
     dated = [run for run in runs if run.started is not None]
     return [
-        f"run {after.label} is dated {told(after.started)}, before run {before.label} that was started earlier: was the "
+        f"run {after.label} is dated {moment_words(after.started)}, before run {before.label} that was started earlier: was the "
         "clock set while it was measured?"
         for before, after in pairwise(dated)
         if before.started is not None and after.started is not None and after.started < before.started
@@ -124,16 +124,16 @@ def _clock(runs: Sequence[RunEntry]) -> list[str]:
 
 def _lacks(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[str]:
     """Say what a session has not, where its figures mean less for it."""
-    said = []
+    found = []
     directions = Counter(str(one.entry.direction) for one in circles)
     if len(directions) == 1:
-        said.append(f"all its runs are {next(iter(directions))}")
+        found.append(f"all its runs are {next(iter(directions))}")
     warm = any(one.analysis is not None and one.analysis.raw.temperature_degc for one in circles)
     if session.ambient_temp_c is None and not warm:
-        said.append("no temperature is noted: U lacks what the bar has grown by")
+        found.append("no temperature is noted: U lacks what the bar has grown by")
     if not session.serial_number:
-        said.append(f"no serial number is noted: it counts for a machine called {session.machine.name}")
-    return said
+        found.append(f"no serial number is noted: it counts for a machine called {session.machine.name}")
+    return found
 
 
 def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures:

@@ -55,7 +55,7 @@ class Held:
         conformity: exceeded where one circle exceeds it, else undecided where one is; None where it holds for none.
         worst: the circle with the largest figure; None where it holds for none.
         exceeded: how many circles exceed it.
-        undecided: of how many nothing can be told.
+        undecided: how many lie within U of the limit.
         circles: how many it holds for.
     """
 
@@ -111,14 +111,14 @@ def held_against(
 
 def _held(tolerance: Tolerance, circles: Sequence[ToleratedCircle], coverage_factor: float) -> Held:
     of = [one for one in circles if tolerance.holds_for(one.test, one.direction)]
-    said = [conformity(one.sizes[tolerance.figure], tolerance.largest_um, coverage_factor) for one in of]
+    verdicts = [conformity(one.sizes[tolerance.figure], tolerance.largest_um, coverage_factor) for one in of]
     worst = max(of, key=lambda one: one.sizes[tolerance.figure].um, default=None)
     order = (Conformity.EXCEEDED, Conformity.UNDECIDED, Conformity.WITHIN)
     return Held(
         tolerance=tolerance,
-        conformity=next((each for each in order if each in said), None),
+        conformity=next((each for each in order if each in verdicts), None),
         worst=worst,
-        exceeded=said.count(Conformity.EXCEEDED),
-        undecided=said.count(Conformity.UNDECIDED),
+        exceeded=verdicts.count(Conformity.EXCEEDED),
+        undecided=verdicts.count(Conformity.UNDECIDED),
         circles=len(of),
     )

@@ -60,7 +60,7 @@ class CircleAnalysis:
         f_commanded: F about the commanded centre.
         steps: at the reversals of X and Y that can be seen.
         harmonics: 2 to 10 undulations per revolution.
-        closure: end of the turn less its beginning; None where too few samples stand there.
+        closure: end of the turn less its beginning; None where too few samples lie there.
         passes: of the overlap; None where there is none.
         feed_mm_min: feed that the overlap shows and its standard uncertainty [mm/min]; None where it shows none.
         noise: of the readings.
@@ -130,7 +130,7 @@ def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter =
 
 
 def _without_drift(raw: RawCircle, residual_um: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Deviations of a turn whose end meets its beginning: a step there would stand in every line of the spectrum."""
+    """Deviations of a turn whose end meets its beginning: a step there would raise every line of the spectrum."""
     apart = closure_of(raw, residual_um, 0.0)
     return residual_um if apart is None else residual_um - apart.height_um * raw.phi_deg / FULL_TURN_DEG
 

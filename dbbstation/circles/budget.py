@@ -41,7 +41,7 @@ class Cause(StrEnum):
     ANGLE = "where the turn begins"
     BAR = "calibrated length of the bar"
     TEMPERATURE = "temperature of the bar"
-    MOUNTING = "where the ball stands"
+    MOUNTING = "place of the ball"
 
 
 NOT_STATED = (
@@ -180,7 +180,7 @@ def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, along: float) -> _
         draft.missing.append(Cause.TEMPERATURE.value)
     else:
         expansion, calibrated, measured = (float(value) for value in stated if value is not None)
-        # Nothing is added to readings: what the bar grew is left in them, and the whole of it may be.
+        # Nothing is added to readings: they hold what the bar grew, perhaps all of it.
         draft.terms[Cause.TEMPERATURE] = along * abs(expansion * (measured - calibrated)) * one.raw.circle.bar_mm / 1e3
     if one.raw.circle.elevation_deg:
         draft.missing.append("height of the tool tip above the ball")

@@ -29,8 +29,8 @@ class CircleNoise:
     """Noise of one circle.
 
     Attributes:
-        slow_um: standard deviation of white noise that slow figures feel as they feel this one, per sample [µm]; NaN where
-            there are too few samples to tell.
+        slow_um: standard deviation of white noise, per sample, that would give slow figures the same uncertainty [µm]; NaN where
+            there are too few samples.
         reading_um: standard deviation of single readings [µm].
         reading_freedom: degrees of freedom of that.
         resolution_um: step in which the readings come [µm]; zero where none shows.
@@ -45,7 +45,7 @@ class CircleNoise:
 
     @property
     def known(self) -> bool:
-        """Whether there were samples enough to tell noise from form."""
+        """Whether there were samples enough to separate noise from form."""
         return bool(np.isfinite(self.slow_um))
 
     @property
@@ -60,7 +60,7 @@ def noise_of(
     """Return the noise of a circle.
 
     The spectrum above 30 undulations per revolution, a floor and a first-order process, is continued below: readings resemble
-    their neighbours, and slow figures then feel more noise than single readings have (`dbbstation.inference.harmonics`).
+    their neighbours, and slow figures then have more noise than single readings would give them (`dbbstation.inference.harmonics`).
 
     Args:
         deviation_um: radial deviations from the circle in time order, what drifted over the turn taken off, shape (n,) [µm].

@@ -29,7 +29,7 @@ class Filter(IntEnum):
 
     @property
     def words(self) -> str:
-        """As it stands beside a figure."""
+        """As it is written beside a figure."""
         return f"Gaussian, {self.value} UPR" if self else "none"
 
 
@@ -82,7 +82,7 @@ def path_of(raw: RawCircle, chosen: Filter = Filter.NONE) -> CirclePath:
 def both(one: CirclePath, other: CirclePath) -> CirclePath:
     """Return two paths of one circle as one, with the least-squares circle of both.
 
-    Both stand at their angles about the ball already; they count alike, however many points each has.
+    Both are given at their angles about the ball already; they count alike, however many points each has.
 
     Raises:
         TraceError: the points do not determine a circle.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis
 
 SECTORS = 2880
-"""Means of an eighth of a degree stand for the samples of a longer recording: the shortest shape here, a cyclic error of 40
+"""Means over an eighth of a degree replace the samples of a longer recording: the shortest shape here, a cyclic error of 40
 periods over the diameter, loses 0.3 % of its amplitude."""
 
 SPIKES_DEG = (1.5, 2.1, 3.0, 4.2, 6.0, 8.5, 12.0)
@@ -32,14 +32,14 @@ SPIKES_DEG = (1.5, 2.1, 3.0, 4.2, 6.0, 8.5, 12.0)
 
 FREE = 10
 """Undulations per revolution, from 3, that the turn may have in both senses alike without being a signature: the form that any
-machine has. It is fitted beside them and not reported. Below, a signature would have to stand for it."""
+machine has. It is fitted beside them and not reported. Without it a signature would be fitted to it."""
 
 PERIODS = np.arange(6.0, 40.01, 0.25)
-"""Periods of a cyclic error over the diameter that are tried. Fewer cannot be told from that form, a quarter of a period is the
+"""Periods of a cyclic error over the diameter that are tried. Fewer cannot be separated from that form. A quarter of a period is the
 width of a peak of that scan."""
 
 AT_END_DEG = 0.3
-"""Stretch either side of an end of an axis that does not count: on which side of a step a sample stands is not known better
+"""Stretch either side of an end of an axis that does not count: on which side of a step a sample lies is known no better
 than the start of the turn and the place of the ball [deg]."""
 
 SEEN = 4.0
@@ -59,11 +59,11 @@ class Symptom:
     Attributes:
         signature: which.
         place: end or axis; empty where it belongs to both axes.
-        value: its size; None where it cannot be told.
+        value: its size; None where it cannot be determined.
         u: standard uncertainty of that; None likewise.
         unit: of both.
-        seen: whether it stands out of its uncertainty.
-        text: what else is to be said, such as the period of a cyclic error.
+        seen: whether it is larger than four times its uncertainty.
+        text: further information, such as the period of a cyclic error.
     """
 
     signature: Signature
@@ -84,7 +84,7 @@ class QuickLook:
         form_rms_um: of the deviations from the least-squares circles [µm].
         left_rms_um: of what the signatures leave of them, noise included [µm].
         spike_deg: most likely length of the spikes [deg].
-        sigma_um: standard deviation of a sample, as these figures feel what is left [µm].
+        sigma_um: standard deviation of white noise, per sample, that would give these figures the same uncertainty [µm].
     """
 
     symptoms: tuple[Symptom, ...]
@@ -105,7 +105,7 @@ class _Turn:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Least squares of all shapes, and of what stands beside them: centre, radius and form."""
+    """Least squares of all shapes, and of what is fitted with them: centre, radius and form."""
 
     shapes: tuple[Shape, ...]
     value: NDArray[np.float64]
@@ -120,7 +120,7 @@ def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
 
     Beside them are fitted centre and radius of each turn, and a form of 3 to 10 undulations that both have alike. What is then
     left beyond noise counts like noise that is white up to 30 undulations per revolution and absent above: nothing is known
-    of it but its size. One direction does not tell squareness from servo mismatch: both are then missing.
+    of it but its size. One direction cannot separate squareness from servo mismatch: both are then missing.
 
     Args:
         turns: one or two, of opposite sense.
@@ -220,7 +220,7 @@ def _beside(turns: Sequence[_Turn]) -> NDArray[np.float64]:
 
 
 def _sigma_um(turns: Sequence[_Turn], fit: _Fit) -> float:
-    """Deviation of white noise, per sample, that the figures feel as they feel what is left."""
+    """Standard deviation of white noise, per sample, that would give the figures the uncertainty that the residual gives them."""
     ends = np.cumsum([len(turn.theta_deg) for turn in turns])[:-1]
     found = misfit(
         np.split(fit.left_um, ends),
@@ -242,16 +242,16 @@ def _symptoms(fits: Sequence[_Fit], sigma_um: float, *, both: bool) -> list[Symp
         for shape, value, each in zip(fit.shapes, values, u, strict=True)
     ]
     if both:
-        return [_told(one, fit) for one in found]
-    untold = "one direction does not tell squareness from servo mismatch"
+        return [_with_length(one, fit) for one in found]
+    why = "one direction cannot separate squareness from servo mismatch"
     mixed = [
-        Symptom(signature, "", None, None, unit, seen=False, text=untold)
+        Symptom(signature, "", None, None, unit, seen=False, text=why)
         for signature, unit in ((Signature.SQUARENESS, "µm/m"), (Signature.SERVO, "ms"))
     ]
-    return [*mixed, *(_told(one, fit) for one in found if one.signature is not Signature.SQUARENESS)]
+    return [*mixed, *(_with_length(one, fit) for one in found if one.signature is not Signature.SQUARENESS)]
 
 
-def _told(one: Symptom, fit: _Fit) -> Symptom:
+def _with_length(one: Symptom, fit: _Fit) -> Symptom:
     return replace(one, text=f"most likely over {fit.spike_deg:g}°") if one.signature is Signature.SPIKE else one
 
 

@@ -70,7 +70,7 @@ def step_at(raw: RawCircle, deviation_um: NDArray[np.float64], theta_deg: float,
         sigma_um: noise of a sample [µm].
 
     Returns:
-        None where the turn begins and ends there, or where too few samples stand beside it: what differs between a
+        None where the turn begins and ends there, or where too few samples lie beside it: what differs between a
         turn's beginning and its end is closure, not a step.
     """
     place = float(raw.circle.phi_deg(np.array([theta_deg]))[0])
@@ -84,7 +84,7 @@ def step_at(raw: RawCircle, deviation_um: NDArray[np.float64], theta_deg: float,
 
 
 def closure_of(raw: RawCircle, deviation_um: NDArray[np.float64], sigma_um: float) -> Step | None:
-    """Return how far the end of a turn lies outside of its beginning; None where too few samples stand there."""
+    """Return how far the end of a turn lies outside of its beginning; None where too few samples lie there."""
     beginning = _line_at(raw.phi_deg, deviation_um, 1.0, sigma_um, near_deg=0.0)
     end = _line_at(raw.phi_deg - FULL_TURN_DEG, deviation_um, -1.0, sigma_um, near_deg=0.0)
     if beginning is None or end is None:

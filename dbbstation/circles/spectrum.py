@@ -40,7 +40,7 @@ def spectrum_of(one: CircleAnalysis) -> FormSpectrum:
     2 s / sqrt(n), root mean square.
 
     Args:
-        one: the circle; of few samples fewer undulations are told apart, of six or less none.
+        one: the circle; of few samples fewer undulations are separated, of six or less none.
     """
     count = len(one.raw)
     highest = min(HIGHEST, count // SAMPLES_PER_HARMONIC)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def circle_summary(one: CircleAnalysis, budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
-    """Figures of one circle, lengths in µm unless the key says otherwise; None where something cannot be told."""
+    """Figures of one circle, lengths in µm unless the key says otherwise; None where something cannot be determined."""
     x, y = one.centre_mm
     return {
         "direction": str(one.raw.circle.direction),

@@ -27,15 +27,15 @@ def date_faults(sessions: Sequence[SessionFigures], now: datetime) -> list[str]:
         sessions: of one machine, each with its date.
         now: the time.
     """
-    said = []
+    faults = []
     by_date = sorted(sessions, key=_dated)
     for one, other in pairwise(by_date):
         if one.started == other.started:
-            said.append(
-                f"{one.name} and {other.name} both start at {told(other.started)}; they are taken by their names"
+            faults.append(
+                f"{one.name} and {other.name} both start at {moment_words(other.started)}; they are taken by their names"
             )
-    said += [
-        f"{one.name} is dated {told(one.started)}, which is still to come: was the clock set wrong?"
+    faults += [
+        f"{one.name} is dated {moment_words(one.started)}, which is still to come: was the clock set wrong?"
         for one in by_date
         if one.started is not None and one.started > now
     ]
@@ -45,14 +45,14 @@ def date_faults(sessions: Sequence[SessionFigures], now: datetime) -> list[str]:
         for k in outside:
             other = by_name[k - 1] if k else by_name[1]
             where = "follows" if k else "precedes"
-            said.append(
-                f"{by_name[k].name} is dated {told(by_name[k].started)} and {where} {other.name}, dated "
-                f"{told(other.started)}, by its name: was the clock set wrong?"
+            faults.append(
+                f"{by_name[k].name} is dated {moment_words(by_name[k].started)} and {where} {other.name}, dated "
+                f"{moment_words(other.started)}, by its name: was the clock set wrong?"
             )
-    return said
+    return faults
 
 
-def told(moment: datetime | None) -> str:
+def moment_words(moment: datetime | None) -> str:
     """Return a moment in words."""
     return "–" if moment is None else f"{moment:%Y-%m-%d %H:%M}"
 

@@ -53,7 +53,7 @@ class SessionFigures:
         runs: accepted runs that show a circle.
         bar: serial number of the bar; empty where not noted.
         programs: NC programs that were run instead of the plan's circles, as a hash over theirs; empty for none.
-        notes: what is to be said of it.
+        notes: remarks on it.
     """
 
     name: str

@@ -59,9 +59,9 @@ def headline(machine: Mapping[str, Any]) -> str:
         return "Cannot tell whether anything changed: there are too few sessions"
     counts = Counter(change["verdict"] for change in machine["changes"])
     changed, single = counts["changed"], counts["stands out"]
-    told = [f"{changed} change{'s' if changed > 1 else ''}"] if changed else []
-    told += [f"{single} session{'s stand' if single > 1 else ' stands'} out"] if single else []
-    return ", ".join(told)
+    counted = [f"{changed} change{'s' if changed > 1 else ''}"] if changed else []
+    counted += [f"{single} session{'s stand' if single > 1 else ' stands'} out"] if single else []
+    return ", ".join(counted)
 
 
 def changes_in_words(machine: Mapping[str, Any], coverage_factor: float) -> Iterator[str]:

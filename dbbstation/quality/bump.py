@@ -76,7 +76,7 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
 
 
 def _near(theta_deg: NDArray[np.float64], reversals_deg: Sequence[float]) -> NDArray[np.int64]:
-    """Number of the reversal that each sample stands beside, -1 for none, shape (n,)."""
+    """Number of the reversal that each sample lies beside, -1 for none, shape (n,)."""
     near = np.full(len(theta_deg), -1, dtype=np.int64)
     for number, place in enumerate(reversals_deg):
         apart = np.abs(theta_deg - place % FULL_TURN_DEG)  # both within a turn: 0 to 360

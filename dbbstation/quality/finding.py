@@ -7,10 +7,10 @@ from enum import StrEnum
 
 
 class Name(StrEnum):
-    """What is looked for, in the order in which it is told."""
+    """What is looked for, in the order in which they are listed."""
 
     CIRCLE = "circle"
-    """The recording shows no full circle: nothing else can be told of it."""
+    """The recording shows no full circle: nothing else can be judged."""
     LOST = "lost samples"
     NOISE = "noise"
     CLOSURE = "closure"
@@ -42,7 +42,7 @@ class Finding:
         limit: greatest value of a sound run; None where none can be given.
         unit: of both.
         verdict: whether the value keeps the limit.
-        text: what was found, where, and what to do where it is wrong; why nothing can be told where it cannot.
+        text: what was found, where, and what to do where it is wrong; why it cannot be decided where it cannot.
     """
 
     name: Name
@@ -73,6 +73,6 @@ def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: 
     return Finding(name, value, limit, unit, verdict, wrong if verdict is Verdict.WRONG else sound)
 
 
-def untold(name: Name, why: str, unit: str = "", value: float | None = None) -> Finding:
-    """Return a finding of which nothing can be told, and why."""
+def undecided(name: Name, why: str, unit: str = "", value: float | None = None) -> Finding:
+    """Return a finding that cannot be decided, and why."""
     return Finding(name, value, None, unit, Verdict.CANNOT_TELL, why)

@@ -44,7 +44,7 @@ def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _do
 
     Args:
         runs: in the order in which they were recorded.
-        progress: told how many of how many are analysed.
+        progress: called with how many of how many are analysed.
     """
     known = []
     for done, run in enumerate(runs):

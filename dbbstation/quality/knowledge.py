@@ -32,7 +32,7 @@ class Expected:
         radial_mm: mean reading less nominal length of the bar [mm].
         covariance_mm2: of these three numbers, ball, mounting and bar included, shape (3, 3) [mm²].
         place_known: False for a ball put up under the spindle: its centre says nothing.
-        mounting_mm: standard deviation of where a ball comes to stand when it is put up again, in X and in Y [mm].
+        mounting_mm: standard deviation of where a ball comes to lie when it is put up again, in X and in Y [mm].
         reversals_deg: angles from +X at which a strut turns round [deg].
     """
 
@@ -51,7 +51,7 @@ class Run:
     Attributes:
         test: name of its test.
         repeat: counts the runs of this test and direction.
-        mounting: name of the putting-up of its ball; runs that share it share where the ball stands.
+        mounting: name of the putting-up of its ball; runs that share it share the place of the ball.
         circle: as commanded.
         recording: as recorded.
         expected: where its circle should lie; None where nobody knows.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.quality.finding import Finding, Name, found, untold
+from dbbstation.quality.finding import Finding, Name, found, undecided
 from dbbstation.quality.limits import length_quantile, quantile
 
 if TYPE_CHECKING:
@@ -17,26 +17,26 @@ if TYPE_CHECKING:
 def radius(one: CircleAnalysis, expected: Expected | None) -> Finding:
     """Mean reading against the expected one."""
     if expected is None:
-        return untold(Name.RADIUS, "nobody said what radius to expect", "µm")
+        return undecided(Name.RADIUS, "no expected radius is known", "µm")
     off_um = one.mean_radial_error_um - 1e3 * expected.radial_mm
     u_um = float(np.hypot(1e3 * np.sqrt(expected.covariance_mm2[2, 2]), one.noise.sigma_um / np.sqrt(len(one.raw))))
-    told = f"the bar reads {one.mean_radial_error_um:+.1f} µm on average, expected {1e3 * expected.radial_mm:+.1f} µm"
+    stated = f"the bar reads {one.mean_radial_error_um:+.1f} µm on average, expected {1e3 * expected.radial_mm:+.1f} µm"
     return found(
         Name.RADIUS,
         abs(off_um),
         quantile(np.inf) * u_um,
         "µm",
-        told,
-        f"{told}: check bar length, radius of plan and program, and the tool length",
+        stated,
+        f"{stated}: check bar length, radius of plan and program, and the tool length",
     )
 
 
 def bore(one: CircleAnalysis, expected: Expected | None) -> Finding:
     """Centre against the expected one."""
     if expected is None:
-        return untold(Name.BORE, "nobody said where the centre should be", "µm")
+        return undecided(Name.BORE, "no expected centre is known", "µm")
     if not expected.place_known:
-        return untold(Name.BORE, "the ball was put up under the spindle: its place is not known", "µm")
+        return undecided(Name.BORE, "the ball was put up under the spindle: its place is not known", "µm")
     off_um = 1e3 * (np.array(one.centre_mm) - expected.centre_mm)
     noise = 2.0 * one.noise.sigma_um**2 / len(one.raw)
     covariance = 1e6 * expected.covariance_mm2[:2, :2] + noise * np.eye(2)
@@ -44,12 +44,12 @@ def bore(one: CircleAnalysis, expected: Expected | None) -> Finding:
     along = off_um / size if size > 0.0 else np.array([1.0, 0.0])
     # The ellipse that a sound centre stays in, in the direction in which this one is off.
     limit = length_quantile(2) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))
-    told = f"the centre is {size:.1f} µm from where it is expected, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
+    stated = f"the centre is {size:.1f} µm from where it is expected, {off_um[0]:+.1f} in X and {off_um[1]:+.1f} in Y"
     return found(
         Name.BORE,
         size,
         limit,
         "µm",
-        told,
-        f"{told}: check bore, holder and its seat, and the ball's entry in the plan",
+        stated,
+        f"{stated}: check bore, holder and its seat, and the ball's entry in the plan",
     )

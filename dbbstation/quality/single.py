@@ -8,7 +8,7 @@ import numpy as np
 
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.quality.bump import bump
-from dbbstation.quality.finding import Finding, Name, Verdict, found, untold
+from dbbstation.quality.finding import Finding, Name, Verdict, found, undecided
 from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
 from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE
 from dbbstation.trace.loss import AFTER_LOSS, share_lost
@@ -25,18 +25,18 @@ def lost_samples(one: Seen) -> Finding:
     """Share of the turn's samples that were lost, against what the plan allows."""
     lost, kept = one.lost
     percent = 100.0 * lost / max(lost + kept, 1)
-    told = share_lost(lost, kept) if lost else "no sample is missing on the turn"
-    return found(Name.LOST, percent, one.run.largest_loss_percent, "%", told, f"{told}; {AFTER_LOSS}")
+    stated = share_lost(lost, kept) if lost else "no sample is missing on the turn"
+    return found(Name.LOST, percent, one.run.largest_loss_percent, "%", stated, f"{stated}; {AFTER_LOSS}")
 
 
 def noise(one: CircleAnalysis, others: Others) -> Finding:
     """Noise against that of the other runs."""
     value = max(one.noise.reading_um, LEAST_UM)
     if not one.noise.known:
-        return untold(Name.NOISE, "too few samples to tell noise from form", "µm")
+        return undecided(Name.NOISE, "too few samples to separate noise from form", "µm")
     known = [max(other, LEAST_UM) for other in others.noise_um if np.isfinite(other)]
     if len(known) < FEWEST_OTHERS:
-        return untold(
+        return undecided(
             Name.NOISE, f"{value:.2f} µm; fewer than {FEWEST_OTHERS} other runs to hold it against", "µm", value
         )
     logs = np.log(known)
@@ -59,38 +59,38 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
 def closure(one: CircleAnalysis, others: Others) -> Finding:
     """End of the turn less its beginning, against noise and what the other runs do."""
     if one.closure is None or not one.noise.known:
-        return untold(Name.CLOSURE, "too few samples, at the ends of the turn or to tell noise from form", "µm")
+        return undecided(Name.CLOSURE, "too few samples, at the ends of the turn or to separate noise from form", "µm")
     u = one.closure.u_um
     limit = _beyond(u, one.noise.freedom, others.closure_um)
     size = abs(one.closure.height_um)
-    told = f"the turn ends {one.closure.height_um:+.2f} µm off its beginning"
+    stated = f"the turn ends {one.closure.height_um:+.2f} µm off its beginning"
     return found(
         Name.CLOSURE,
         size,
         limit,
         "µm",
-        told,
-        f"{told}: something moved or warmed during the run, or the angles are wrong; repeat it",
+        stated,
+        f"{stated}: something moved or warmed during the run, or the angles are wrong; repeat it",
     )
 
 
 def drift(one: CircleAnalysis, others: Others) -> Finding:
     """Second pass of the overlap less the first, against noise, feed and what the other runs do."""
     if one.passes is None:
-        return untold(Name.DRIFT, "the recording was cut to its turn: no place is passed twice", "µm")
+        return undecided(Name.DRIFT, "the recording was cut to its turn: no place is passed twice", "µm")
     if not one.noise.known:
-        return untold(Name.DRIFT, "too few samples to tell noise from form", "µm")
+        return undecided(Name.DRIFT, "too few samples to separate noise from form", "µm")
     passes = one.passes
     u = passes.u_mean_um(one.noise.sigma_um)
     limit = _beyond(float(np.hypot(u, _by_feed_um(one))), one.noise.freedom, others.drift_um)
-    told = f"the bar reads {passes.mean_um:+.2f} µm more after one turn of {passes.turn_s:.0f} s"
+    stated = f"the bar reads {passes.mean_um:+.2f} µm more after one turn of {passes.turn_s:.0f} s"
     return found(
         Name.DRIFT,
         abs(passes.mean_um),
         limit,
         "µm",
-        told,
-        f"{told}, the same place passed twice: let bar and machine warm through, tighten the holder, and repeat the run",
+        stated,
+        f"{stated}, the same place passed twice: let bar and machine warm through, tighten the holder, and repeat the run",
     )
 
 
@@ -134,18 +134,18 @@ scatter is hardly known, would let pass whatever comes."""
 def feed(circle: Circle, shown_mm_min: tuple[float, float] | None) -> Finding:
     """Feed that the overlap shows against the programmed one, by the limits that cutting has."""
     if shown_mm_min is None:
-        return untold(Name.FEED, "the overlap is too short or too round to show the feed", "mm/min")
+        return undecided(Name.FEED, "the overlap is too short or too round to show the feed", "mm/min")
     shown, u = shown_mm_min
     programmed = circle.feed_mm_min
     limit = max(FEED_TOLERANCE * programmed, FEED_SIGMAS * u)
-    told = f"the overlap shows {shown:.1f} ± {u:.1f} mm/min, programmed are {programmed:g}"
+    stated = f"the overlap shows {shown:.1f} ± {u:.1f} mm/min, programmed are {programmed:g}"
     return found(
         Name.FEED,
         abs(shown - programmed),
         limit,
         "mm/min",
-        told,
-        f"{told}: set the feed of the plan to the one that was run, or the override to 100 %",
+        stated,
+        f"{stated}: set the feed of the plan to the one that was run, or the override to 100 %",
     )
 
 

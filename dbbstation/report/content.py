@@ -139,13 +139,13 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
 
 
 def _notes_before(reported: Reported) -> list[str]:
-    """Return what is to be said of the circles before: where they are of another machine, first of all."""
+    """Return remarks on the circles before: whether they are of another machine, first of all."""
     if reported.before is None:
         return []
     one, other = reported.before.sessions[0].machine, reported.found.sessions[0].machine
     unlike = differences(one, other)
-    told = f"The session before is of another nominal machine; before and now: {in_words(unlike)}."
-    return [*([told] if unlike else []), *reported.before.warnings]
+    note = f"The session before is of another nominal machine; before and now: {in_words(unlike)}."
+    return [*([note] if unlike else []), *reported.before.warnings]
 
 
 def _tests_of(found: Circled, session: str) -> list[str]:
@@ -199,12 +199,12 @@ def _sizes(one: ToleratedCircle) -> dict[str, dict[str, float]]:
 def _means(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Mean and largest of each figure; with those before of the circles that were measured both times."""
     both = [row for row in rows if row["before"] is not None]
-    told = both or list(rows)
+    taken = both or list(rows)
     return [
         {
             "quantity": figure.value,
-            "circles": len(told),
-            "now": _mean_and_largest([row["now"][figure.value]["um"] for row in told]),
+            "circles": len(taken),
+            "now": _mean_and_largest([row["now"][figure.value]["um"] for row in taken]),
             "before": _mean_and_largest([row["before"][figure.value]["um"] for row in both]),
         }
         for figure in CircleFigure
@@ -237,8 +237,8 @@ def _polars(reported: Reported) -> list[dict[str, Any]]:
 
 
 def _findings(found: Circled) -> dict[str, Any]:
-    """Return findings that are wrong, run by run, and those that could not be told, by what they are."""
-    wrong, untold, good = [], dict[tuple[str, str], list[str]](), 0
+    """Return findings that are wrong, run by run, and those that cannot be decided, by what they are."""
+    wrong, undecided, good = [], dict[tuple[str, str], list[str]](), 0
     for one in found.circles:
         for finding in () if one.judgement is None else one.judgement.findings:
             if finding.wrong:
@@ -246,10 +246,10 @@ def _findings(found: Circled) -> dict[str, Any]:
             elif finding.verdict.value == "good":
                 good += 1
             else:
-                untold.setdefault((str(finding.name), finding.text), []).append(one.entry.label)
+                undecided.setdefault((str(finding.name), finding.text), []).append(one.entry.label)
     return {
         "wrong": wrong,
-        "untold": [(name, text, runs) for (name, text), runs in untold.items()],
+        "undecided": [(name, text, runs) for (name, text), runs in undecided.items()],
         "good": good,
     }
 

@@ -1,4 +1,4 @@
-"""Where the tests of a plan stand on the table, as what an SVG needs."""
+"""Places of the tests of a plan on the table, as what an SVG needs."""
 
 from __future__ import annotations
 

@@ -120,8 +120,8 @@ def draw_spectrum(sheet: Sheet, box: Box, name: str, drawn: Sequence[Drawn]) -> 
     spectra = [(one.analysis, spectrum_of(one.analysis), thin) for one, thin in drawn if one.analysis is not None]
     noise = [each.noise_um for _, each, _ in spectra if np.isfinite(each.noise_um)]
     noise_um = float(np.sqrt(np.mean(np.square(noise)))) if noise else float("nan")
-    told = f"noise alone {noise_um:.2g} µm, dotted" if noise else "noise not known: too few samples"
-    axes = _chart(sheet, box, [name, told], "amplitude, µm")
+    subtitle = f"noise alone {noise_um:.2g} µm, dotted" if noise else "noise not known: too few samples"
+    axes = _chart(sheet, box, [name, subtitle], "amplitude, µm")
     least = 1e-4  # a tenth of what bars resolve; zero has no place on this scale
     for analysis, each, thin in spectra:
         style = _style(analysis, thin=thin) | {"marker": "." if not thin else "", "markersize": 3.0}

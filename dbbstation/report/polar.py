@@ -24,7 +24,7 @@ REACH = 44.0
 """How far from that the greatest deviation of a figure is drawn, either way."""
 
 BINS = 240
-"""Stretches of a turn, of which each is drawn by its greatest and least deviation: narrower ones cannot be told apart at the size
+"""Stretches of a turn, of which each is drawn by its greatest and least deviation: narrower ones cannot be distinguished at the size
 of the figure, and a peak of a single reading is still there."""
 
 MOST_DRAWN = 4

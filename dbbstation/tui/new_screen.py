@@ -10,6 +10,7 @@ from textual.content import Content
 
 from dbbstation.service.choice import Part
 from dbbstation.service.order import Order
+from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.tui import texts
 from dbbstation.tui.asking import ChooseQuestion, TypeQuestion
 from dbbstation.tui.bar_screen import BarScreen
@@ -209,7 +210,7 @@ class NewScreen(RowScreen):
 
     def _typed(self, part: Part, text: str) -> None:
         if part is Part.TEMPERATURE:
-            temp_c = _temperature(text)
+            temp_c = shop_degc(text)
             if temp_c is None:
                 self.say(texts.NO_NUMBER.format(text=text), wrong=True)
             else:
@@ -297,13 +298,3 @@ _EMPTY: dict[Part, object] = {
     Part.SERIAL_NUMBER: "",
     Part.TEMPERATURE: None,
 }
-
-_COLDEST_C, _WARMEST_C = -30.0, 80.0
-
-
-def _temperature(text: str) -> float | None:
-    try:
-        temp_c = float(text.replace(",", "."))
-    except ValueError:
-        return None
-    return temp_c if _COLDEST_C <= temp_c <= _WARMEST_C else None

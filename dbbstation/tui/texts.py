@@ -209,6 +209,7 @@ HELP = {
             "f": "Large figures for two metres, and back.",
             "c": "After a fault: open instrument and session again.",
             "e": "Results of the session: calibrate, diagnose, programs, report.",
+            "t": "Note the temperature of the shop. After circles it is asked for before the session is left.",
             "d": "Dark or light.",
             "f1": "This help.",
             "question_mark": "This help.",
@@ -339,6 +340,7 @@ TYPE_ANOTHER = "type another …"
 TYPE_REASON = "without a calibration: type why …"
 MEASURE_BAR = "measure it now, on its calibrator …"
 CHOOSE_TITLE = "Choose {part}: arrow keys, Enter; Esc goes back."
+TEMPERATURE_NOW = "Temperature of the shop now [°C]? Enter notes it, Esc goes on without."
 NO_NUMBER = "{text} is no temperature between -30 and 80 °C."
 NO_PROFILE = "usual"
 

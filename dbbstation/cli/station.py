@@ -244,6 +244,7 @@ def _given(line: Line, spy: Path | None, told: Mapping[str, Any]) -> Choice:
         bar_waiver=told["bar_waiver"].strip(),
         operator=told["operator"],
         serial_number=told["serial_number"],
+        job=told["job"],
         ambient_temp_c=told["ambient_temp_c"],
     )
 

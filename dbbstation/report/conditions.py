@@ -24,7 +24,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
     Args:
         session: the session.
         circles: its accepted runs.
-        job: what it was measured for, as typed.
+        job: what it was measured for, as typed; empty: what the session says.
     """
     compensated = sum(1 for run in session.in_state(RunState.ACCEPTED) if run.program is not None)
     accepted = len(session.in_state(RunState.ACCEPTED))
@@ -32,7 +32,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
         ("machine", session.machine.name),
         ("serial number", session.serial_number or _NOT_NOTED),
         ("operator", session.operator or _NOT_NOTED),
-        ("job", job or _NOT_NOTED),
+        ("job", job or session.job or _NOT_NOTED),
         ("measured", when_measured(session)),
         ("plan", session.plan.name),
         ("runs", _runs(session)),

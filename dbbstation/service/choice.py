@@ -46,6 +46,7 @@ class Part(StrEnum):
     PROGRAMS = "programs"
     OPERATOR = "operator"
     SERIAL_NUMBER = "serial number"
+    JOB = "job"
     TEMPERATURE = "temperature"
     ORDER = "order"
     GATE = "drift gate"
@@ -80,6 +81,7 @@ class Choice:
         programs: folder of NC programs; None: plain nominal circles.
         operator: name.
         serial_number: of the machine.
+        job: job or order number.
         ambient_temp_c: temperature of the shop before [degC]; None: not read.
         order: of the tests; a session that exists keeps its own.
         gate: whether the first test is repeated at the end.
@@ -94,6 +96,7 @@ class Choice:
     programs: Path | None = None
     operator: str = ""
     serial_number: str = ""
+    job: str = ""
     ambient_temp_c: float | None = None
     order: Order = Order.PLAN
     gate: bool = False
@@ -155,7 +158,12 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
     calibration = None if choice.bar is None else read_bar(choice.bar)
     bar = None if calibration is None else calibration.to_bar(protocol.length.stroke_mm)
     details = SessionDetails(
-        choice.serial_number, choice.operator, choice.ambient_temp_c, bar, choice.bar_waiver.strip()
+        choice.serial_number,
+        choice.operator,
+        choice.ambient_temp_c,
+        bar,
+        choice.bar_waiver.strip(),
+        job=choice.job.strip(),
     )
     job = Job(
         machine,

@@ -285,6 +285,7 @@ _FIELDS = {
     Part.PROGRAMS: "programs",
     Part.OPERATOR: "operator",
     Part.SERIAL_NUMBER: "serial_number",
+    Part.JOB: "job",
     Part.TEMPERATURE: "ambient_temp_c",
 }
 """Field of the choice that a row shows."""
@@ -296,5 +297,6 @@ _EMPTY: dict[Part, object] = {
     Part.PROGRAMS: None,
     Part.OPERATOR: "",
     Part.SERIAL_NUMBER: "",
+    Part.JOB: "",
     Part.TEMPERATURE: None,
 }

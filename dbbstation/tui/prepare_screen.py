@@ -123,7 +123,9 @@ class PrepareScreen(RowScreen):
         yield (
             _NOTE,
             texts.CHECK_WHO.format(
-                serial=choice.serial_number or texts.UNNAMED, operator=choice.operator or texts.UNNAMED
+                serial=choice.serial_number or texts.UNNAMED,
+                operator=choice.operator or texts.UNNAMED,
+                job=choice.job or texts.UNNAMED,
             ),
         )
 

@@ -303,6 +303,7 @@ PARTS: Mapping[Part, str] = {
     Part.PROGRAMS: "NC programs",
     Part.OPERATOR: "operator",
     Part.SERIAL_NUMBER: "serial number",
+    Part.JOB: "job",
     Part.TEMPERATURE: "temperature",
     Part.ORDER: "order of tests",
     Part.GATE: "drift gate",
@@ -329,6 +330,7 @@ NEW_EMPTY: Mapping[Part, str] = {
     Part.PROGRAMS: "none: plain circles, started at the control",
     Part.OPERATOR: "not noted",
     Part.SERIAL_NUMBER: "not noted",
+    Part.JOB: "not noted",
     Part.TEMPERATURE: "not read",
 }
 NOT_CHOSEN = "not chosen"
@@ -362,7 +364,7 @@ CHECK_VIRTUAL = "Machine, bar and instrument are virtual."
 CHECK_OLD = "The session keeps bar and shop as it has noted them."
 CHECK_TEMPERATURE = "Temperature of the shop before: {temp:g} °C."
 CHECK_NO_TEMPERATURE = "The temperature of the shop was not read; what the bar grows by is not known then."
-CHECK_WHO = "Machine {serial}, operator {operator}."
+CHECK_WHO = "Machine {serial}, operator {operator}, job {job}."
 CHECK_WROTE = "{count} NC programs written to {folder}."
 CHECK_OPEN = "Still to be confirmed: {count} of {all}. Enter confirms one, Y all."
 CHECK_READY = "Everything is confirmed: B begins."

@@ -177,8 +177,8 @@ def test_a_real_session_needs_the_bar_or_a_reason(front: Front) -> None:
     bar = shipped_folder("fixtures") / "bars" / "zerodur.yaml"
     with pytest.raises(InputError, match="last on its calibrator"):
         front.prepare(replace(choice, bar=bar))
-    waived = front.prepare(replace(choice, bar_waiver="a first look"))
-    assert waived.job.details.bar_waiver == "a first look"
+    waived = front.prepare(replace(choice, bar_waiver="a first look", job=" order 4711 "))
+    assert (waived.job.details.bar_waiver, waived.job.details.job) == ("a first look", "order 4711")
 
 
 def test_work_answers_with_what_its_command_prints(tmp_path: Path) -> None:

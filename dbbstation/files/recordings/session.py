@@ -286,6 +286,7 @@ def parse_session(
         seal=seal,
         amendments=tuple(map(amendment_entry, session.amendments)),
         notes=tuple(map(note_entry, session.notes)),
+        job=session.job,
     )
 
 

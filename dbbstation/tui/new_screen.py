@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from textual.content import Content
 
 from dbbstation.service.choice import Part
-from dbbstation.service.order import Order
+from dbbstation.service.order import Gate, Order
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.tui import texts
 from dbbstation.tui.asking import ChooseQuestion, TypeQuestion
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from dbbstation.service.front import Front
     from dbbstation.service.port_probe import Answer
     from dbbstation.tui.reception import Reception
+
+_Kind = TypeVar("_Kind", Order, Gate)
 
 ROWS = tuple(Part)
 _OF_LINE = (Part.INSTRUMENT, Part.PORT)
@@ -110,10 +112,9 @@ class NewScreen(RowScreen):
             case Part.PORT:
                 self._choose_port()
             case Part.ORDER:
-                orders = list(Order)
-                self._take(order=orders[(orders.index(self.choice.order) + 1) % len(orders)])
+                self._take(order=_next(self.choice.order))
             case Part.GATE:
-                self._take(gate=not self.choice.gate)
+                self._take(gate=_next(self.choice.gate))
             case _:
                 self._type(part, str(getattr(self.choice, _FIELDS[part]) or ""), lambda text: self._typed(part, text))
 
@@ -246,7 +247,7 @@ class NewScreen(RowScreen):
         said = {
             Part.INSTRUMENT: " ".join(filter(None, (line.instrument, line.profile))) or texts.NOT_CHOSEN,
             Part.PORT: line.port or texts.NOT_CHOSEN,
-            Part.ORDER: choice.order.value,
+            Part.ORDER: texts.ORDER_WORDS[choice.order],
             Part.GATE: texts.GATE_WORDS[choice.gate],
         }
         if line.virtual:
@@ -300,3 +301,9 @@ _EMPTY: dict[Part, object] = {
     Part.JOB: "",
     Part.TEMPERATURE: None,
 }
+
+
+def _next(one: _Kind) -> _Kind:
+    """The next of the values of an enumeration, behind the last comes the first."""
+    every = list(type(one))
+    return every[(every.index(one) + 1) % len(every)]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.service.after import Step
 from dbbstation.service.choice import Part
+from dbbstation.service.order import Gate, Order
 from dbbstation.service.work import Progress
 from dbbstation.station.states import State
 
@@ -336,7 +337,16 @@ NEW_EMPTY: Mapping[Part, str] = {
 NOT_CHOSEN = "not chosen"
 WITHOUT_BAR = "without: {reason}"
 VIRTUAL_BAR = "not needed: a virtual bar has the length of the plan"
-GATE_WORDS = {True: "the first test is repeated at the end", False: "as the plan has it"}
+ORDER_WORDS: Mapping[Order, str] = {
+    Order.PLAN: "as the plan has them",
+    Order.HOLDER: "by holder, then by ball: each is put up once",
+    Order.DRIFT: "heights in turn, so that none looks like a drift",
+}
+GATE_WORDS: Mapping[Gate, str] = {
+    Gate.PLAN: "as the plan has it",
+    Gate.FIRST: "the first test is repeated at the end",
+    Gate.HOLDERS: "the first test of each holder is repeated at the end",
+}
 TYPED = "type it, then Enter; Esc goes back"
 TYPE_ANOTHER = "type another …"
 TYPE_REASON = "without a calibration: type why …"
@@ -355,7 +365,9 @@ CONFIRMED: Mapping[str, str] = {
 """What only a person can see, by a name that is not shown."""
 
 CHECK_TRAVEL = "Every circle and its feed-in lie within the travel of axes, angles and struts."
-CHECK_TIME = "{runs} runs; their circles take {time} at the planned feeds, putting up balls comes on top."
+CHECK_TIME = "{runs} runs; their circles take {time} at the planned feeds. {mountings} times a ball is put up, which comes on top."
+CHECK_ORDER = "Heights and a steady drift correlate by {r:.2f}: they are told apart."
+CHECK_MIXED = "Heights and a steady drift correlate by {r:.2f}: a drift can look like an effect of height."
 CHECK_PROGRAMS = "{count} NC programs run the circles that they are named after."
 CHECK_NO_PROGRAMS = "The control runs plain circles; W writes NC programs of them."
 CHECK_BAR = "The bar {serial} was on its calibrator, at {when}."

@@ -41,7 +41,6 @@ CONDITIONS = ("temperature", "operator", "job", "bar")
     help="Which run a file is, such as old1.csv=a-ccw or old1.csv=a-ccw-2, where the file does not say it.",
 )
 @noted_options
-@click.option("--job", default="", help="What it was measured for.")
 @click.option(
     "--not-known",
     multiple=True,
@@ -58,7 +57,6 @@ def import_(
     plan: Path | None,
     machine: Path | None,
     named: tuple[str, ...],
-    job: str,
     not_known: tuple[str, ...],
     yes: bool,
     dry_run: bool,
@@ -95,7 +93,7 @@ def import_(
     elif remembered is not None:
         refuse_existing(remembered, force=False)
     asker = Asker()
-    found = _read(asker, files, of_mapping, (plan, machine), named, options, job, not_known)
+    found = _read(asker, files, of_mapping, (plan, machine), named, options, not_known)
     writes = (out, found.machine, found.plan, found.runs, found.details, found.more)
     with staged(*writes, dry=dry_run) as put:
         if not as_json:
@@ -134,7 +132,6 @@ def _read(
     paths: tuple[Path | None, Path | None],
     named: Sequence[str],
     options: dict[str, Any],
-    job: str,
     not_known: Sequence[str],
 ) -> _Import:
     """Read everything, and ask for what is missing."""
@@ -153,7 +150,7 @@ def _read(
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)
     plan = paths[0] or Path(asker.text("test plan whose circles were run", "--plan"))
     machine = paths[1] or Path(asker.text("file of the machine", "--machine"))
-    options, job = _conditions(asker, options, job, not_known)
+    _ask_conditions(asker, options, not_known)
     asker.check()
     mapping, inline, nominal = chosen(), read_inline_plan(plan), read_machine(machine)
     planned = inline.to_domain()
@@ -163,7 +160,7 @@ def _read(
     for path, table in tables.items():
         runs += reader.read(table, told.get(path) or _asked_run(asker, reader, table, planned))
     reader.check()
-    statements = [*_statements(mapping, runs, job, _unknown(options, job)), *reader.left_out]
+    statements = [*_statements(mapping, runs, _unknown(options)), *reader.left_out]
     now = datetime.now(UTC).replace(microsecond=0)
     notes = tuple(Note(now, f"imported: {text}") for text in statements)
     details = replace(session_details(**options, stroke_mm=None), notes=notes)
@@ -200,30 +197,27 @@ def _print_json(found: _Import, out: Path, *, written: bool) -> None:
     print_json({**told, "runs": runs, "statements": list(found.statements)})
 
 
-def _conditions(
-    asker: Asker, options: dict[str, Any], job: str, not_known: Sequence[str]
-) -> tuple[dict[str, Any], str]:
-    """Ask for conditions that neither option nor settings state."""
+def _ask_conditions(asker: Asker, options: dict[str, Any], not_known: Sequence[str]) -> None:
+    """Ask for conditions that neither option nor settings state, and put the answers into the options."""
     if options["ambient_temp_c"] is None and "temperature" not in not_known:
         options["ambient_temp_c"] = asker.number(
             "temperature of the shop [degC]", _or("--ambient-temp-c", "temperature")
         )
     if not options["operator"] and "operator" not in not_known:
         options["operator"] = asker.text("who measured", _or("--operator", "operator"), default="")
-    if not job and "job" not in not_known:
-        job = asker.text("what it was measured for", _or("--job", "job"), default="")
+    if not options["job"] and "job" not in not_known:
+        options["job"] = asker.text("what it was measured for", _or("--job", "job"), default="")
     if options["bar_file"] is None and options["bar_length_mm"] is None and "bar" not in not_known:
         option = _or("--bar FILE, or --bar-length-mm with --bar-uncertainty-um", "bar")
         options["bar_length_mm"] = asker.number("calibrated length of the bar [mm]", option)
         if options["bar_length_mm"] is not None:
             options["bar_uncertainty_um"] = asker.number("its standard uncertainty [µm]", "--bar-uncertainty-um")
-    return options, job
 
 
-def _unknown(options: Mapping[str, Any], job: str) -> list[str]:
+def _unknown(options: Mapping[str, Any]) -> list[str]:
     """Conditions that nobody knows, whether that was said on the command line or by Enter."""
     has_bar = options["bar_file"] is not None or options["bar_length_mm"] is not None
-    known = (options["ambient_temp_c"] is not None, bool(options["operator"]), bool(job), has_bar)
+    known = (options["ambient_temp_c"] is not None, bool(options["operator"]), bool(options["job"]), has_bar)
     return [one for one, is_known in zip(CONDITIONS, known, strict=True) if not is_known]
 
 
@@ -266,12 +260,12 @@ def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) ->
         click.echo(f"the plan's tests: {', '.join(plan.tests)}; directions: ccw, cw", err=True)
 
 
-def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], job: str, unknown: Sequence[str]) -> list[str]:
+def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequence[str]) -> list[str]:
     """What somebody who reads the session later has to know of it."""
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION
 
     files = ", ".join(dict.fromkeys(Path(one.file).name for one in runs))
-    found = [f"from {files}: kept in the folder `imported`", *([f"job: {job}"] if job else [])]
+    found = [f"from {files}: kept in the folder `imported`"]
     if mapping.column(DEVIATION) is not None:
         found.append(f"lengths are the deviations plus {mapping.zero_mm} mm, a positive deviation is a longer bar")
     if mapping.column(ANGLE) is not None and mapping.angle is not None:
@@ -305,6 +299,7 @@ def _show(found: _Import) -> None:
     details = found.details
     bar = "not known" if details.bar is None else f"{details.bar.calibrated_length_mm:.4f} mm"
     temp = "not known" if details.ambient_temp_c is None else f"{details.ambient_temp_c:g} degC"
-    click.echo(f"\noperator {details.operator or 'not known'}, temperature {temp}, bar {bar}")
+    people = f"operator {details.operator or 'not known'}, job {details.job or 'not known'}"
+    click.echo(f"\n{people}, temperature {temp}, bar {bar}")
     for text in found.statements:
         click.echo(f"- {text}")

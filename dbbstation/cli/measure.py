@@ -15,6 +15,7 @@ from dbbstation.cli.instrument_options import chosen_protocol, instrument_option
 from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.order_options import in_order, order_options
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 from dbbstation.service.patience import RECONNECT_S, driver_patience
@@ -53,6 +54,7 @@ _AUTO_PATIENCE_S = 60.0
 @spy_option
 @loss_option
 @judging_model_options
+@order_options
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print what was recorded as JSON.")
 def measure(
@@ -74,6 +76,8 @@ def measure(
     largest_bar_age_h: float | None,
     model_file: Path | None,
     source_files: tuple[Path, ...],
+    order: str,
+    gate: str,
     as_json: bool,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> None:
@@ -87,6 +91,7 @@ def measure(
     Examples:
       dbbstation measure --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
+      dbbstation measure ... --order drift --gate first   (heights in turn, the first test again at the end)
       dbbstation measure ... --port /dev/pts/5 --auto tcp://127.0.0.1:41234 --time-scale 50   (against `emulate`)
     """
     from dbbstation.files.formats.machine import read_machine
@@ -99,7 +104,8 @@ def measure(
     from dbbstation.virtual.wire_clock import ScaledClock
 
     clock = ScaledClock(time_scale)
-    machine, plan = read_machine(machine_file), with_loss_limit(read_inline_plan(plan_file), largest_loss_percent)
+    machine = read_machine(machine_file)
+    plan = in_order(with_loss_limit(read_inline_plan(plan_file), largest_loss_percent), order, gate)
     chosen = chosen_protocol(instrument, profile, zero_mm, bar_length_mm=stated_length_mm(told))
     protocol = at_rate(chosen, rate_hz)
     job = Job(

@@ -11,6 +11,7 @@ import click
 
 from dbbstation.cli.output import log_said
 from dbbstation.quality.summary import findings_summary
+from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, GoTo, Note, Pause, Quit, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.states import State
@@ -224,15 +225,8 @@ def _command_of(line: str) -> Command | None:
 
 def _temperature(text: str) -> Note | None:
     """Temperature of the shop as a note; None where it is no number or no shop has it."""
-    try:
-        degc = float(text.replace(",", "."))
-    except ValueError:
-        return None
-    return Note(ambient_temp_c=degc) if abs(degc) <= HOTTEST_DEGC else None
-
-
-HOTTEST_DEGC = 60.0
-"""No shop in which people measure is hotter, nor as far below zero [degC]."""
+    degc = shop_degc(text)
+    return None if degc is None else Note(ambient_temp_c=degc)
 
 
 def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a line per event, nothing nested

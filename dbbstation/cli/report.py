@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 @click.option(
     "--model", type=click.Path(path_type=Path), help="Model file of `calibrate` or `diagnose`, to put beside."
 )
-@click.option("--job", default="", help="What was measured for: stands among the conditions.")
+@click.option(
+    "--job", default="", help="What was measured for, where the session does not say it or says something else."
+)
 @source_file_option
 @chosen_tests_options
 @click.option(

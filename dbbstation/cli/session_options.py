@@ -22,6 +22,7 @@ _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 _OPTIONS = (
     click.option("--operator", default="", help="Name of the operator."),
+    click.option("--job", default="", help="Job or order number: what it is measured for."),
     shop_option("--serial-number", setting="serial_number", default="", help="Serial number of the machine."),
     click.option("--ambient-temp-c", type=Finite(), help="Temperature of the shop [degC]."),
     shop_option("--bar-serial-number", setting="bar.serial_number", default="", help="Serial number of the bar."),
@@ -74,6 +75,7 @@ def session_options(function: _Function) -> _Function:
 def session_details(
     *,
     operator: str,
+    job: str,
     serial_number: str,
     ambient_temp_c: float | None,
     bar_serial_number: str,
@@ -100,9 +102,9 @@ def session_details(
         if any(value not in {"", None} and not from_settings(name) for name, value in zip(names, values, strict=True)):
             raise click.UsageError("--bar says everything of the bar: leave out --bar-length-mm and the like")
         details = SessionDetails(serial_number, operator, ambient_temp_c, read_bar(bar_file).to_bar(stroke_mm))
-        return replace(details, bar_waiver=bar_waiver.strip())
+        return replace(details, bar_waiver=bar_waiver.strip(), job=job.strip())
     bar = _bar(bar_serial_number, bar_length_mm, bar_uncertainty_um, bar_temp_c, stroke_mm)
-    return SessionDetails(serial_number, operator, ambient_temp_c, bar, bar_waiver.strip())
+    return SessionDetails(serial_number, operator, ambient_temp_c, bar, bar_waiver.strip(), job=job.strip())
 
 
 def stated_length_mm(told: Mapping[str, Any]) -> float | None:

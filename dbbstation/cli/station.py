@@ -17,6 +17,7 @@ from dbbstation.cli.instrument_options import chosen_protocol, instrument_option
 from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.order_options import in_order, order_options
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
@@ -56,6 +57,7 @@ _DEMO_SEED = 3
 @spy_option
 @loss_option
 @judging_model_options
+@order_options
 @session_options
 def station(
     *,
@@ -74,6 +76,8 @@ def station(
     largest_bar_age_h: float | None,
     model_file: Path | None,
     source_files: tuple[Path, ...],
+    order: str,
+    gate: str,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
@@ -95,7 +99,7 @@ def station(
     if not virtual and time_scale == 1.0 and plan_file is None and machine_file is None and out is None:
         _check_terminal()
         return _begin(
-            _given(_line(instrument, profile, port, baud, zero_mm), spy, told),
+            _given(_line(instrument, profile, port, baud, zero_mm), spy, (order, gate), told),
             _limits(largest_loss_percent, largest_bar_age_h),
             judging_model(model_file, source_files),
         )
@@ -116,7 +120,7 @@ def station(
 
     plan_file = plan_file or demo("plan")
     machine = read_machine(machine_file or demo("machine"))
-    plan = with_loss_limit(read_inline_plan(plan_file), largest_loss_percent)
+    plan = in_order(with_loss_limit(read_inline_plan(plan_file), largest_loss_percent), order, gate)
     name = instrument or _DEMO_INSTRUMENT
     protocol = chosen_protocol(name, profile, zero_mm, bar_length_mm=stated_length_mm(told))
     details = session_details(**told, stroke_mm=protocol.length.stroke_mm)
@@ -219,18 +223,20 @@ def _line(
     return Line(instrument=instrument or "", profile=profile or "", port=port or "", baud=baud, zero_mm=zero_mm)
 
 
-def _given(line: Line, spy: Path | None, told: Mapping[str, Any]) -> Choice:
+def _given(line: Line, spy: Path | None, sequence: tuple[str, str], told: Mapping[str, Any]) -> Choice:
     """Return what options and settings say of a session that is chosen on the screen.
 
     Args:
         line: instrument and port.
         spy: file of `--spy`.
+        sequence: order of the tests, and what is repeated at their end.
         told: the session's options.
 
     Raises:
         click.UsageError: an option that the start screen has no place for.
     """
     from dbbstation.service.choice import Choice
+    from dbbstation.service.order import Gate, Order
 
     of_bar = ("bar_serial_number", "bar_length_mm", "bar_uncertainty_um", "bar_temp_c")
     lost = ["spy"] if spy is not None else []
@@ -244,6 +250,9 @@ def _given(line: Line, spy: Path | None, told: Mapping[str, Any]) -> Choice:
         bar_waiver=told["bar_waiver"].strip(),
         operator=told["operator"],
         serial_number=told["serial_number"],
+        job=told["job"],
+        order=Order(sequence[0]),
+        gate=Gate(sequence[1]),
         ambient_temp_c=told["ambient_temp_c"],
     )
 

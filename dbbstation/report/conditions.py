@@ -24,7 +24,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
     Args:
         session: the session.
         circles: its runs that are shown, of which dates and temperatures are given.
-        job: what it was measured for, as typed.
+        job: what it was measured for, as typed; empty: what the session says.
     """
     compensated = sum(1 for run in session.in_state(RunState.ACCEPTED) if run.program is not None)
     accepted = len(session.in_state(RunState.ACCEPTED))
@@ -32,13 +32,13 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
         ("machine", session.machine.name),
         ("serial number", session.serial_number or _NOT_NOTED),
         ("operator", session.operator or _NOT_NOTED),
-        ("job", job or _NOT_NOTED),
+        ("job", job or session.job or _NOT_NOTED),
         ("measured", when_measured(one.entry for one in circles)),
         ("plan", session.plan.name),
         ("runs", _runs(session)),
         ("programs", f"{compensated} of {accepted} accepted runs under NC programs that the session keeps"),
         *_bar(session.bar, session.bar_waiver),
-        ("temperature of the shop", _degc(session.ambient_temp_c)),
+        ("temperature of the shop", _shop(session)),
         ("logged temperatures", _logged(circles)),
         *(("noted", _noted(note)) for note in session.notes),
         ("seal", _seal(session)),
@@ -74,6 +74,16 @@ def _bar(bar: Bar | None, waiver: str) -> tuple[tuple[str, str], ...]:
         ("thermal expansion of the bar", grows),
         *without,
     )
+
+
+def _shop(session: SessionFolder) -> str:
+    """Temperature before, and after the last run where it was noted then."""
+    before = _degc(session.ambient_temp_c)
+    last = max((run.started for run in session.runs if run.started is not None), default=None)
+    after = [
+        note for note in session.notes if note.ambient_temp_c is not None and last is not None and note.made >= last
+    ]
+    return f"{before} before, {_degc(after[-1].ambient_temp_c)} after" if after else before
 
 
 def _noted(note: Note) -> str:

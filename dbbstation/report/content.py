@@ -102,7 +102,7 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
     return {
         **numbers,
         "machine": found.sessions[0].machine.name,
-        "job": reported.job,
+        "job": reported.job or found.sessions[0].job,
         "sessions": [
             {
                 "name": session.name,

@@ -101,6 +101,7 @@ class Board:
         completed: the run that waits for a verdict, or waited last.
         fault: what ended the sequence.
         finished: the end of the plan.
+        temperature_due: whether a run was begun since the temperature of the shop was noted.
         messages: the last ones, newest last.
     """
 
@@ -124,6 +125,7 @@ class Board:
     completed: events.RunCompleted | None = None
     fault: events.Fault | None = None
     finished: events.SessionFinished | None = None
+    temperature_due: bool = False
     messages: deque[Message] = field(default_factory=lambda: deque(maxlen=_MESSAGES))
 
     @property
@@ -185,6 +187,9 @@ class Board:
                 self.announced, self.swept_deg = event, 0.0
             case events.RunStarted():
                 self._begin(event.run)
+                self.temperature_due = True
+            case events.Noted() if event.ambient_temp_c is not None:
+                self.temperature_due = False
             case events.RunCompleted():
                 self._complete(event)
             case events.RunRestored():

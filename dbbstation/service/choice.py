@@ -14,8 +14,9 @@ from dbbstation.files.recordings.session import SESSION_FILE, read_session
 from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.instrument.library import load_instrument, with_zero
 from dbbstation.plan.duration import circles_s
+from dbbstation.plan.order import LARGEST_LEAK, height_and_drift, mountings
 from dbbstation.service.memory import Line
-from dbbstation.service.order import Order, ordered
+from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.station.assembly import Job
 from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
 from dbbstation.station.programs import load_programs
@@ -46,6 +47,7 @@ class Part(StrEnum):
     PROGRAMS = "programs"
     OPERATOR = "operator"
     SERIAL_NUMBER = "serial number"
+    JOB = "job"
     TEMPERATURE = "temperature"
     ORDER = "order"
     GATE = "drift gate"
@@ -80,9 +82,10 @@ class Choice:
         programs: folder of NC programs; None: plain nominal circles.
         operator: name.
         serial_number: of the machine.
+        job: job or order number.
         ambient_temp_c: temperature of the shop before [degC]; None: not read.
         order: of the tests; a session that exists keeps its own.
-        gate: whether the first test is repeated at the end.
+        gate: what is repeated at the end.
     """
 
     folder: Path | None = None
@@ -94,9 +97,10 @@ class Choice:
     programs: Path | None = None
     operator: str = ""
     serial_number: str = ""
+    job: str = ""
     ambient_temp_c: float | None = None
     order: Order = Order.PLAN
-    gate: bool = False
+    gate: Gate = Gate.PLAN
 
     @property
     def goes_on(self) -> bool:
@@ -126,6 +130,8 @@ class Prepared:
         line: instrument and port.
         runs: of the whole plan.
         circles_s: time that their circles take at their planned feeds [s].
+        mountings: how often a ball is put up.
+        height_and_drift: how far the height of the tests follows a steady drift, from 0 (not at all) to 1.
     """
 
     job: Job
@@ -133,6 +139,13 @@ class Prepared:
     line: Line
     runs: int
     circles_s: float
+    mountings: int
+    height_and_drift: float
+
+    @property
+    def mixes_drift(self) -> bool:
+        """Whether a drift can be taken for an effect of height."""
+        return self.height_and_drift > LARGEST_LEAK
 
 
 def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel | None = None) -> Prepared:
@@ -155,7 +168,12 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
     calibration = None if choice.bar is None else read_bar(choice.bar)
     bar = None if calibration is None else calibration.to_bar(protocol.length.stroke_mm)
     details = SessionDetails(
-        choice.serial_number, choice.operator, choice.ambient_temp_c, bar, choice.bar_waiver.strip()
+        choice.serial_number,
+        choice.operator,
+        choice.ambient_temp_c,
+        bar,
+        choice.bar_waiver.strip(),
+        job=choice.job.strip(),
     )
     job = Job(
         machine,
@@ -173,7 +191,16 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
         check_bar_known(bar, domain, datetime.now(UTC), limits.largest_bar_age_h)
     every = [test.run(direction) for test in domain.tests.values() for direction in test.directions]
     again = [domain.tests[name].run(way) for name in domain.repeat_at_end for way in domain.tests[name].directions]
-    return Prepared(job, protocol, choice.line, len(every) + len(again), circles_s([*every, *again]))
+    names = (*domain.tests, *domain.repeat_at_end)
+    return Prepared(
+        job,
+        protocol,
+        choice.line,
+        len(every) + len(again),
+        circles_s([*every, *again]),
+        mountings(domain, names),
+        height_and_drift([domain.tests[name].circle.centre_mm[2] for name in names], degree=1),
+    )
 
 
 def _protocol(choice: Choice) -> Protocol:
@@ -197,7 +224,7 @@ def _read(choice: Choice, limits: Limits) -> tuple[Machine, InlinePlan, Path, di
     if choice.machine is None or choice.plan is None:
         raise ValueError("machine or plan is missing")
     machine = read_machine(choice.machine)
-    plan = ordered(read_inline_plan(choice.plan), choice.order, gate=choice.gate)
+    plan = ordered(read_inline_plan(choice.plan), choice.order, choice.gate)
     stated = plan.plan.largest_loss_percent is not None
     if limits.largest_loss_percent is not None and (limits.loss_over_plan or not stated):
         plan = replace(plan, plan=plan.plan.model_copy(update={"largest_loss_percent": limits.largest_loss_percent}))

@@ -1,4 +1,4 @@
-"""In which order the tests of a plan are measured."""
+"""In which order the tests of a plan are measured, and which are measured again at its end."""
 
 from __future__ import annotations
 
@@ -6,29 +6,50 @@ from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from dbbstation.plan.order import against_drift, by_holder
+
 if TYPE_CHECKING:
     from dbbstation.files.formats.plan import InlinePlan
 
 
 class Order(StrEnum):
-    """The order; the text is how it is called."""
+    """The order."""
 
-    PLAN = "as the plan has them"
-    HOLDER = "by holder, then by ball: each is put up once"
+    PLAN = "plan"
+    """As the plan has the tests."""
+    HOLDER = "holder"
+    """By holder and ball, each put up once."""
+    DRIFT = "drift"
+    """Heights in turn, so that a drift does not look like an effect of height."""
 
 
-def ordered(plan: InlinePlan, order: Order, *, gate: bool = False) -> InlinePlan:
+class Gate(StrEnum):
+    """What is measured a second time at the end: how far that differs is what the machine drifted by."""
+
+    PLAN = "plan"
+    """What the plan names in `repeat_at_end`."""
+    FIRST = "first"
+    """The first test."""
+    HOLDERS = "holders"
+    """The first test of each holder."""
+
+
+def ordered(plan: InlinePlan, order: Order, gate: Gate = Gate.PLAN) -> InlinePlan:
     """Return the plan with its tests in an order.
 
     Args:
         plan: as its file has it.
-        order: holders and balls come in the order in which the plan names them first.
-        gate: repeat the first test at the end, so that drift shows; a plan that names tests to repeat keeps its own.
+        order: of the tests.
+        gate: what is repeated at the end; a plan that names tests to repeat keeps its own.
     """
-    tests = list(plan.plan.tests)
-    if order is Order.HOLDER:
-        holder_of = {test.ball: plan.plan.balls[test.ball].holder for test in tests}
-        holders, balls = list(dict.fromkeys(holder_of.values())), list(holder_of)
-        tests.sort(key=lambda test: (holders.index(holder_of[test.ball]), balls.index(test.ball)))
-    again = plan.plan.repeat_at_end or ((tests[0].name,) if gate else ())
-    return replace(plan, plan=plan.plan.model_copy(update={"tests": tuple(tests), "repeat_at_end": again}))
+    domain = plan.to_domain()
+    choose = {Order.PLAN: lambda one: tuple(one.tests), Order.HOLDER: by_holder, Order.DRIFT: against_drift}
+    names = choose[order](domain)
+    tests = {test.name: test for test in plan.plan.tests}
+    first_of: dict[str, str] = {}
+    for name in names:
+        first_of.setdefault(domain.tests[name].ball.holder, name)
+    gates = {Gate.PLAN: (), Gate.FIRST: names[:1], Gate.HOLDERS: tuple(first_of.values())}
+    again = plan.plan.repeat_at_end or gates[gate]
+    changed = {"tests": tuple(tests[name] for name in names), "repeat_at_end": again}
+    return replace(plan, plan=plan.plan.model_copy(update=changed))

@@ -95,12 +95,16 @@ class Runner:
                 came.append(self._mail.get_nowait())
         return came
 
+    def wait(self) -> None:
+        """Wait for the end of a sequence that is over, until it has let go of the session."""
+        if self._thread is not None:
+            self._thread.join(_JOIN_S)
+
     def close(self) -> None:
         """End the sequence, also one that is only about to begin, and wait for that."""
         self._closing.set()
         self.send(Quit())
-        if self._thread is not None:
-            self._thread.join(_JOIN_S)
+        self.wait()
 
     def _run(self) -> None:
         try:

@@ -15,7 +15,10 @@ from dbbstation.errors import StationError
 from dbbstation.service.after import After
 from dbbstation.service.background import Background
 from dbbstation.service.board import Board
-from dbbstation.station.commands import Command, Quit
+from dbbstation.service.messages import Message, Weight
+from dbbstation.service.shop_temperature import note_temperature, shop_degc
+from dbbstation.station.commands import Command, Note, Quit
+from dbbstation.station.events import Noted
 from dbbstation.station.states import FINAL, RECORDING, VERDICT
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
 from dbbstation.tui.explained import ExplainedScreen
@@ -28,6 +31,7 @@ from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.row_screen import RowScreen
 from dbbstation.tui.shown import Shown
 from dbbstation.tui.start_screen import StartScreen
+from dbbstation.tui.temperature_question import TemperatureQuestion
 from dbbstation.tui.texts import HELP
 
 if TYPE_CHECKING:
@@ -73,6 +77,9 @@ class Sequence(Protocol):
     def mail(self) -> list[Event | SequenceOpened]:
         """Return what has come since the last call."""
 
+    def wait(self) -> None:
+        """Wait until a sequence that is over has let go of the session."""
+
     def close(self) -> None:
         """End the sequence and wait for that."""
 
@@ -96,6 +103,7 @@ class StationApp(App[None]):
         ("c", "connect", "Connect again"),
         # The sentence at the end of the plan names it; until then the footer has no room.
         Binding("e", "results", "Results", show=False),
+        Binding("t", "temperature", "Temperature", show=False),
         Binding("d", "brightness", "Dark/light", show=False),
         ("f1,question_mark", "explain", "Help"),
         ("q", "leave", "Quit"),
@@ -277,6 +285,8 @@ class StationApp(App[None]):
         """Only keys that mean something now stand in the footer and do something."""
         if action == "connect":
             return self.board.fault is not None and self._measuring
+        if action == "temperature":
+            return self._measuring and bool(self.board.session)
         if action == "results":
             return self._measuring and bool(self.board.session) and self.board.state not in RECORDING
         if action == "command_palette":
@@ -320,9 +330,17 @@ class StationApp(App[None]):
         if self._runner is not None:
             self._runner.start()
 
+    def action_temperature(self) -> None:
+        """Ask for the temperature of the shop and note it."""
+        self._ask_temperature(lambda: None)
+
     def action_results(self) -> None:
-        """Show what can be done with what is measured so far."""
-        self.show_results(Path(self.board.session))
+        """Show what can be done with what is measured so far; the temperature after the last circle comes first."""
+        folder = Path(self.board.session)
+        if self.board.finished is not None and self.board.temperature_due:
+            self._ask_temperature(lambda: self.show_results(folder))
+        else:
+            self.show_results(folder)
 
     def action_brightness(self) -> None:
         """Change between dark and light."""
@@ -334,8 +352,45 @@ class StationApp(App[None]):
             self.exit()
         elif self.board.state in RECORDING and self.drawn is not None:
             ask_to_give_up(self.drawn, "Quit", self.leave)
+        elif self.board.temperature_due and self.board.fault is None and not self._leaving:
+            self._ask_temperature(lambda: self.leave(sure=True))
         else:
             self.leave(sure=True)
+
+    def _ask_temperature(self, then: Callable[[], None]) -> None:
+        """Ask for the temperature of the shop, note it where it is given, then go on; one question at a time."""
+        if isinstance(self.screen, TemperatureQuestion):
+            return
+
+        def answered(text: str | None) -> None:
+            degc = None if text is None else shop_degc(text)
+            if degc is None:
+                then()
+            else:
+                self._note_temperature(degc, then)
+
+        self.push_screen(TemperatureQuestion(), answered)
+
+    def _note_temperature(self, degc: float, then: Callable[[], None]) -> None:
+        """Note a temperature [degC] by the sequence, or in the session's file where the sequence is over."""
+        runner, folder = self._runner, Path(self.board.session)
+        if runner is None or Note in self.board.allowed:
+            self.send(Note(ambient_temp_c=degc))
+            then()
+            return
+
+        def write() -> None:
+            runner.wait()
+            note_temperature(folder, degc)
+
+        def written(_: None) -> None:
+            self.board.take(Noted("", degc))
+            then()
+
+        def failed(error: Exception) -> None:
+            self.board.messages.append(Message(Weight.FAULT, str(error)))
+
+        self.do(write, written, failed)
 
     def close_down(self) -> None:
         """End the sequence and the screen without a question, whatever screen is on top."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from textual.content import Content
 
 from dbbstation.service.choice import Part
-from dbbstation.service.order import Order
+from dbbstation.service.order import Gate, Order
+from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.tui import texts
 from dbbstation.tui.asking import ChooseQuestion, TypeQuestion
 from dbbstation.tui.bar_screen import BarScreen
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from dbbstation.service.front import Front
     from dbbstation.service.port_probe import Answer
     from dbbstation.tui.reception import Reception
+
+_Kind = TypeVar("_Kind", Order, Gate)
 
 ROWS = tuple(Part)
 _OF_LINE = (Part.INSTRUMENT, Part.PORT)
@@ -109,10 +112,9 @@ class NewScreen(RowScreen):
             case Part.PORT:
                 self._choose_port()
             case Part.ORDER:
-                orders = list(Order)
-                self._take(order=orders[(orders.index(self.choice.order) + 1) % len(orders)])
+                self._take(order=_next(self.choice.order))
             case Part.GATE:
-                self._take(gate=not self.choice.gate)
+                self._take(gate=_next(self.choice.gate))
             case _:
                 self._type(part, str(getattr(self.choice, _FIELDS[part]) or ""), lambda text: self._typed(part, text))
 
@@ -209,7 +211,7 @@ class NewScreen(RowScreen):
 
     def _typed(self, part: Part, text: str) -> None:
         if part is Part.TEMPERATURE:
-            temp_c = _temperature(text)
+            temp_c = shop_degc(text)
             if temp_c is None:
                 self.say(texts.NO_NUMBER.format(text=text), wrong=True)
             else:
@@ -245,7 +247,7 @@ class NewScreen(RowScreen):
         said = {
             Part.INSTRUMENT: " ".join(filter(None, (line.instrument, line.profile))) or texts.NOT_CHOSEN,
             Part.PORT: line.port or texts.NOT_CHOSEN,
-            Part.ORDER: choice.order.value,
+            Part.ORDER: texts.ORDER_WORDS[choice.order],
             Part.GATE: texts.GATE_WORDS[choice.gate],
         }
         if line.virtual:
@@ -284,6 +286,7 @@ _FIELDS = {
     Part.PROGRAMS: "programs",
     Part.OPERATOR: "operator",
     Part.SERIAL_NUMBER: "serial_number",
+    Part.JOB: "job",
     Part.TEMPERATURE: "ambient_temp_c",
 }
 """Field of the choice that a row shows."""
@@ -295,15 +298,12 @@ _EMPTY: dict[Part, object] = {
     Part.PROGRAMS: None,
     Part.OPERATOR: "",
     Part.SERIAL_NUMBER: "",
+    Part.JOB: "",
     Part.TEMPERATURE: None,
 }
 
-_COLDEST_C, _WARMEST_C = -30.0, 80.0
 
-
-def _temperature(text: str) -> float | None:
-    try:
-        temp_c = float(text.replace(",", "."))
-    except ValueError:
-        return None
-    return temp_c if _COLDEST_C <= temp_c <= _WARMEST_C else None
+def _next(one: _Kind) -> _Kind:
+    """The next of the values of an enumeration, behind the last comes the first."""
+    every = list(type(one))
+    return every[(every.index(one) + 1) % len(every)]

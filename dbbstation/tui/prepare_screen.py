@@ -98,7 +98,10 @@ class PrepareScreen(RowScreen):
         choice, prepared = self._choice, self._prepared
         job = prepared.job
         yield _GOOD, texts.CHECK_TRAVEL
-        yield _GOOD, texts.CHECK_TIME.format(runs=prepared.runs, time=duration(prepared.circles_s))
+        time = duration(prepared.circles_s)
+        yield _GOOD, texts.CHECK_TIME.format(runs=prepared.runs, time=time, mountings=prepared.mountings)
+        r = prepared.height_and_drift
+        yield (_NOTE, texts.CHECK_MIXED.format(r=r)) if prepared.mixes_drift else (_GOOD, texts.CHECK_ORDER.format(r=r))
         if self._wrote:
             yield _GOOD, self._wrote
         elif job.programs:
@@ -123,7 +126,9 @@ class PrepareScreen(RowScreen):
         yield (
             _NOTE,
             texts.CHECK_WHO.format(
-                serial=choice.serial_number or texts.UNNAMED, operator=choice.operator or texts.UNNAMED
+                serial=choice.serial_number or texts.UNNAMED,
+                operator=choice.operator or texts.UNNAMED,
+                job=choice.job or texts.UNNAMED,
             ),
         )
 

@@ -40,6 +40,9 @@ class Happened:
     def start(self) -> None:
         """Do nothing."""
 
+    def wait(self) -> None:
+        """Do nothing."""
+
     def close(self) -> None:
         """Do nothing."""
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.service.after import Step
 from dbbstation.service.choice import Part
+from dbbstation.service.order import Gate, Order
 from dbbstation.service.work import Progress
 from dbbstation.station.states import State
 
@@ -209,6 +210,7 @@ HELP = {
             "f": "Large figures for two metres, and back.",
             "c": "After a fault: open instrument and session again.",
             "e": "Results of the session: calibrate, diagnose, programs, report.",
+            "t": "Note the temperature of the shop. After circles it is asked for before the session is left.",
             "d": "Dark or light.",
             "f1": "This help.",
             "question_mark": "This help.",
@@ -302,6 +304,7 @@ PARTS: Mapping[Part, str] = {
     Part.PROGRAMS: "NC programs",
     Part.OPERATOR: "operator",
     Part.SERIAL_NUMBER: "serial number",
+    Part.JOB: "job",
     Part.TEMPERATURE: "temperature",
     Part.ORDER: "order of tests",
     Part.GATE: "drift gate",
@@ -328,17 +331,28 @@ NEW_EMPTY: Mapping[Part, str] = {
     Part.PROGRAMS: "none: plain circles, started at the control",
     Part.OPERATOR: "not noted",
     Part.SERIAL_NUMBER: "not noted",
+    Part.JOB: "not noted",
     Part.TEMPERATURE: "not read",
 }
 NOT_CHOSEN = "not chosen"
 WITHOUT_BAR = "without: {reason}"
 VIRTUAL_BAR = "not needed: a virtual bar has the length of the plan"
-GATE_WORDS = {True: "the first test is repeated at the end", False: "as the plan has it"}
+ORDER_WORDS: Mapping[Order, str] = {
+    Order.PLAN: "as the plan has them",
+    Order.HOLDER: "by holder, then by ball: each is put up once",
+    Order.DRIFT: "heights in turn, so that none looks like a drift",
+}
+GATE_WORDS: Mapping[Gate, str] = {
+    Gate.PLAN: "as the plan has it",
+    Gate.FIRST: "the first test is repeated at the end",
+    Gate.HOLDERS: "the first test of each holder is repeated at the end",
+}
 TYPED = "type it, then Enter; Esc goes back"
 TYPE_ANOTHER = "type another …"
 TYPE_REASON = "without a calibration: type why …"
 MEASURE_BAR = "measure it now, on its calibrator …"
 CHOOSE_TITLE = "Choose {part}: arrow keys, Enter; Esc goes back."
+TEMPERATURE_NOW = "Temperature of the shop now [°C]? Enter notes it, Esc goes on without."
 NO_NUMBER = "{text} is no temperature between -30 and 80 °C."
 NO_PROFILE = "usual"
 
@@ -351,7 +365,9 @@ CONFIRMED: Mapping[str, str] = {
 """What only a person can see, by a name that is not shown."""
 
 CHECK_TRAVEL = "Every circle and its feed-in lie within the travel of axes, angles and struts."
-CHECK_TIME = "{runs} runs; their circles take {time} at the planned feeds, putting up balls comes on top."
+CHECK_TIME = "{runs} runs; their circles take {time} at the planned feeds. {mountings} times a ball is put up, which comes on top."
+CHECK_ORDER = "Heights and a steady drift correlate by {r:.2f}: they are told apart."
+CHECK_MIXED = "Heights and a steady drift correlate by {r:.2f}: a drift can look like an effect of height."
 CHECK_PROGRAMS = "{count} NC programs run the circles that they are named after."
 CHECK_NO_PROGRAMS = "The control runs plain circles; W writes NC programs of them."
 CHECK_BAR = "The bar {serial} was on its calibrator, at {when}."
@@ -360,7 +376,7 @@ CHECK_VIRTUAL = "Machine, bar and instrument are virtual."
 CHECK_OLD = "The session keeps bar and shop as it has noted them."
 CHECK_TEMPERATURE = "Temperature of the shop before: {temp:g} °C."
 CHECK_NO_TEMPERATURE = "The temperature of the shop was not read; what the bar grows by is not known then."
-CHECK_WHO = "Machine {serial}, operator {operator}."
+CHECK_WHO = "Machine {serial}, operator {operator}, job {job}."
 CHECK_WROTE = "{count} NC programs written to {folder}."
 CHECK_OPEN = "Still to be confirmed: {count} of {all}. Enter confirms one, Y all."
 CHECK_READY = "Everything is confirmed: B begins."

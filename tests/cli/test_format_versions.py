@@ -32,6 +32,7 @@ STORED = {
     "dbb-session/1": FIXTURES / "sessions" / "under-spindle",
     "dbb-session/2": FIXTURES / "sessions" / "small",
     "dbb-session/3": FIXTURES / "sessions" / "sealed",
+    "dbb-session/4": FIXTURES / "sessions" / "begun",
 }
 """One stored file of each version."""
 

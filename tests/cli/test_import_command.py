@@ -13,6 +13,7 @@ import pytest
 from dbbstation.cli import DONE, FAILED, USAGE
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.report.conditions import conditions
 
 FIXTURES = shipped_folder("fixtures")
 PLAN = shipped_folder("protocols") / "plans" / "table2.yaml"
@@ -291,15 +292,17 @@ def test_on_a_terminal_everything_that_is_missing_is_asked_for(run, tmp_path, mo
     """Answers as they are typed, a decimal comma, a test that is none, and Enter where nobody knows."""
     rows = [f"{a:g},{d:g}" for a, d in zip(ANGLES, ellipse(), strict=True)]
     file = table(tmp_path / "old.csv", rows, "Winkel,Abweichung [µm]")
-    answers = ["deg", "ccw", "0", "150", str(PLAN), str(MACHINE), "20,5", "Mori", "", "", "zz", "a-ccw", "y"]
+    answers = ["deg", "ccw", "0", "150", str(PLAN), str(MACHINE), "20,5", "Mori", "order 7", "", "zz", "a-ccw", "y"]
     monkeypatch.setattr("sys.stdin", io.StringIO("\n".join(answers) + "\n"))
     monkeypatch.setattr("dbbstation.cli.asking.on_terminal", lambda: True)
     done = run("import", file, "--out", tmp_path / "s")
     assert done.code == DONE, done.err
     session = read_session(tmp_path / "s")
-    assert (session.operator, session.ambient_temp_c, session.bar) == ("Mori", 20.5, None)
+    assert (session.operator, session.job, session.ambient_temp_c, session.bar) == ("Mori", "order 7", 20.5, None)
+    assert dict(conditions(session, [], ""))["job"] == "order 7"
+    assert dict(conditions(session, [], "typed later"))["job"] == "typed later"
     assert [one.label for one in session.runs] == ["a ccw 1"]
-    assert {note.text for note in session.notes} >= {"imported: nobody knows: job", "imported: nobody knows: bar"}
+    assert {note.text for note in session.notes} >= {"imported: nobody knows: bar"}
     assert "the plan's tests: a, b" in done.err
 
 

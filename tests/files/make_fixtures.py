@@ -1,4 +1,4 @@
-"""Makes the session `sealed` of `fixtures` and `fixtures/models` anew: `python -m tests.files.make_fixtures`.
+"""Makes the sessions `sealed` and `begun` of `fixtures` and `fixtures/models` anew: `python -m tests.files.make_fixtures`.
 
 The sessions `small` and `under-spindle` are of older versions of the format and stay as those wrote them; `make_session` and
 `make_conventional_session` say what they hold. The recordings of `small` and `sealed` come from the independent virtual machine of tests/plant, those of `under-spindle` from that of
@@ -117,6 +117,12 @@ def make_conventional_session(folder: Path) -> None:
     write_session(folder, machine, inline, runs, SessionDetails(set_up_errors=tuple(readings)))
 
 
+def make_begun_session(folder: Path) -> None:
+    """A session for an order, of the same machine and plan, in which nothing is measured yet."""
+    source = read_session(FIXTURES / "sessions" / "sealed")
+    write_session(folder, source.machine, read_inline_plan(source.plan_path), (), SessionDetails(job="order 4711"))
+
+
 def make_models(folder: Path) -> None:
     session = read_session(FIXTURES / "sessions" / "small")
     known, machine = known_sources(), session.machine
@@ -150,4 +156,6 @@ def make_models(folder: Path) -> None:
 if __name__ == "__main__":
     shutil.rmtree(FIXTURES / "sessions" / "sealed", ignore_errors=True)
     make_session(FIXTURES / "sessions" / "sealed")
+    shutil.rmtree(FIXTURES / "sessions" / "begun", ignore_errors=True)
+    make_begun_session(FIXTURES / "sessions" / "begun")
     make_models(FIXTURES / "models")

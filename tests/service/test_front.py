@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from dbbstation.cli import order_options
 from dbbstation.errors import InputError, TravelError
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
 from dbbstation.files.shipped import shipped_folder
@@ -19,7 +20,7 @@ from dbbstation.service.candidates import Kind, candidates
 from dbbstation.service.choice import Choice, Part
 from dbbstation.service.front import Front
 from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
-from dbbstation.service.order import Order, ordered
+from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.service.port_probe import probe
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.work import Progress, Work
@@ -177,8 +178,8 @@ def test_a_real_session_needs_the_bar_or_a_reason(front: Front) -> None:
     bar = shipped_folder("fixtures") / "bars" / "zerodur.yaml"
     with pytest.raises(InputError, match="last on its calibrator"):
         front.prepare(replace(choice, bar=bar))
-    waived = front.prepare(replace(choice, bar_waiver="a first look"))
-    assert waived.job.details.bar_waiver == "a first look"
+    waived = front.prepare(replace(choice, bar_waiver="a first look", job=" order 4711 "))
+    assert (waived.job.details.bar_waiver, waived.job.details.job) == ("a first look", "order 4711")
 
 
 def test_work_answers_with_what_its_command_prints(tmp_path: Path) -> None:
@@ -291,7 +292,21 @@ def test_the_order_by_holder_puts_each_up_once(tmp_path: Path) -> None:
     file.write_text(f"{text.rstrip()}\n{low.replace('name: low', 'name: last')}", "utf-8")
     plan = read_inline_plan(file)
     assert list(ordered(plan, Order.PLAN).to_domain().tests) == ["low", "side", "high", "last"]
-    by_holder = ordered(plan, Order.HOLDER, gate=True).to_domain()
+    by_holder = ordered(plan, Order.HOLDER, Gate.FIRST).to_domain()
     assert list(by_holder.tests) == ["low", "last", "side", "high"]
     assert by_holder.repeat_at_end == ("low",)
     assert ordered(plan, Order.PLAN).to_domain().repeat_at_end == ()
+
+
+def test_the_checklist_says_what_an_order_costs_and_whether_heights_follow_a_drift(front: Front) -> None:
+    table2 = shipped_folder("protocols") / "plans" / "table2.yaml"
+    choice = replace(front.virtual_choice(), plan=table2)
+    as_planned = front.prepare(choice)
+    assert (as_planned.runs, as_planned.mountings, as_planned.mixes_drift) == (30, 15, True)
+    in_turn = front.prepare(replace(choice, order=Order.DRIFT, gate=Gate.HOLDERS))
+    assert (in_turn.runs, in_turn.mountings, in_turn.mixes_drift) == (36, 18, False)
+
+
+def test_the_orders_of_the_command_line_are_those_of_the_service() -> None:
+    assert tuple(Order) == order_options.ORDERS
+    assert tuple(Gate) == order_options.GATES

@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from dbbstation.files.formats.machine import read_machine
-from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.formats.plan import read_inline_plan, read_plan
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.station.preflight import check_plan
 from dbbstation.trace.cut import cut
 from dbbstation.virtual.machine import Sizes
@@ -73,14 +74,17 @@ def test_a_finished_session_has_nothing_left_and_another_plan_is_refused(plan_fi
     out = tmp_path / "session"
     text = plan_file.read_text(encoding="utf-8")
     plan_file.write_text(text.replace("[ccw, cw]", "[ccw]").replace("repeat_at_end: [a]\n", ""), encoding="utf-8")
+    in_turn = ("--order", "drift", "--gate", "first")
+    planned = ordered(read_inline_plan(plan_file), Order.DRIFT, Gate.FIRST).to_domain()
     with bench(plan_file) as place:
-        assert place.measure(out).returncode == 0
+        assert place.measure(out, *in_turn).returncode == 0
         before = (out / "session.yaml").read_bytes()
-        again = place.measure(out)
+        again = place.measure(out, *in_turn)
         assert (again.returncode, (out / "session.yaml").read_bytes()) == (0, before)
         plan_file.write_text(text, encoding="utf-8")
         other = place.measure(out)
     assert other.returncode == 1
+    assert [run.test for run in read_session(out).runs] == [*planned.tests, *planned.repeat_at_end]
     assert "the plan of this session is another one" in other.stderr
     assert "Traceback" not in other.stderr
 

@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import asyncio
+import shutil
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from textual.events import Key
+from textual.widgets import Input, Static
 
+from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.session_writer import SessionWriter
+from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
-from dbbstation.station.commands import Accept, GoTo, Judge, Quit, Repeat, Skip
+from dbbstation.report.conditions import conditions
+from dbbstation.station.commands import Accept, GoTo, Judge, Note, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.overview_panels import ChosenRun
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import GiveUpQuestion
 from dbbstation.tui.reason_question import ReasonQuestion
+from dbbstation.tui.results_screen import ResultsScreen
+from dbbstation.tui.temperature_question import TemperatureQuestion
 from dbbstation.tui.texts import HELP
 from dbbstation.tui.trace_view import TraceView
 from tests.tui.happenings import Happening, make_plan
@@ -44,6 +54,9 @@ class EndsWhileItsMailIsTaken:
         self._quits = False
 
     def start(self) -> None:
+        """Do nothing."""
+
+    def wait(self) -> None:
         """Do nothing."""
 
     def close(self) -> None:
@@ -94,6 +107,9 @@ class Waits:
         self._mail = list(events)
 
     def start(self) -> None:
+        """Do nothing."""
+
+    def wait(self) -> None:
         """Do nothing."""
 
     def close(self) -> None:
@@ -341,3 +357,84 @@ def test_wrong_keys_do_no_harm_on_any_screen(state: Callable[[], Happening], key
     sent = played(happening, play).sent
     # Nothing is sent that means nothing to the sequence now; a quit goes through in every state.
     assert {type(command) for command in sent} <= {*happening.board().allowed, Quit, Judge, GoTo}
+
+
+async def type_into(pilot: Pilot[None], app: StationApp, text: str) -> None:
+    assert isinstance(app.screen, TemperatureQuestion)
+    app.screen.query_one(Input).value = text
+    await pilot.press("enter")
+    await pilot.pause()
+
+
+def test_the_temperature_of_the_shop_is_noted_at_any_time() -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("t")
+        await type_into(pilot, app, "warm")
+        assert "warm is no temperature" in str(app.screen.query_one(Static).visual)
+        await type_into(pilot, app, "20,9")
+        assert not isinstance(app.screen, TemperatureQuestion)
+
+    assert played(announced(), play).sent == [Note(ambient_temp_c=20.9)]
+
+
+def test_the_temperature_after_circles_is_asked_for_before_the_session_is_left() -> None:
+    async def noted(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("q")
+        await type_into(pilot, app, "21")
+
+    async def without(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("q")
+        assert isinstance(app.screen, TemperatureQuestion)
+        await pilot.press("escape")
+
+    async def not_asked(pilot: Pilot[None], _app: StationApp) -> None:
+        await pilot.press("q")
+
+    after_a_circle = complete().command(Accept())
+    assert played(after_a_circle, noted).sent == [Note(ambient_temp_c=21.0), Quit()]
+    assert played(complete().command(Accept()), without).sent == [Quit()]
+    assert played(announced(), not_asked).sent == [Quit()]
+    # Somebody noted it behind the last circle.
+    assert played(complete().command(Accept(), Note(ambient_temp_c=20.5)), not_asked).sent == [Quit()]
+    assert Quit() in played(complete().command(Note("a chip")), without).sent
+
+
+def test_behind_the_last_circle_it_is_written_into_the_session(tmp_path: Path) -> None:
+    folder = tmp_path / "session"
+    shutil.copytree(shipped_folder("fixtures") / "sessions" / "sealed", folder)
+    happening = finished()
+    opened = replace(happening.events[0], session=str(folder))
+
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("e")
+        await type_into(pilot, app, "20.9")
+        while not isinstance(app.screen, ResultsScreen):
+            await pilot.pause(0.02)
+            app.look()
+        assert not app.board.temperature_due
+
+    happening.events[0] = opened
+    assert played(happening, play).sent == []
+    session = read_session(folder)
+    assert [note.ambient_temp_c for note in session.notes] == [20.1, 20.9]
+    assert dict(conditions(session, [], ""))["temperature of the shop"] == "20.4 °C before, 20.9 °C after"
+
+
+def test_a_session_that_another_process_writes_into_says_so_and_can_be_left(tmp_path: Path) -> None:
+    folder = tmp_path / "session"
+    shutil.copytree(shipped_folder("fixtures") / "sessions" / "sealed", folder)
+    happening = finished()
+    happening.events[0] = replace(happening.events[0], session=str(folder))
+
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("q")
+        await type_into(pilot, app, "20.9")
+        while not any("writes into this session" in message.text for message in app.board.messages):
+            await pilot.pause(0.02)
+            app.look()
+        await pilot.press("q")
+        await pilot.press("escape")
+
+    with SessionWriter.open(folder):
+        assert played(happening, play).sent == [Quit()]
+    assert [note.ambient_temp_c for note in read_session(folder).notes] == [20.1]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from textual.events import Key
+from textual.widgets import Input
 
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.machine import read_machine
@@ -31,6 +32,7 @@ from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import GiveUpQuestion
 from dbbstation.tui.reason_question import ReasonQuestion
 from dbbstation.tui.shown import Shown
+from dbbstation.tui.temperature_question import TemperatureQuestion
 from dbbstation.tui.trace_view import TraceView
 
 if TYPE_CHECKING:
@@ -174,6 +176,9 @@ def test_a_whole_plan_with_every_verdict(short_plan: InlinePlan, tmp_path: Path)
         assert "ccw ✓ accepted" in row(app, "runs")
         assert "1 of 2 accepted" in row(app, "progress")
         await press(app, "q")
+        await until(pilot, lambda: isinstance(app.screen, TemperatureQuestion))
+        app.screen.query_one(Input).value = "20,9"
+        await press(app, "enter")
 
     with switched_on(short_plan, tmp_path / "session") as bench:
         bench.press_all(play)
@@ -283,6 +288,8 @@ def test_a_verdict_that_was_not_given_is_asked_for_again(short_plan: InlinePlan,
     async def leave(pilot: Pilot[None], app: StationApp) -> None:
         await circle(pilot, app)
         await press(app, "q")
+        await until(pilot, lambda: isinstance(app.screen, TemperatureQuestion))
+        await press(app, "escape")
         await until(pilot, lambda: app.board.state is State.STOPPED)
 
     async def go_on(pilot: Pilot[None], app: StationApp) -> None:

@@ -29,6 +29,7 @@ from dbbstation.tui.prepare_screen import PrepareScreen
 from dbbstation.tui.question import YesQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.start_screen import StartScreen
+from dbbstation.tui.temperature_question import TemperatureQuestion
 from tests.tui.test_screen import one_circle, press
 
 if TYPE_CHECKING:
@@ -106,6 +107,20 @@ async def choose_all(pilot: Pilot[None], app: StationApp) -> None:
     await until(pilot, lambda: "is switched on when it is needed" in now(app))
 
 
+async def confirm_all(pilot: Pilot[None], app: StationApp) -> None:
+    """Confirm the checklist and begin."""
+    await until(pilot, on(app, PrepareScreen))
+    await press(app, "y", "b")
+    await until(pilot, on(app, MeasureScreen))
+
+
+async def answer_temperature(pilot: Pilot[None], app: StationApp, text: str) -> None:
+    """Answer the question for the temperature after the circles; empty: go on without."""
+    await until(pilot, on(app, TemperatureQuestion))
+    app.screen.query_one("Input").value = text
+    await press(app, "enter")
+
+
 async def measured(pilot: Pilot[None], app: StationApp, runs: int) -> None:
     """Run and accept circles until so many count."""
     while app.board.accepted < runs:
@@ -145,12 +160,12 @@ def test_from_the_start_screen_to_the_path_of_the_report(front: Front) -> None:
         await press(app, "b")  # not before everything is confirmed
         await press(app, "enter", "down", "enter", "enter")
         await until(pilot, lambda: "3 of 4" in now(app))
-        await press(app, "y", "b")
-        await until(pilot, on(app, MeasureScreen))
+        await confirm_all(pilot, app)
         await measured(pilot, app, 3)
         await until(pilot, lambda: app.board.finished is not None)
         assert len(app.board.tasks) == 3
         await press(app, "e")
+        await answer_temperature(pilot, app, "20.9")
         await until(pilot, on(app, ResultsScreen))
         await press(app, "p")  # there is no model yet
         await press(app, "c")
@@ -166,13 +181,14 @@ def test_from_the_start_screen_to_the_path_of_the_report(front: Front) -> None:
         await press(app, "q")
         await until_start(pilot, app)
         await until(pilot, lambda: len(rows(app)) == 1)
-        assert "session" in rows(app)[0]
-        assert "complete" in rows(app)[0]
+        assert all(word in rows(app)[0] for word in ("session", "complete"))
         await press(app, "q")
         await until(pilot, lambda: app._exit)
 
     play(front, keys)
-    runs = read_session(front.under / "session").runs
+    session = read_session(front.under / "session")
+    runs = session.runs
+    assert [note.ambient_temp_c for note in session.notes] == [20.9]
     assert [run.state for run in runs].count(RunState.ACCEPTED) == 3
     results = front.under / "session-results"
     assert {path.name for path in results.iterdir()} >= {"model.yaml", "report.html"}
@@ -190,12 +206,11 @@ def test_a_session_is_gone_on_with_where_it_was_left(front: Front) -> None:
         await until(pilot, on(app, NewScreen))
         await choose(pilot, app, Part.PLAN, "plan.yaml")
         await press(app, "b")
-        await until(pilot, on(app, PrepareScreen))
-        await press(app, "y", "b")
-        await until(pilot, on(app, MeasureScreen))
+        await confirm_all(pilot, app)
         await measured(pilot, app, 1)
         await until(pilot, lambda: app.board.state is State.ANNOUNCED)
         await press(app, "q")
+        await answer_temperature(pilot, app, "")
         await until_start(pilot, app)
 
     async def second(pilot: Pilot[None], app: StationApp) -> None:

@@ -122,11 +122,15 @@ def test_one_circle_is_measured_and_accepted_wrong_keys_and_all(terminal: Termin
     terminal.press("a")
     terminal.until("low-ccw-1 accepted")
     terminal.press("q")
+    terminal.until("Temperature of the shop now")
+    terminal.press("21.5\r")
     assert terminal.exit_code() == 0
     assert terminal.restored()
     assert f"{tmp_path / 'session'}: 1 of 6 runs accepted" in terminal.shown
-    (run,) = read_session(tmp_path / "session").runs
+    session = read_session(tmp_path / "session")
+    (run,), (note,) = session.runs, session.notes
     assert (run.label, run.state) == ("low ccw 1", RunState.ACCEPTED)
+    assert note.ambient_temp_c == 21.5
 
 
 def test_a_polite_kill_in_mid_circle_keeps_the_recording_and_the_terminal(terminal: Terminal, tmp_path: Path) -> None:

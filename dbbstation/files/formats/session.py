@@ -1,4 +1,4 @@
-"""`dbb-session/3`, which has all of `dbb-session/1` and `/2`: what was done in a session, one entry per run."""
+"""`dbb-session/4`, which has all of `dbb-session/1` to `/3`: what was done in a session, one entry per run."""
 
 from datetime import datetime
 from pathlib import PurePosixPath
@@ -190,7 +190,7 @@ class NoteSchema(Schema):
 class SessionFile(Schema):
     """What was done: where the machine and plan stand, the bar, one entry per run."""
 
-    format: Literal["dbb-session/1", "dbb-session/2", "dbb-session/3"]
+    format: Literal["dbb-session/1", "dbb-session/2", "dbb-session/3", "dbb-session/4"]
     """Name and version of this format."""
     machine: InsidePath
     """The nominal model that the controller had while measuring, `dbb-machine/1`."""
@@ -200,6 +200,8 @@ class SessionFile(Schema):
     """Of the machine."""
     operator: str = ""
     """Who measured."""
+    job: str = ""
+    """Job or order number: what it was measured for."""
     ambient_temp_c: TemperatureDegc | None = None
     """Temperature of the shop [degC]."""
     bar: BarSchema | None = None

@@ -27,7 +27,7 @@ from dbbstation.files.recordings.session import SESSION_FILE
 from dbbstation.files.recordings.session_text import seal_data
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.files.yaml.out import yaml_text
-from dbbstation.files.yaml.schema import format_of, validate
+from dbbstation.files.yaml.schema import format_for, validate
 from dbbstation.files.yaml.text import parse_yaml
 
 if TYPE_CHECKING:
@@ -161,8 +161,9 @@ def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, t
 
 
 def _with_seal(text: str, seal: Seal) -> str:
-    """The text with the seal before the list of runs, in the version of the format that has one."""
-    root = YAML(typ="safe", pure=True).compose(text)
+    """The text with the seal before the list of runs, in the oldest version of the format that has all its keys."""
+    yaml = YAML(typ="safe", pure=True)
+    root = yaml.compose(text)
     starts = {name.value: name.start_mark.index for name, _ in root.value}
     begin = starts.get("seal", starts.get("set_up_errors", starts["runs"]))
     after = [start for start in starts.values() if start > begin]
@@ -170,7 +171,8 @@ def _with_seal(text: str, seal: Seal) -> str:
     line = yaml_text({"seal": seal_data(seal)})
     given = next(value for name, value in root.value if name.value == "format")
     text = text[:begin] + line + text[end:]
-    return text[: given.start_mark.index] + format_of(SessionFile) + text[given.end_mark.index :]
+    version = format_for(SessionFile, yaml.load(text))
+    return text[: given.start_mark.index] + version + text[given.end_mark.index :]
 
 
 def _runs(text: str, path: Path) -> Sequence[MappingNode]:

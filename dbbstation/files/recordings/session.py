@@ -287,6 +287,7 @@ def parse_session(
         seal=seal,
         amendments=tuple(map(amendment_entry, session.amendments)),
         notes=tuple(map(note_entry, session.notes)),
+        job=session.job,
     )
 
 

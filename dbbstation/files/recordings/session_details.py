@@ -26,6 +26,7 @@ class SessionDetails:
         seal: hashes of machine, plan and jig, and the end of the chain of runs.
         amendments: what was changed on purpose after it was sealed.
         notes: what was noted while it was measured, oldest first.
+        job: job or order number, what it is measured for.
     """
 
     serial_number: str = ""
@@ -37,6 +38,7 @@ class SessionDetails:
     seal: Seal | None = None
     amendments: tuple[Amendment, ...] = ()
     notes: tuple[Note, ...] = ()
+    job: str = ""
 
     @property
     def noted(self) -> bool:

@@ -35,6 +35,7 @@ def session_text(folder: Path, names: Sequence[str], details: SessionDetails, ru
         "plan": names[1],
         "serial_number": details.serial_number,
         "operator": details.operator,
+        "job": details.job or None,
         "ambient_temp_c": details.ambient_temp_c,
         "bar": bar and {each.name: _plain(getattr(bar, each.name)) for each in fields(bar)},
         "bar_waiver": details.bar_waiver or None,

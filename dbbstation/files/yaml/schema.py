@@ -59,6 +59,7 @@ SINCE: dict[str, dict[str, int]] = {
         "chain_sha256": 3,
         "counts": 3,
         "notes": 3,
+        "job": 4,
         **dict.fromkeys(_OF_BARS, 3),
     },
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},

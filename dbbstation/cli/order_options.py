@@ -1,0 +1,44 @@
+"""Options that say in which order the tests of a plan are measured."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dbbstation.files.formats.plan import InlinePlan
+
+_Function = TypeVar("_Function", bound="Callable[..., Any]")
+
+# The values of `Order` and `Gate`; a test holds them together, so that no command waits for what those import.
+ORDERS, GATES = ("plan", "holder", "drift"), ("plan", "first", "holders")
+
+_ORDER = click.option(
+    "--order",
+    type=click.Choice(ORDERS),
+    default="plan",
+    show_default=True,
+    help="As the plan has its tests; by holder and ball, each put up once; or heights in turn, apart from drift.",
+)
+_GATE = click.option(
+    "--gate",
+    type=click.Choice(GATES),
+    default="plan",
+    show_default=True,
+    help="What is repeated at the end to show drift, where the plan names nothing: the first test, or that of each holder.",
+)
+
+
+def order_options(function: _Function) -> _Function:
+    """Give a command `--order` and `--gate`."""
+    return _ORDER(_GATE(function))
+
+
+def in_order(plan: InlinePlan, order: str, gate: str) -> InlinePlan:
+    """Return the plan in the order that was asked for."""
+    from dbbstation.service.order import Gate, Order, ordered
+
+    return ordered(plan, Order(order), Gate(gate))

@@ -1,0 +1,132 @@
+"""In which order the tests of a plan are run: with few changes of holder, or so that a drift does not look like an effect of height."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.plan.plan import Plan
+
+LARGEST_LEAK = 0.05
+"""Correlation of height and drift up to which an order counts as separating them: a drift of 10 µm then looks like less than 0.5 µm
+of an effect of height, less than a holder is put back to. On Table II, 0.05 and 0.1 give the same order with 4 changes of holder, 0.02 takes
+7, and the plan's own order has 2 and a correlation of 0.945 (tests/plan/test_order.py)."""
+
+_STARTS = 40
+"""Orders from which the search begins, beside the plan's own and that by holder. With 40 it finds what trying all orders finds
+(tests/plan/test_order.py); each takes some milliseconds."""
+
+_SEED = 0
+"""Of these orders: the same plan always gets the same order, so that a session can be gone on with."""
+
+_TINY = 1e-9
+"""Correlations that differ by less are the same but for rounding."""
+
+
+def by_holder(plan: Plan) -> tuple[str, ...]:
+    """Return the tests by holder and then by ball, both as the plan names them first: each is put up once."""
+    balls = {test.ball.name: test.ball.holder for test in plan.tests.values()}
+    holders, names = list(dict.fromkeys(balls.values())), list(balls)
+    tests = sorted(plan.tests.values(), key=lambda test: (holders.index(test.ball.holder), names.index(test.ball.name)))
+    return tuple(test.name for test in tests)
+
+
+def against_drift(plan: Plan) -> tuple[str, ...]:
+    """Return the tests in an order in which the height of their circles follows no drift.
+
+    What counts, in this order: no more than `LARGEST_LEAK` of correlation with a steady drift; the same with one that bends, such as
+    a warm-up; few balls to be put up; few changes of holder. Every test counts as one step of time: putting up a ball takes longer
+    than its circles. The best order is searched by exchanging and moving tests, from several orders.
+    """
+    names = list(plan.tests)
+    tests = [plan.tests[name] for name in names]
+    balls = np.unique([test.ball.name for test in tests], return_inverse=True)[1]
+    holders = np.unique([test.ball.holder for test in tests], return_inverse=True)[1]
+    heights = np.array([test.circle.centre_mm[2] for test in tests])
+    rng = np.random.default_rng(_SEED)
+    first = [np.arange(len(names)), np.array([names.index(name) for name in by_holder(plan)])]
+    found = [
+        _improved(order, heights, balls, holders)
+        for order in (*first, *(rng.permutation(len(names)) for _ in range(_STARTS)))
+    ]
+    costs = np.concatenate([_costs(order[None, :], heights, balls, holders) for order in found])
+    return tuple(names[k] for k in found[_least(costs)])
+
+
+def height_and_drift(heights_mm: Sequence[float], degree: int = 2) -> float:
+    """Return the multiple correlation coefficient of heights, in the order they are measured, with a drift in equal steps of time.
+
+    Args:
+        heights_mm: of the circles of successive tests, shape (n,) [mm].
+        degree: 1: a steady drift; 2: also one that bends.
+
+    Returns:
+        0: a drift cannot be taken for an effect of height; 1: nothing tells them apart. 0 where all heights are the same.
+    """
+    return float(_correlations(np.array([heights_mm], dtype=np.float64), degree)[0])
+
+
+def mountings(plan: Plan, names: Sequence[str]) -> int:
+    """Return how often a ball is put up where tests are measured in an order."""
+    balls = [plan.tests[name].ball.name for name in names]
+    return sum(k == 0 or balls[k] != balls[k - 1] for k in range(len(balls)))
+
+
+def _improved(
+    order: NDArray[np.intp], heights: NDArray[np.float64], balls: NDArray[np.intp], holders: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """The order that no exchange of two tests, and no move of one, makes better."""
+    at = _costs(order[None, :], heights, balls, holders)[0]
+    while True:
+        near = _neighbours(order)
+        costs = _costs(near, heights, balls, holders)
+        best = _least(costs)
+        if tuple(costs[best]) >= tuple(at):
+            return order
+        order, at = near[best], costs[best]
+
+
+def _neighbours(order: NDArray[np.intp]) -> NDArray[np.intp]:
+    """The order itself, and every order by one exchange or one move from it, shape (m, n)."""
+    n = len(order)
+    near = [order]
+    for i in range(n):
+        rest = np.delete(order, i)
+        near += [np.insert(rest, j, order[i]) for j in range(n) if j != i]
+        for j in range(i + 2, n):
+            swapped = order.copy()
+            swapped[[i, j]] = swapped[[j, i]]
+            near.append(swapped)
+    return np.array(near)
+
+
+def _costs(
+    orders: NDArray[np.intp], heights: NDArray[np.float64], balls: NDArray[np.intp], holders: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """What is to be small, the first column first, shape (m, 4)."""
+    in_order = heights[orders]
+    leaks = [np.maximum(_correlations(in_order, degree) - LARGEST_LEAK, 0.0) for degree in (1, 2)]
+    changes = [np.count_nonzero(np.diff(each[orders], axis=1), axis=1) for each in (balls, holders)]
+    return np.stack([*(np.round(leak / _TINY) * _TINY for leak in leaks), *changes], axis=1)
+
+
+def _least(costs: NDArray[np.float64]) -> int:
+    return int(np.lexsort(costs.T[::-1])[0])
+
+
+def _correlations(heights: NDArray[np.float64], degree: int) -> NDArray[np.float64]:
+    """Multiple correlation coefficients of rows of heights, shape (m, n), with polynomials of their place, shape (m,)."""
+    n = heights.shape[1]
+    off = heights - heights.mean(axis=1, keepdims=True)
+    size = np.linalg.norm(off, axis=1)
+    if n < 2 or not size.any():  # noqa: PLR2004 - one test has no order
+        return np.zeros(len(heights))
+    drift = np.vander(np.linspace(-1.0, 1.0, n), min(degree, n - 1) + 1, increasing=True)
+    basis = np.linalg.qr(drift)[0][:, 1:]  # the first column is the mean, which is gone
+    return np.minimum(np.linalg.norm(off @ basis, axis=1) / size, 1.0)

@@ -1,0 +1,42 @@
+"""The temperature of the shop: as somebody types it, and noted in a session that nothing is being recorded into."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from pydantic import TypeAdapter, ValidationError
+
+from dbbstation.files.formats.quantities import TemperatureDegc
+from dbbstation.files.recordings.entries import Note
+from dbbstation.files.recordings.session_writer import SessionWriter
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_NOTED: TypeAdapter[float] = TypeAdapter(TemperatureDegc)
+
+
+def shop_degc(text: str) -> float | None:
+    """Return the temperature that a text is [degC], also with a decimal comma; None where no session file may hold it."""
+    try:
+        return _NOTED.validate_python(float(text.replace(",", ".")))
+    except (ValueError, ValidationError):
+        return None
+
+
+def note_temperature(folder: Path, degc: float) -> None:
+    """Note the temperature of now; while a sequence runs, it takes a `Note` instead.
+
+    Args:
+        folder: of the session.
+        degc: temperature of the shop [degC].
+
+    Raises:
+        InputError: the session has faults.
+        OutputError: another process writes into it, or the disk refuses.
+    """
+    with SessionWriter.open(folder) as writer:
+        # On a virtual machine that runs faster than real time, runs bear times ahead of now.
+        moments = [run.started for run in writer.runs if run.started is not None]
+        writer.note(Note(max([datetime.now(UTC), *moments]), ambient_temp_c=degc))

@@ -280,8 +280,8 @@ def test_programs_are_written_beside_the_session_and_commanded_by(front: Front) 
     plan = read_plan(PLAN)
     runs = [(name, way) for name, test in plan.tests.items() for way in test.directions]
     assert count == again == len(runs)
-    assert (Path(folder).name, Path(other).name) == ("virtual-programs", "virtual-programs-2")
-    prepared = front.prepare(replace(choice, programs=Path(folder)))
+    assert (folder.name, other.name) == ("virtual-programs", "virtual-programs-2")
+    prepared = front.prepare(replace(choice, programs=folder))
     assert set(prepared.job.programs) == set(runs)
 
 

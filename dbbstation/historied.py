@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.inputs import note_known
-from dbbstation.files.kept import Kept, stamp_of
+from dbbstation.files.kept import Kept, Stamp, stamp_of
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
-from dbbstation.files.recordings.session import SESSION_FILE
+from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.history.order import date_faults
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.history.trend import histories
+from dbbstation.processes import each
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.history.trend import Asked, MachineHistory
@@ -68,9 +72,9 @@ def load_history(
     """
     found = files_of(folder)
     with Kept(folder, begin_anew=rebuild) as kept:
-        reading = _Reading(kept, source_files, progress, len(found.sessions) + len(found.models))
-        sessions = [one for name, path in found.sessions.items() if (one := reading.session(name, path)) is not None]
-        models = [model for name, path in found.models.items() if (model := reading.model(name, path)) is not None]
+        reading = _Reading(kept, progress, len(found.sessions) + len(found.models))
+        sessions = reading.every(found.sessions, _session_of, _session_data, _processes_for)
+        models = reading.every(found.models, model_from, partial(_model_data, source_files=tuple(source_files)))
         kept.drop_others([*found.sessions, *found.models])
         notes = [kept.problem] if kept.problem else []
     progress(reading.of, reading.of)
@@ -98,6 +102,15 @@ def load_history(
 _Kind = TypeVar("_Kind", SessionFigures, ModelFigures)
 
 
+@dataclass(frozen=True)
+class _File:
+    """A file of the folder: its path in it, its path, and its stamp before it was read."""
+
+    name: str
+    path: Path
+    stamp: Stamp
+
+
 class _Reading:
     """Reads sessions and models, from the index where it knows them.
 
@@ -107,75 +120,120 @@ class _Reading:
         worked_out: how many were read.
     """
 
-    def __init__(self, kept: Kept, source_files: Sequence[Path], progress: Callable[[int, int], None], of: int) -> None:
+    def __init__(self, kept: Kept, progress: Callable[[int, int], None], of: int) -> None:
         self.of = of
         self.left_out: list[tuple[str, str]] = []
         self.worked_out = 0
         self._kept = kept
-        self._source_files = source_files
         self._progress = progress
         self._done = 0
 
-    def session(self, name: str, path: Path) -> SessionFigures | None:
-        """Return the figures of a session; None where it cannot be read."""
-        folder = name.removesuffix(f"/{SESSION_FILE}")
-        return self._figures(name, folder, path, self._session_data, lambda data: session_from(data, folder))
-
-    def model(self, name: str, path: Path) -> ModelFigures | None:
-        """Return the parameters of a model; None where it cannot be read."""
-        return self._figures(name, name, path, self._model_data, lambda data: model_from(data, name))
-
-    def _figures(
+    def every(
         self,
-        name: str,
-        called: str,
-        path: Path,
-        work: Callable[[Path], dict[str, Any]],
-        taken: Callable[[dict[str, Any]], _Kind],
-    ) -> _Kind | None:
-        self._progress(self._done, self.of)
+        files: Mapping[str, Path],
+        taken: Callable[[dict[str, Any], str], _Kind],
+        work: Callable[[Path], dict[str, Any] | str],
+        processes: Callable[[Sequence[Path]], int] = lambda _paths: 1,
+    ) -> list[_Kind]:
+        """Return the figures of all files that can be read, in their order.
+
+        Args:
+            files: by name.
+            taken: makes figures of what is kept, and of a file's name.
+            work: works out what is kept, or says why it cannot.
+            processes: how many to work such files out with.
+        """
+        found: dict[str, _Kind] = {}
+        reasons: dict[str, str] = {}
+        unknown: dict[str, list[_File]] = {}
+        for name, path in files.items():
+            try:
+                file = _File(name, path, stamp_of(path))
+                one = _understood(self._kept.of(name, file.stamp), taken, name)
+                if one is None:
+                    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+                    text = self._kept.of_content(digest)
+                    one = _understood(text, taken, name)
+                    if text is None or one is None:
+                        unknown.setdefault(digest, []).append(file)
+                        continue
+                    self._kept.keep(name, file.stamp, digest, text)
+                found[name] = one
+            except OSError as error:
+                reasons[name] = reason_of(error)
+            self._count()
+        digests, paths = list(unknown), [same[0].path for same in unknown.values()]
+        with closing(each(work, paths, processes(paths))) as outcomes:
+            for place, outcome in outcomes:
+                digest = digests[place]
+                self.worked_out += 1
+                for file in unknown[digest]:
+                    if isinstance(outcome, str):
+                        reasons[file.name] = outcome
+                    else:
+                        text = json.dumps({**outcome, "sha256": digest}, allow_nan=False)
+                        found[file.name] = taken(json.loads(text), file.name)
+                        self._kept.keep(file.name, file.stamp, digest, text)
+                    self._count()
+        self.left_out += [(_called(name), reasons[name]) for name in files if name in reasons]
+        for name in (name for name in files if name in found):
+            note_known(files[name], found[name].sha256)
+        return [found[name] for name in files if name in found]
+
+    def _count(self) -> None:
         self._done += 1
-        try:
-            stamp = stamp_of(path)
-            found = _understood(self._kept.of(name, stamp), taken)
-            if found is None:
-                digest = hashlib.sha256(path.read_bytes()).hexdigest()
-                text = self._kept.of_content(digest)
-                found = _understood(text, taken)
-                if text is None or found is None:
-                    text = self._worked_out(path, digest, work)
-                    found = taken(json.loads(text))
-                self._kept.keep(name, stamp, digest, text)
-        except StationError as error:
-            self.left_out.append((called, _first_of(error)))
-            return None
-        except OSError as error:
-            self.left_out.append((called, reason_of(error)))
-            return None
-        note_known(path, found.sha256)
-        return found
+        self._progress(self._done, self.of)
 
-    def _worked_out(self, path: Path, digest: str, work: Callable[[Path], dict[str, Any]]) -> str:
-        self.worked_out += 1
-        return json.dumps({**work(path), "sha256": digest}, allow_nan=False)
 
-    def _session_data(self, path: Path) -> dict[str, Any]:
-        from dbbstation.session_figures import session_figures  # noqa: PLC0415 - whoever opens an index does not wait for the compiler
+RUNS_WORTH_PROCESSES = 300
+"""Recordings from which on other cores help: ten seconds of work; a process needs two until it has begun."""
 
+
+def _processes_for(sessions: Sequence[Path]) -> int:
+    """Return how many processes are worth starting for sessions that have to be worked out."""
+    runs = sum(1 for path in sessions for _ in path.parent.glob("runs/*.csv"))
+    return min(os.cpu_count() or 1, len(sessions)) if runs >= RUNS_WORTH_PROCESSES else 1
+
+
+def _session_data(path: Path) -> dict[str, Any] | str:
+    """Return what is kept of a session, or why it cannot be read."""
+    from dbbstation.session_figures import session_figures  # noqa: PLC0415 - whoever opens an index does not wait for the compiler
+
+    try:
         data = asdict(session_figures(path.parent))
-        data["started"] = None if data["started"] is None else data["started"].isoformat()
-        return data
-
-    def _model_data(self, path: Path) -> dict[str, Any]:
-        from dbbstation.session_figures import model_figures  # noqa: PLC0415 - the same
-
-        return asdict(model_figures(path, self._source_files))
+    except (StationError, OSError) as error:
+        return _why(error)
+    data["started"] = None if data["started"] is None else data["started"].isoformat()
+    return data
 
 
-def _understood(text: str | None, taken: Callable[[dict[str, Any]], _Kind]) -> _Kind | None:
+def _model_data(path: Path, source_files: Sequence[Path]) -> dict[str, Any] | str:
+    """Return what is kept of a model, or why it cannot be read."""
+    from dbbstation.session_figures import model_figures  # noqa: PLC0415 - the same
+
+    try:
+        return asdict(model_figures(path, source_files))
+    except (StationError, OSError) as error:
+        return _why(error)
+
+
+def _why(error: StationError | OSError) -> str:
+    return reason_of(error) if isinstance(error, OSError) else _first_of(error)
+
+
+def _called(name: str) -> str:
+    """Return the name of a file, of a session that of its folder."""
+    return name.removesuffix(f"/{SESSION_FILE}")
+
+
+def _session_of(data: dict[str, Any], name: str) -> SessionFigures:
+    return session_from(data, _called(name))
+
+
+def _understood(text: str | None, taken: Callable[[dict[str, Any], str], _Kind], name: str) -> _Kind | None:
     """Return what a kept text says; None where there is none, or where somebody else wrote it."""
     try:
-        return None if text is None else taken(json.loads(text))
+        return None if text is None else taken(json.loads(text), name)
     except (AttributeError, KeyError, TypeError, ValueError):
         return None
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.diagnosed import diagnose_sessions
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
-from studies.fleet import deaf, processes
+from dbbstation.processes import deaf, processes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

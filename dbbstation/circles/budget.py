@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -224,8 +225,14 @@ def _expected_extreme(one: CircleAnalysis) -> float:
 
 def _between_samples_um(one: CircleAnalysis) -> float:
     """Height that a peak may have between two samples, of the form up to 50 undulations per revolution [µm]."""
-    form = gaussian(one.path.theta_deg, 1e3 * one.path.least_squares.deviation_mm, _FORM_UPR)
-    return float(np.abs(np.diff(form, 2)).max(initial=0.0)) / 8.0
+    if one not in _BETWEEN:
+        form = gaussian(one.path.theta_deg, 1e3 * one.path.least_squares.deviation_mm, _FORM_UPR)
+        _BETWEEN[one] = float(np.abs(np.diff(form, 2)).max(initial=0.0)) / 8.0
+    return _BETWEEN[one]
+
+
+_BETWEEN: WeakKeyDictionary[CircleAnalysis, float] = WeakKeyDictionary()
+"""Such heights, which the budgets of a circle, of its pair and of a tolerance ask for."""
 
 
 _FORM_UPR = 50.0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.plan.circle import FULL_TURN_DEG
-from dbbstation.trace.analysis import BallPath, best_circle, horizontal_radius_mm, path_about_ball
+from dbbstation.trace.analysis import BallPath, best_circle, horizontal_radius_mm, measured_path, path_about_ball
 from dbbstation.trace.gaussian import gaussian
 from dbbstation.trace.minimum_zone import MinimumZone, minimum_zone
 
@@ -72,7 +72,7 @@ def path_of(raw: RawCircle, chosen: Filter = Filter.NONE) -> CirclePath:
         TraceError: the points do not determine a circle.
     """
     about_ball = horizontal_radius_mm(raw, raw.length_mm)
-    path = path_about_ball(raw.theta_deg, about_ball)
+    path = measured_path(raw)
     if chosen:
         about_ball = about_ball - path.deviation_mm + gaussian(path.theta_deg, path.deviation_mm, chosen)
         path = path_about_ball(raw.theta_deg, about_ball)

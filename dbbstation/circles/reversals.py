@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.harmonics import amplitudes
 from dbbstation.plan.circle import FULL_TURN_DEG
 
 if TYPE_CHECKING:
@@ -112,12 +113,9 @@ def _line_at(
 
 def harmonics_of(path: CirclePath) -> tuple[Harmonic, ...]:
     """Return the undulations of a path about its least-squares circle, 2 to 10 per revolution."""
-    theta = np.radians(path.theta_deg)
     orders = np.arange(1, HIGHEST_HARMONIC + 1)
-    waves = np.exp(1j * np.outer(theta, orders))
-    columns = np.hstack([np.ones((len(theta), 1)), waves.real, waves.imag])
-    found, *_ = np.linalg.lstsq(columns, 1e3 * path.least_squares.deviation_mm, rcond=None)
-    cosine, sine = found[1 : HIGHEST_HARMONIC + 1], found[HIGHEST_HARMONIC + 1 :]
+    found = amplitudes(1e3 * path.least_squares.deviation_mm, np.radians(path.theta_deg), HIGHEST_HARMONIC)
+    cosine, sine = found.real[1:], -found.imag[1:]
     peaks = np.mod(np.degrees(np.arctan2(sine, cosine)) / orders, FULL_TURN_DEG / orders)
     return tuple(
         Harmonic(int(k), float(np.hypot(c, s)), float(peak))

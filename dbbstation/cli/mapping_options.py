@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from dbbstation.cli.number_options import SEPARATOR, number_language, shops_numbers
 from dbbstation.cli.number_types import Finite
 
 if TYPE_CHECKING:
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
 
     from dbbstation.cli.asking import Asker
     from dbbstation.files.formats.mapping import MappingFile
+    from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.files.recordings.foreign_csv import ForeignTable
     from dbbstation.imported.proposal import Proposed
 
@@ -51,6 +54,14 @@ _OPTIONS = (
     click.option("--zero-mm", type=Finite(20, 2000), help="Length of the bar at which the deviation is 0 [mm]."),
     click.option("--file-name", metavar="PATTERN", help="What names of files say, such as '{test}_{direction}'."),
     click.option(
+        "--decimal",
+        type=click.Choice([".", ","]),
+        help="Decimal sign in the files  [default: the shop's, else found by looking].",
+    ),
+    click.option(
+        "--separator", type=SEPARATOR, metavar="[comma|semicolon|tab]", help="What stands between columns  [likewise]."
+    ),
+    click.option(
         "--encoding", type=click.Choice(["utf-8", "utf-16", "cp1252"]), help="Of the files' text  [default: utf-8]."
     ),
 )
@@ -63,6 +74,8 @@ MAPPING_OPTIONS = (
     "trace",
     "zero_mm",
     "file_name",
+    "decimal",
+    "separator",
     "encoding",
 )
 """Names of the parameters that they fill."""
@@ -76,7 +89,9 @@ def mapping_options(function: _Function) -> _Function:
 
 
 def read_tables(files: Sequence[Path], options: Mapping[str, Any]) -> dict[Path, ForeignTable]:
-    """Read all files, as the mapping says where there is one.
+    """Read all files: as the mapping says where it says how numbers are written, else as the options, else as the shop's settings.
+
+    Where nobody says it, it is found by looking. So it is with tables that this program exported, whatever the shop writes.
 
     Raises:
         InputError: every fault of every file.
@@ -84,10 +99,10 @@ def read_tables(files: Sequence[Path], options: Mapping[str, Any]) -> dict[Path,
     """
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.formats.mapping import read_mapping
-    from dbbstation.files.formats.number_language import NumberLanguage
-    from dbbstation.files.recordings.foreign_csv import read_foreign
 
-    language, encoding = None, options["encoding"] or "utf-8"
+    decimal, separator = options["decimal"], options["separator"]
+    language = number_language(decimal, separator) if decimal or separator else None
+    encoding = options["encoding"] or "utf-8"
     kept = _kept(options)
     if kept is not None:
         also = [name for name in MAPPING_OPTIONS[1:] if options[name] not in (None, ())]
@@ -95,17 +110,32 @@ def read_tables(files: Sequence[Path], options: Mapping[str, Any]) -> dict[Path,
             said = ", ".join("--" + ("column" if name == "columns" else name.replace("_", "-")) for name in also)
             raise click.UsageError(f"{options['mapping_file']} says what columns mean: edit it, or leave out {said}")
         mapping = read_mapping(kept)
-        language, encoding = NumberLanguage(mapping.decimal, _SEPARATORS[mapping.separator]), mapping.encoding
+        language, encoding = mapping.numbers, mapping.encoding
+    shops = shops_numbers() if language is None else None
     found: dict[Path, ForeignTable] = {}
     faults: list[Problem] = []
     for path in files:
         try:
-            found[path] = read_foreign(path, language, encoding)
+            found[path] = _read(path, language, shops, encoding)
         except InputError as error:
             faults += error.problems
     if faults:
         raise InputError(faults)
     return found
+
+
+def _read(path: Path, stated: NumberLanguage | None, shops: NumberLanguage | None, encoding: str) -> ForeignTable:
+    """Read one file: as stated, else as the shop writes, where this program did not write it; errors as of `read_foreign`."""
+    from dbbstation.errors import InputError
+    from dbbstation.files.recordings.foreign_csv import read_foreign
+    from dbbstation.imported.proposal import EXPORTED
+
+    if shops is not None:
+        with suppress(InputError):  # what is wrong with it is said as the shop reads it
+            looked = read_foreign(path, None, encoding)
+            if set(looked.table.names) >= EXPORTED:
+                return looked
+    return read_foreign(path, stated or shops, encoding)
 
 
 def chosen_mapping(

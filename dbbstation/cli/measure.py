@@ -132,7 +132,7 @@ def measure(
             protocol, port, baud=baud, clock=clock, log=log, reconnect_s=RECONNECT_S, **driver_patience(time_scale)
         ) as source,
     ):
-        workplace = assemble(job, source, source.unreadable)
+        workplace = assemble(job, source, source.unreadable, asked=protocol.ask.asked)
         if workplace.writer.runs and job.details.noted:
             click.echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)
         interrupted = _run(workplace, hands, as_json=as_json)

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from dbbstation.cli.shop import shop_option
+from dbbstation.cli.output import say
+from dbbstation.cli.shop import shop_option, shop_settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
 _BY_NAME = {"comma": ",", "semicolon": ";", "tab": "\t"}
+
+SEPARATOR = click.Choice([*_BY_NAME, *_BY_NAME.values()])
+"""What may stand between columns."""
 
 
 def number_options(function: _Function) -> _Function:
@@ -30,7 +34,7 @@ def number_options(function: _Function) -> _Function:
         shop_option(
             "--separator",
             setting="numbers.separator",
-            type=click.Choice([*_BY_NAME, *_BY_NAME.values()]),
+            type=SEPARATOR,
             metavar="[comma|semicolon|tab]",
             help="What stands between the columns of the table  [default: comma; semicolon with a decimal comma].",
         ),
@@ -38,6 +42,20 @@ def number_options(function: _Function) -> _Function:
     for option in reversed(options):
         function = option(function)
     return function
+
+
+def shops_numbers() -> NumberLanguage | None:
+    """Return how the shop's settings say that numbers are written, and tell the user; None where they do not say.
+
+    For a command whose options do not take them by themselves, because a file decides first.
+    """
+    values = shop_settings().values
+    found = {key: values[name] for key in ("decimal", "separator") if (name := f"numbers.{key}") in values}
+    if not found:
+        return None
+    texts = ", ".join(f"--{key} {setting.value}" for key, setting in found.items())
+    say(f"settings: {texts} (from {next(iter(found.values())).file})")
+    return number_language(*(str(found[key].value) if key in found else None for key in ("decimal", "separator")))
 
 
 def number_language(decimal: str | None, separator: str | None) -> NumberLanguage:

@@ -61,12 +61,7 @@ def diagnose(
     runs = [thinned(observation) for observation in observations]
     explained = explain(machine, runs, sources, progress)
     progress("verdicts")
-    findings = judge(explained)
-    given_up: set[str] = set()
-    while rather_not := doubtful(explained, findings):
-        given_up |= rather_not
-        explained = without(explained, given_up)
-        findings = judge(explained)
+    explained, findings = judged(explained)
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
     again = found_again(explained, [f.name for f in sorted(findings, key=lambda f: -f.gain)[:RIVALS]])
@@ -94,6 +89,17 @@ def diagnose(
         second_start_agrees=settled.second_start_agrees(),
         next_tests=next_tests(explained, findings, elsewhere),
     )
+
+
+def judged(explained: Explained) -> tuple[Explained, tuple[SourceFinding, ...]]:
+    """Judge every named cause, and take out of the joint model what is rather not there, until nothing of that is in it."""
+    findings = judge(explained)
+    given_up: set[str] = set()
+    while rather_not := doubtful(explained, findings):
+        given_up |= rather_not
+        explained = without(explained, given_up)
+        findings = judge(explained)
+    return explained, findings
 
 
 def doubtful(explained: Explained, findings: Sequence[SourceFinding]) -> set[str]:

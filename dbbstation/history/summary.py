@@ -12,7 +12,7 @@ from dbbstation.history.standardised import BASELINE
 from dbbstation.quality.conformity import Size, conformity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -47,9 +47,10 @@ def history_summary(machines: Sequence[MachineHistory], asked: Asked) -> dict[st
 
 
 def _machine(one: MachineHistory, coverage_factor: float) -> dict[str, Any]:
+    sessions = [_session(session) for session in one.sessions]
     return {
         "machine": one.machine,
-        "sessions": [_session(session) for session in one.sessions],
+        "sessions": sessions,
         "watched_quantities": sum(trend.watched is not None for trend in one.trends),
         "chart": None
         if one.chart is None
@@ -61,7 +62,7 @@ def _machine(one: MachineHistory, coverage_factor: float) -> dict[str, Any]:
         "false_alarms_expected": one.expected,
         "verdicts": {str(verdict): count for verdict, count in sorted(Counter(t.verdict for t in one.trends).items())},
         "changes": list(_changes(one)),
-        "quantities": [_trend(trend, one.sessions, coverage_factor) for trend in one.trends],
+        "quantities": [_trend(trend, sessions, coverage_factor) for trend in one.trends],
     }
 
 
@@ -111,7 +112,7 @@ def _beside(sessions: Sequence[SessionFigures], since: int) -> Iterator[str]:
         )
 
 
-def _trend(trend: Trend, sessions: Sequence[SessionFigures], coverage_factor: float) -> dict[str, Any]:
+def _trend(trend: Trend, sessions: Sequence[Mapping[str, Any]], coverage_factor: float) -> dict[str, Any]:
     watched = trend.watched
     last = Size(abs(float(trend.values[-1])), float(np.nan_to_num(trend.u[-1])))
     return {
@@ -138,17 +139,17 @@ def _trend(trend: Trend, sessions: Sequence[SessionFigures], coverage_factor: fl
     }
 
 
-def _event(event: Event, trend: Trend, sessions: Sequence[SessionFigures]) -> dict[str, Any]:
+def _event(event: Event, trend: Trend, sessions: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "verdict": str(event.verdict),
-        "since": sessions[trend.at[event.since]].name,
-        "found": sessions[trend.at[event.found]].name,
+        "since": sessions[trend.at[event.since]]["name"],
+        "found": sessions[trend.at[event.found]]["name"],
         "difference": event.difference,
         "u_difference": event.u_difference,
     }
 
 
-def _values(trend: Trend, sessions: Sequence[SessionFigures]) -> list[dict[str, Any]]:
+def _values(trend: Trend, sessions: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return every value of a trend with what the chart made of it."""
     at, watched = trend.at.tolist(), trend.watched
     columns: dict[str, list[float | None]] = {"value": trend.values.tolist(), "u": _numbers(trend.u)}
@@ -156,8 +157,8 @@ def _values(trend: Trend, sessions: Sequence[SessionFigures]) -> list[dict[str, 
         columns[name] = [None] * len(at) if watched is None else _numbers(getattr(watched, name))
     return [
         {
-            "session": sessions[k].name,
-            "started": _date(sessions[k]),
+            "session": sessions[k]["name"],
+            "started": sessions[k]["started"],
             "value": value,
             "u": u,
             "level": level,

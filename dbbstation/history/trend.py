@@ -204,6 +204,10 @@ def _circle_series(sessions: Sequence[SessionFigures], asked: Asked) -> dict[Sub
             for place, figure in enumerate(repeats[0]):
                 one = found.setdefault(Subject(figure.name, test, direction, circle), _Series())
                 one.at.append(k)
+                if len(repeats) == 1:  # as most are, and means take half of the time that a history opens in
+                    one.values.append(figure.value_um)
+                    one.u.append(figure.u_um)
+                    continue
                 one.values.append(fmean(figures[place].value_um for figures in repeats))
                 # What repeats do not share averages out; what is stated holds mostly what they share.
                 one.u.append(sqrt(fmean(figures[place].u_um ** 2 for figures in repeats)))

@@ -79,7 +79,8 @@ def _near(theta_deg: NDArray[np.float64], reversals_deg: Sequence[float]) -> NDA
     """Number of the reversal that each sample stands beside, -1 for none, shape (n,)."""
     near = np.full(len(theta_deg), -1, dtype=np.int64)
     for number, place in enumerate(reversals_deg):
-        near[np.abs(np.mod(theta_deg - place + 180.0, FULL_TURN_DEG) - 180.0) <= REVERSAL_DEG] = number
+        apart = np.abs(theta_deg - place % FULL_TURN_DEG)  # both within a turn: 0 to 360
+        near[(apart <= REVERSAL_DEG) | (apart >= FULL_TURN_DEG - REVERSAL_DEG)] = number
     return near
 
 
@@ -88,7 +89,8 @@ def _peaks(one: CircleAnalysis, rest: NDArray[np.float64], near: NDArray[np.int6
     samples = max(round(width_deg / FULL_TURN_DEG * len(rest)), 1)
     if samples < FEWEST and width_deg < WIDTHS_DEG[-1]:
         return []
-    means = np.convolve(rest, np.full(samples, 1.0 / samples), mode="valid")
+    sums = np.cumsum(rest)
+    means = (sums[samples - 1 :] - np.concatenate([[0.0], sums[:-samples]])) / samples
     middle = np.arange(len(means)) + samples // 2
     theta_deg, beside = one.raw.theta_deg[middle], near[middle]
     # The two ends of the turn do not meet where anything drifted: the filter makes a step of that.

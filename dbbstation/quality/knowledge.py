@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.circles.analysis import CircleAnalysis, analyse, feed_shown
 from dbbstation.errors import TraceError
+from dbbstation.inference.harmonics import amplitudes
 from dbbstation.trace.cut import cut, lost_on_turn
 
 if TYPE_CHECKING:
@@ -109,10 +110,10 @@ def seen(run: Run) -> Seen:
         return Seen(run, None, f"{error.what}; {error.remedy}", lost, _feed_of(run))
     raw = analysis.raw
     theta = np.radians(raw.theta_deg - raw.circle.start_deg)
-    orders = np.outer(theta, np.arange(1, HIGHEST_HARMONIC + 1))
-    columns = np.hstack([np.ones((len(theta), 1)), np.sqrt(2.0) * np.cos(orders), np.sqrt(2.0) * np.sin(orders)])
-    found, *_ = np.linalg.lstsq(columns, 1e3 * (raw.length_mm - raw.circle.bar_mm), rcond=None)
-    return Seen(run, analysis, "", lost, analysis.feed_mm_min, np.asarray(found, dtype=np.float64))
+    found = amplitudes(1e3 * (raw.length_mm - raw.circle.bar_mm), theta, HIGHEST_HARMONIC)
+    waves = found[1:] / np.sqrt(2.0)
+    orthonormal = np.concatenate([found[:1].real, waves.real, -waves.imag])
+    return Seen(run, analysis, "", lost, analysis.feed_mm_min, orthonormal)
 
 
 def _feed_of(run: Run) -> tuple[float, float] | None:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from dbbstation.files.recordings.entries import RunState
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from dbbstation.circled import MeasuredCircle
-    from dbbstation.files.recordings.entries import Note
+    from dbbstation.files.recordings.entries import Note, RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.plan.bar import Bar
 
@@ -23,7 +23,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
 
     Args:
         session: the session.
-        circles: its accepted runs.
+        circles: its runs that are shown: their dates and temperatures count.
         job: what it was measured for, as typed; empty: what the session says.
     """
     compensated = sum(1 for run in session.in_state(RunState.ACCEPTED) if run.program is not None)
@@ -33,7 +33,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
         ("serial number", session.serial_number or _NOT_NOTED),
         ("operator", session.operator or _NOT_NOTED),
         ("job", job or session.job or _NOT_NOTED),
-        ("measured", when_measured(session)),
+        ("measured", when_measured(one.entry for one in circles)),
         ("plan", session.plan.name),
         ("runs", _runs(session)),
         ("programs", f"{compensated} of {accepted} accepted runs under NC programs that the session keeps"),
@@ -46,10 +46,13 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
     )
 
 
-def when_measured(session: SessionFolder) -> str:
-    """Return the starts of the first and the last run of a session, in words."""
-    moments = [run.started for run in session.runs if run.started is not None]
-    return f"{min(moments):%Y-%m-%d %H:%M} to {max(moments):%Y-%m-%d %H:%M %Z}" if moments else _NOT_NOTED
+def when_measured(runs: Iterable[RunEntry]) -> str:
+    """Return the starts of the first and the last of some runs, in words."""
+    moments = [run.started for run in runs if run.started is not None]
+    if not moments:
+        return _NOT_NOTED
+    first, last = min(moments), max(moments)
+    return f"{first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M %Z}" if last > first else f"{first:%Y-%m-%d %H:%M %Z}"
 
 
 def _runs(session: SessionFolder) -> str:

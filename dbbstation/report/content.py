@@ -106,7 +106,7 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
         "sessions": [
             {
                 "name": session.name,
-                "measured": when_measured(session),
+                "measured": when_measured(c.entry for c in found.circles if c.session == session.name),
                 "conditions": conditions(
                     session, [c for c in found.circles if c.session == session.name], reported.job
                 ),

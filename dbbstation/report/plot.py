@@ -112,6 +112,12 @@ class Plotted:
         drawn = chosen(runs, MOST_DRAWN)
         return Panel(session, test, tuple(drawn), len(runs) - len(drawn))
 
+    def on_sheet(self) -> list[MeasuredCircle]:
+        """Return the runs that are drawn: of a map all that show a circle, since it draws their mean."""
+        if self.kind is Kind.MAP:
+            return [one for one in self.found.circles if one.analysis is not None]
+        return [one for panel in self.panels() for one, _ in panel.drawn]
+
     def numbers(self) -> dict[str, Any]:
         """Return what the figure shows as plain numbers: what its command prints as JSON."""
         panels = self.panels()
@@ -249,7 +255,7 @@ def _title_block(plotted: Plotted, panels: Sequence[Panel]) -> list[list[Cell]]:
     """Rows of the title block: one for each session, and one for what was drawn."""
     rows = []
     for session in plotted.found.sessions:
-        of = [one for one in plotted.found.circles if one.session == session.name]
+        of = [one for one in plotted.on_sheet() if one.session == session.name]
         if not of:
             continue
         said = dict(conditions(session, of, ""))

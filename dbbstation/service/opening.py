@@ -48,7 +48,7 @@ def opener(
         with Instrument(
             protocol, port, baud=baud, clock=job.clock, log=log, reconnect_s=RECONNECT_S, **patience
         ) as source:
-            workplace = assemble(job, source, source.unreadable)
+            workplace = assemble(job, source, source.unreadable, asked=protocol.ask.asked)
             for observer in observers:
                 workplace.station.subscribe(observer)
             try:

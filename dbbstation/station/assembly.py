@@ -108,13 +108,16 @@ class Workplace:
             self.writer.close()
 
 
-def assemble(job: Job, source: ReadingSource, unreadable: Callable[[], Mapping[str, int]] = dict) -> Workplace:
+def assemble(
+    job: Job, source: ReadingSource, unreadable: Callable[[], Mapping[str, int]] = dict, *, asked: bool = False
+) -> Workplace:
     """Open the session and build the station; storage is its first observer.
 
     Args:
         job: what is measured.
         source: started instrument.
         unreadable: what its driver rejected so far, by what was wrong with it.
+        asked: whether it is asked for each reading.
 
     Raises:
         InputError: the folder holds another session, or one with faults.
@@ -130,7 +133,7 @@ def assemble(job: Job, source: ReadingSource, unreadable: Callable[[], Mapping[s
     names = {key: program.name for key, program in job.programs.items()}
     # Real runs bear the computer's time, so that they fit what thermometers log.
     now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
-    storage = Storage(writer, now, kept, unreadable)
+    storage = Storage(writer, now, kept, unreadable, asked=asked)
     judge = RunJudge(writer, kept, job.model)
     sequencer = Sequencer(
         plan,

@@ -53,6 +53,7 @@ class Sample:
         lost: samples lost immediately before this one.
         phi_deg: progress along the turn as far as it can be told live, 0 to 360 on the full turn, negative on the
             overshoot before it, above 360 behind it [deg]; None off the circle.
+        t_uncertainty_s: standard uncertainty of `t_s` [s]; None where the instrument sends by itself.
     """
 
     t_s: float
@@ -61,6 +62,7 @@ class Sample:
     said: str = ""
     lost: int = 0
     phi_deg: float | None = None
+    t_uncertainty_s: float | None = None
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ class RunRecord:
         if self.fed_in_s is not None and self.fed_out_s is None:
             self.lost_on_turn += reading.lost
             phi = live_phi_deg(self.circle, t_s - self.fed_in_s)
-        return Sample(t_s, length_mm, reading.status, reading.said, reading.lost, phi)
+        return Sample(t_s, length_mm, reading.status, reading.said, reading.lost, phi, reading.t_uncertainty_s)
 
     def swept_deg(self) -> float:
         """Travelled since the feed-in, as far as it can be told live [deg]."""

@@ -12,7 +12,7 @@ from dbbstation.errors import OutputError
 from dbbstation.files.recordings.entries import Counts, Note
 from dbbstation.station import events
 from dbbstation.station.run_record import recording_of
-from dbbstation.trace.columns import STATUS_GOOD
+from dbbstation.trace.columns import STATUS_GOOD, TIME_UNCERTAINTY
 from dbbstation.trace.recording import Recording
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Direction
 
 COLUMNS = ("t_s", "length_mm", "status")
-"""What the station records."""
+"""What the station records of every instrument."""
 
 
 class Storage:
@@ -35,6 +35,7 @@ class Storage:
         now: the time of day with its zone.
         programs: NC program, kept in the session already, by test and direction.
         unreadable: what the driver rejected so far, by what was wrong with it.
+        asked: whether the instrument is asked for each reading: the time of each then has an uncertainty of its own.
     """
 
     def __init__(
@@ -43,6 +44,8 @@ class Storage:
         now: Callable[[], datetime] | None = None,
         programs: Mapping[tuple[str, Direction], Program] | None = None,
         unreadable: Callable[[], Mapping[str, int]] = dict,
+        *,
+        asked: bool = False,
     ) -> None:
         self._writer = writer
         self._now = now or (lambda: datetime.now(UTC))
@@ -51,6 +54,7 @@ class Storage:
         self._received = self._lost = 0
         self._rejected: Counter[str] = Counter()
         self._unreadable = unreadable
+        self._columns = (*COLUMNS, TIME_UNCERTAINTY) if asked else COLUMNS
         self._unreadable_before: Counter[str] = Counter()
 
     def __call__(self, event: events.Event) -> None:
@@ -129,7 +133,7 @@ class Storage:
         self._journal = self._writer.start_run(
             run.test,
             run.direction,
-            COLUMNS,
+            self._columns,
             started=self._now(),
             mounting=run.mounting,
             program=self._programs.get((run.test, run.direction)),
@@ -153,7 +157,10 @@ class Storage:
         for sample in samples:
             if sample.length_mm is None:
                 raise RuntimeError("a recorded sample has a number")
-            self._journal.append((sample.t_s, sample.length_mm, sample.status))
+            values = (sample.t_s, sample.length_mm, sample.status)
+            self._journal.append(
+                values if len(self._columns) == len(values) else (*values, sample.t_uncertainty_s or 0.0)
+            )
             self._received += 1
             self._lost += sample.lost
             if sample.status != STATUS_GOOD:

@@ -148,6 +148,21 @@ def horizontal_radius_mm(raw: RawCircle, length_mm: NDArray[np.float64]) -> NDAr
     return np.sqrt(length_mm**2 - height**2)
 
 
+def measured_path(raw: RawCircle) -> BallPath:
+    """Path of a raw circle as measured, about the ball; worked out once.
+
+    Raises:
+        TraceError: the points do not determine a circle.
+    """
+    if raw not in _PATHS:
+        _PATHS[raw] = path_about_ball(raw.theta_deg, horizontal_radius_mm(raw, raw.length_mm))
+    return _PATHS[raw]
+
+
+_PATHS: WeakKeyDictionary[RawCircle, BallPath] = WeakKeyDictionary()
+"""Paths of raw circles, which figures and analyses ask for."""
+
+
 def figures(raw: RawCircle, length_mm: NDArray[np.float64] | None = None) -> CircleFigures:
     """Figures of a raw circle, worked out once, or of other lengths at the same angles, shape (n,) [mm].
 
@@ -166,7 +181,8 @@ _MEASURED: WeakKeyDictionary[RawCircle, CircleFigures] = WeakKeyDictionary()
 
 
 def _figures(raw: RawCircle, length_mm: NDArray[np.float64]) -> CircleFigures:
-    path = path_about_ball(raw.theta_deg, horizontal_radius_mm(raw, length_mm))
+    measured = length_mm is raw.length_mm
+    path = measured_path(raw) if measured else path_about_ball(raw.theta_deg, horizontal_radius_mm(raw, length_mm))
     return CircleFigures(
         centre_mm=(float(path.centre_mm[0]), float(path.centre_mm[1])),
         mean_radial_error_um=1e3 * float((length_mm - raw.circle.bar_mm).mean()),

@@ -66,6 +66,7 @@ _PULL = "positive when it pulls the platform towards the base"
 
 _DECLARED = (
     Column("t_s", Kind.TIME, "s", "host time since the first sample, rising", 6, 1e6),
+    Column("t_uncertainty_s", Kind.OTHER, "s", "standard uncertainty of t_s, of an instrument that is asked", 6, 1e3),
     Column("length_mm", Kind.LENGTH, "mm", "distance between the two ball centres, raw", 6, 1e4),
     Column(
         "theta_deg",
@@ -89,6 +90,7 @@ COLUMNS = {column.name: column for column in _DECLARED}
 """Every numeric column by name."""
 
 TIME, LENGTH, THETA = "t_s", "length_mm", "theta_deg"
+TIME_UNCERTAINTY = "t_uncertainty_s"
 REQUIRED = (TIME, LENGTH)
 STATUS = "status"
 """What the instrument says of a sample; `STATUS_GOOD` or nothing where it can be trusted."""

@@ -16,6 +16,8 @@ from dbbstation.trace.columns import each
 from dbbstation.trace.loss import AFTER_LOSS, lost_samples, share_lost
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from dbbstation.plan.circle import Circle
@@ -111,6 +113,18 @@ def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
 
 
 def _cut(recording: Recording, circle: Circle) -> RawCircle:
+    """Return the turn of a recording, worked out once."""
+    found = _TURNS.setdefault(recording, {})
+    if circle not in found:
+        found[circle] = _turn(recording, circle)
+    return found[circle]
+
+
+_TURNS: WeakKeyDictionary[Recording, dict[Circle, RawCircle]] = WeakKeyDictionary()
+"""Turns that were cut out, which findings, expectations and figures all ask for."""
+
+
+def _turn(recording: Recording, circle: Circle) -> RawCircle:
     if recording.theta_deg is not None:
         phi = _along(circle.phi_deg(recording.theta_deg))
         return _selected(recording, circle, phi, np.ones(len(recording), dtype=bool))
@@ -287,11 +301,11 @@ def _match(recording: Recording, circle: Circle, middle: float, start_s: float) 
     piece = np.arange(len(when)) * PIECES // len(when)
     if np.std(means(first, piece)) < SMALLEST_SHAPE_MM:
         return None
+    slope_of = _slopes(when, piece)
     turn = start_s
     for _ in range(ROUNDS):
         second = np.interp(when + turn, t, length)
-        shape = np.polynomial.Polynomial.fit(when, (first + second) / 2.0, SHAPE_ORDER)
-        slope = means(shape.deriv()(when), piece)
+        slope = slope_of((first + second) / 2.0)
         columns = np.column_stack([np.ones(PIECES), slope])
         difference = means(second - first, piece)
         (offset, late), *_ = np.linalg.lstsq(columns, difference, rcond=None)
@@ -302,6 +316,19 @@ def _match(recording: Recording, circle: Circle, middle: float, start_s: float) 
     spread = float(np.sum((slope - slope.mean()) ** 2))
     remaining = float(np.sqrt(left @ left / (PIECES - 2)))
     return turn, (remaining / np.sqrt(spread) if spread > 0.0 else np.inf), remaining
+
+
+def _slopes(t_s: NDArray[np.float64], piece: NDArray[np.int64]) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Return what gives the mean slope of a smooth curve in each piece, from its values at the same times.
+
+    The polynomial is fitted by an orthogonal basis that is worked out once, not for every curve.
+    """
+    middle, half_s = 0.5 * (t_s[0] + t_s[-1]), 0.5 * (t_s[-1] - t_s[0])
+    powers = np.polynomial.polynomial.polyvander((t_s - middle) / half_s, SHAPE_ORDER)
+    orthogonal, upper = np.linalg.qr(powers)
+    rates = powers[:, :-1] * (np.arange(1.0, SHAPE_ORDER + 1.0) / half_s)
+    of_rest = np.linalg.solve(upper.T, np.column_stack([np.zeros(PIECES), means(rates, piece)]).T).T
+    return lambda values: np.asarray(of_rest @ (orthogonal.T @ values))
 
 
 def _along(phi_deg: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -50,9 +50,10 @@ def gaussian(theta_deg: NDArray[np.float64], values: NDArray[np.float64], cut_of
     share, lower = place - lower, lower.astype(np.int64) % cells
     upper = (lower + 1) % cells
 
+    passed = transmission(np.arange(cells // 2 + 1.0), cut_off_upr)
+
     def spread(amount: NDArray[np.float64]) -> NDArray[np.float64]:
         on_cells = np.bincount(lower, amount * (1.0 - share), cells) + np.bincount(upper, amount * share, cells)
-        passed = transmission(np.arange(cells // 2 + 1.0), cut_off_upr)
         return np.fft.irfft(np.fft.rfft(on_cells) * passed, cells)
 
     smooth = spread(values * arc) / spread(arc)

@@ -109,7 +109,17 @@ def _best_centre(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     one, other, sine = one[meet], other[meet], sine[meet]
     x = (offset[one] * along[other, 1] - offset[other] * along[one, 1]) / sine
     y = (along[one, 0] * offset[other] - along[other, 0] * offset[one]) / sine
-    # Circles about several points have their widths at once: (crossings, points).
-    distance = np.hypot(points_mm[:, 0] - x[:, None], points_mm[:, 1] - y[:, None])
-    best = int(np.argmin(np.ptp(distance, axis=1)))
-    return np.array([x[best], y[best]])
+    centres = np.column_stack([x, y])
+    # The zone of four points that lie far apart is no wider than that of all: most centres are out by it.
+    outermost = points_mm[np.concatenate([points_mm.argmin(axis=0), points_mm.argmax(axis=0)])]
+    at_least = _widths(centres, outermost)
+    likely = int(np.argmin(at_least))
+    centres = centres[at_least <= _widths(centres[likely : likely + 1], points_mm)[0]]
+    return np.asarray(centres[np.argmin(_widths(centres, points_mm))])
+
+
+def _widths(centres_mm: NDArray[np.float64], points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Width of the zone of points about each of several centres, shape (centres,) [mm]."""
+    # Points first: ranges are then taken row by row of a thousand centres, not centre by centre of a dozen points.
+    across, along = (points_mm[:, k, None] - centres_mm[:, k] for k in (0, 1))
+    return np.asarray(np.ptp(np.sqrt(across * across + along * along), axis=0))

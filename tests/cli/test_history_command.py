@@ -151,6 +151,20 @@ def test_what_was_read_before_an_interrupt_is_not_read_again(few, monkeypatch):
     assert read == ["w001", "w002", "w003", "w003", "w004"]
 
 
+def test_several_processes_give_the_same(few, monkeypatch):
+    """A damaged session and a copy among them; nothing is worked out in this process."""
+    shutil.copytree(few / "w002", few / "w002 copy")
+    run = few / "w003" / "runs" / "a-cw-2.csv"
+    run.write_bytes(run.read_bytes()[:-40])
+    before = call("history", few, "--json")
+    monkeypatch.setattr("dbbstation.historied.RUNS_WORTH_PROCESSES", 1)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    monkeypatch.setattr("dbbstation.session_figures.session_figures", None)
+    again = call("history", few, "--json", "--rebuild")
+    assert (again.out, again.err) == (before.out, before.err)
+    assert [one["name"] for one in again.data["left_out"]] == ["w003"]
+
+
 @pytest.mark.skipif(getattr(os, "geteuid", lambda: 1)() == 0, reason="root may look into every folder")
 def test_a_folder_that_cannot_be_looked_into_is_named(few):
     (few / "w002").chmod(0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import re
 
 import numpy as np
 import pytest
@@ -139,6 +140,67 @@ def test_a_mapping_is_kept_for_the_next_time_and_decides_then(run, tmp_path):
     both = imported(run, file, tmp_path / "u", "--mapping", mapping)
     assert both.code == USAGE
     assert "edit it, or leave out --angle-zero-deg, --angle-grows, --zero-mm" in both.err
+
+
+def settings(tmp_path, decimal, separator):
+    path = tmp_path / "shop.yaml"
+    path.write_text(f'format: dbb-settings/2\nnumbers: {{decimal: "{decimal}", separator: "{separator}"}}\n', "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("mapped", [True, False])
+def test_how_numbers_are_written_says_the_mapping_first_then_the_shop(run, tmp_path, mapped):
+    """Tables with decimal commas, which would be found by looking, in a shop that writes dots."""
+    mapping = tmp_path / "m.yaml"
+    text = MAPPING.read_text("utf-8")
+    mapping.write_text(text if mapped else re.sub(r"(?m)^(separator|decimal):.*\n", "", text), "utf-8")
+
+    def done(name, *shop):
+        out = tmp_path / name
+        return run(*shop, "import", *GERMAN, "--out", out, *WHERE, *UNKNOWN, "--mapping", mapping, "--yes")
+
+    assert done("looked").code == DONE
+    here = settings(tmp_path, ".", ",")
+    other = done("dots", "--settings", here)
+    assert other.code == (DONE if mapped else FAILED)
+    assert ("settings: --decimal ." in other.err) == (not mapped)
+    assert ("--decimal and --separator say otherwise" in other.err) == (not mapped)
+    there = settings(tmp_path, ",", ";")
+    assert done("commas", "--settings", there).code == DONE
+    one, last = ((tmp_path / name / "runs" / "a-ccw-1.csv").read_bytes() for name in ("looked", "commas"))
+    assert one == last
+
+
+def test_options_say_how_numbers_are_written_before_the_shop_and_not_beside_a_mapping(run, tmp_path):
+    rows = [f"{a:.1f};{d:.4f}".replace(".", ",") for a, d in zip(ANGLES, ellipse(), strict=True)]
+    file, shop = table(tmp_path / "old.csv", rows, "angle_deg;deviation_um"), settings(tmp_path, ".", ",")
+    known = ["--settings", shop]
+    words = [
+        "--out",
+        tmp_path / "s",
+        *WHERE,
+        *UNKNOWN,
+        "--angle-grows",
+        "ccw",
+        "--angle-zero-deg",
+        "0",
+        "--zero-mm",
+        "150",
+    ]
+    words += ["--run", "old.csv=a-ccw", "--yes"]
+    refused = run(*known, "import", file, *words)
+    assert (refused.code, "--decimal and --separator say otherwise" in refused.err) == (FAILED, True)
+    assert run(*known, "import", file, *words, "--decimal", ",").code == DONE
+    both = run("import", *GERMAN, "--out", tmp_path / "t", *WHERE, "--mapping", MAPPING, "--decimal", ",")
+    assert (both.code, "leave out --decimal" in both.err) == (USAGE, True)
+
+
+def test_what_this_program_exported_has_dots_whatever_the_shop_writes(run, tmp_path):
+    out, told = tmp_path / "x.csv", settings(tmp_path, ",", ";")
+    assert run("export", FIXTURES / "sessions" / "small", "--test", "a", "--out", out).code == DONE
+    words = ["--out", tmp_path / "s", *WHERE, *UNKNOWN, "--yes", "--dry-run"]
+    found = run("--settings", told, "import", out, *words)
+    assert found.code == DONE, found.err
 
 
 def test_in_a_pipe_everything_that_is_missing_is_named_at_once(run, tmp_path):

@@ -49,6 +49,26 @@ def test_the_title_block_says_what_the_session_says(kind, tmp_path):
         assert told in said
 
 
+@pytest.mark.parametrize(
+    ("tests", "kind", "dates"),
+    [
+        ("g", "polar", "2026-11-20 08:09 to 2026-11-20 08:12 UTC"),
+        ("a,l", "map", "2026-11-20 08:00 to 2026-11-20 08:18 UTC"),
+    ],
+)
+def test_dates_are_those_of_the_runs_that_are_drawn(tests, kind, dates, tmp_path):
+    outcome = call("plot", SMALL, "--test", tests, "--kind", kind, "--out", tmp_path / "figure.svg")
+    assert outcome.code == DONE, outcome.err
+    assert f"measured {dates}" in " ".join(words_of(tmp_path / "figure.svg"))
+
+
+def test_a_single_run_has_one_date(small, tmp_path):
+    edited(small, r"(test: g, direction: cw.*state: )accepted", r"\1rejected")
+    outcome = call("plot", small, "--test", "g", "--out", tmp_path / "figure.svg")
+    assert outcome.code == DONE, outcome.err
+    assert "measured 2026-11-20 08:09 UTC bar" in " ".join(words_of(tmp_path / "figure.svg"))
+
+
 def test_the_numbers_are_those_of_circles(tmp_path):
     told = call("plot", SMALL, "--test", "a", "--out", tmp_path / "a.svg", "--json").data
     circles = call("circles", SMALL, "--test", "a", "--json").data["runs"]

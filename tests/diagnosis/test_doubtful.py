@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dbbstation.diagnosis.diagnose import diagnose, doubtful
+from dbbstation.diagnosis.diagnose import doubtful, judged
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.findings import Verdict
+from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.verdicts import EVEN, judge
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
@@ -24,12 +25,12 @@ def test_a_drift_of_nobody_knows_what_is_named_by_nobody_and_not_modelled(tmp_pa
     record(tmp_path / "s", seed=200, mechanisms=[kinematics, Gravity(), faint], rate_hz=10.0)
     recorded = load_sessions([tmp_path / "s"])
     sources = sources_named(NAMES)
-    explained = explain(recorded.machine, recorded.observations, sources, lambda _: None)
+    explained = explain(recorded.machine, [thinned(one) for one in recorded.observations], sources, lambda _: None)
     assert doubtful(explained, judge(explained)) == {"thermal-frame"}
-    diagnosis = diagnose(recorded.machine, recorded.observations, sources)
-    modelled = {term.source.name for term in diagnosis.after.layout.terms} & set(NAMES)
+    explained, findings = judged(explained)
+    modelled = {term.source.name for term in explained.settled.after.layout.terms} & set(NAMES)
     assert modelled == {"gravity"}
-    found = {finding.name: finding for finding in diagnosis.sources}
+    found = {finding.name: finding for finding in findings}
     drifts = [found[name] for name in NAMES[1:]]
     assert all(drift.verdict is Verdict.NOT_TESTABLE and drift.probability < EVEN for drift in drifts)
     # What was given up is still said: together they are rather there than not.

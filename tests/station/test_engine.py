@@ -158,6 +158,23 @@ def test_what_is_stored_is_what_was_read(plan_file: Path, tmp_path: Path) -> Non
         assert stored.length_mm.tolist() == pytest.approx([sample.length_mm for sample in seen], abs=1e-6)
 
 
+def test_readings_that_are_asked_for_keep_the_uncertainty_of_their_time(plan_file: Path, tmp_path: Path) -> None:
+    plan = read_inline_plan(plan_file)
+    plain = run_readings(plan.to_domain().tests["a"].circle, 1000.0)
+    source = Script([replace(one, t_uncertainty_s=1e-3 * (2 + n % 3)) for n, one in enumerate(plain)])
+    workplace = assemble(Job(read_machine(MACHINE_FILE), plan, tmp_path / "session"), source, asked=True)
+    for observer in (source, accepts_ccw(workplace.station)):
+        workplace.station.subscribe(observer)
+    workplace.station.run()
+    workplace.close()
+    (run,) = read_session(tmp_path / "session").runs
+    read = read_run(run.path)
+    known_s = read.recording.logged["t_uncertainty_s"]
+    first = round(1e3 * known_s[0]) - 2
+    assert known_s.tolist() == pytest.approx([1e-3 * (2 + (n + first) % 3) for n in range(len(known_s))], abs=1e-9)
+    assert not read.warnings
+
+
 def test_what_came_over_the_line_is_counted_in_run_file_and_session(plan_file: Path, tmp_path: Path) -> None:
     plan = read_inline_plan(plan_file)
     readings = run_readings(plan.to_domain().tests["a"].circle, 1000.0)

@@ -15,6 +15,7 @@ import pytest
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.service.order import Gate, Order, ordered
@@ -95,7 +96,10 @@ def test_a_polled_display_is_measured_too(plan_file: Path, tmp_path: Path) -> No
     with bench(plan_file, instrument=POLLED, scale=20.0, rate_hz=None) as place:
         done = place.measure(out)
     assert done.returncode == 0, done.stderr
-    assert [run.state for run in read_session(out).runs][-1] is RunState.ACCEPTED
+    *_, last = read_session(out).runs
+    assert last.state is RunState.ACCEPTED
+    # Nobody knows when between request and reply it took its length.
+    assert (read_run(last.path).recording.logged["t_uncertainty_s"] > 0.0).all()
 
 
 def test_a_person_answers_with_keys(plan_file: Path, tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ import pytest
 
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import Circle, Direction
-from dbbstation.trace.cut import cut
+from dbbstation.trace.average import means
+from dbbstation.trace.cut import PIECES, SHAPE_ORDER, _slopes, cut
 from dbbstation.trace.recording import Recording
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
@@ -179,3 +180,18 @@ def test_loss_that_the_line_counted_is_named_before_the_feed():
     assert counted.value.what.startswith("5 of ")
     assert counted.value.what.endswith(alone.value.what)
     assert counted.value.remedy.index("cable") < counted.value.remedy.index("set the feed")
+
+
+def test_slopes_of_an_overlap_are_those_of_the_fitted_polynomial():
+    t = np.sort(np.random.default_rng(3).uniform(20.0, 27.0, 700))
+    piece = np.arange(len(t)) * PIECES // len(t)
+    slope_of = _slopes(t, piece)
+    for values in (0.05 * np.cos(0.4 * t), 150.0 + 0.01 * (t - 23.0) ** 3 + 1e-4 * np.sin(50.0 * t)):
+        direct = np.polynomial.Polynomial.fit(t, values, SHAPE_ORDER).deriv()(t)
+        assert slope_of(values) == pytest.approx(means(direct, piece), abs=1e-9)
+
+
+def test_a_turn_is_cut_out_once_and_another_circle_anew():
+    recording = trace()
+    assert cut(recording, CIRCLE) is cut(recording, CIRCLE)
+    assert cut(recording, replace(CIRCLE, start_deg=20)).circle.start_deg == 20

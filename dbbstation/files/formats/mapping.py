@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.atomic import write_text
+from dbbstation.files.formats.number_language import PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import Schema, format_of, read_document, validate
@@ -50,6 +51,8 @@ UNITS: dict[str, dict[str, float]] = {
 
 MEANINGS = (*UNITS, columns.STATUS, *OF_RUNS, IGNORED)
 """Everything that a column can be."""
+
+_SEPARATORS = {name: sign for sign, name in SEPARATORS.items()}
 
 ENCODINGS = ("utf-8", "utf-16", "cp1252")
 
@@ -106,10 +109,10 @@ class MappingFile(Schema):
     """What people call the program that wrote the files."""
     encoding: Literal["utf-8", "utf-16", "cp1252"] = "utf-8"
     """Of the files' text; a byte order mark in a file takes precedence."""
-    separator: Literal["comma", "semicolon", "tab"]
-    """What stands between columns."""
-    decimal: Literal[".", ","] = "."
-    """Decimal sign."""
+    separator: Literal["comma", "semicolon", "tab"] | None = None
+    """What stands between columns; absent: a comma, or a semicolon where the decimal sign is a comma."""
+    decimal: Literal[".", ","] | None = None
+    """Decimal sign; absent: a dot. Where neither is said, the shop's settings hold, or else it is found by looking."""
     columns: Annotated[dict[str, ColumnSchema], Field(min_length=1)]
     """Meaning of each column by its name in the file; one that is not named here is refused."""
     angle: AngleSchema | None = None
@@ -145,6 +148,15 @@ class MappingFile(Schema):
         if self.separator == "comma" and self.decimal == ",":
             raise PydanticCustomError("alike", "decimal sign and separator are both a comma", {})
         return self
+
+    @property
+    def numbers(self) -> NumberLanguage | None:
+        """How numbers are written; None where the mapping does not say."""
+        if self.separator is None and self.decimal is None:
+            return None
+        decimal = self.decimal or PLAIN.decimal
+        usual = ";" if decimal == "," else PLAIN.separator
+        return NumberLanguage(decimal, usual if self.separator is None else _SEPARATORS[self.separator])
 
     def column(self, meaning: str) -> str | None:
         """Return the name of the column with a meaning; None where there is none."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.recordings.session import SESSION_FILE
+from dbbstation.files.recordings.session_name import SESSION_FILE
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -30,6 +30,8 @@ _LANGUAGES = (
 
 _SIGNS = ",;\t"
 
+_STATED = "so say the mapping, the options or the shop's settings: --decimal and --separator say otherwise"
+
 _LOOKED_AT = 300
 """Lines that tell how a table is written, and in which it begins: text before it is some pages at the most."""
 
@@ -78,10 +80,11 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
         raise InputError(faults)
     lines = text.splitlines()
     chosen = language or _language(lines, str(path))
+    stated = "" if language is None else f"; {_STATED}"
     rows = [_cells(line, chosen, str(path), number) for number, line in enumerate(lines[:_LOOKED_AT], start=1)]
     first = next((k for k in range(len(rows)) if _is_row(rows[k], chosen) and _goes_on(rows, k, chosen)), None)
     if first is None:
-        remedy = f"check which file it is; {chosen.text}"
+        remedy = f"check which file it is; {chosen.text}{stated}"
         raise InputError([Problem(str(path), 0, 0, "there is no table of numbers in this file", remedy)])
     above = [
         k for k in range(first) if len(rows[k]) == len(rows[first]) and any(rows[k]) and not _count(rows[k], chosen)
@@ -89,7 +92,9 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
     near = [k for k in above if k >= first - _NAMES_WITHIN]
     if not near:
         what = "no line above the numbers names the columns"
-        raise InputError([Problem(str(path), first + 1, 0, what, "write one name per column in a line above them")])
+        raise InputError(
+            [Problem(str(path), first + 1, 0, what, f"write one name per column in a line above them{stated}")]
+        )
     # A line of units may stand below the names.
     has_units = len(near) > 1 and all(_UNIT.fullmatch(cell) for cell in rows[near[-1]] if cell)
     names = near[-2] if has_units else near[-1]

@@ -54,13 +54,13 @@ def runs_of(
 
 
 def _run(session: SessionFolder, run: RunEntry, recording: Recording, model: IdentifiedModel | None) -> Run:
-    circle = session.circle(run)
+    circle, recording = session.circle(run), replace(recording, name=run.label)
     return Run(
         test=run.test,
         repeat=run.repeat,
         mounting=session.setup(run).mounting,
         circle=circle,
-        recording=replace(recording, name=run.label),
+        recording=recording,
         expected=_expected(session, run, recording, model),
         largest_loss_percent=session.plan.largest_loss_percent,
     )

@@ -14,6 +14,7 @@ from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.recordings import session_name
 from dbbstation.files.recordings.entries import (
     RunEntry,
     RunState,
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Plan
     from dbbstation.trace.recording import Recording
 
-SESSION_FILE = "session.yaml"
+SESSION_FILE = session_name.SESSION_FILE
 """What a session folder is known by."""
 
 _UNLIKE_RADIUS = 0.2

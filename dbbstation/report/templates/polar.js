@@ -46,7 +46,7 @@
     const tools = make("div", "", figure);
     tools.className = "tools";
     const title = figure.querySelector("figcaption b").textContent;
-    for (const [text, what, work] of [["+", "Enlarge", () => zoom(2)], ["−", "Reduce", () => zoom(0.5)], ["1:1", "Whole of", whole]]) {
+    for (const [text, what, work] of [["+", "Enlarge", () => zoom(2)], ["−", "Reduce", () => zoom(0.5)], ["Whole", "Whole of", whole]]) {
       const button = make("button", text, tools);
       button.type = "button";
       button.setAttribute("aria-label", `${what} ${title}`);

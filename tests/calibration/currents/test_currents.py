@@ -87,7 +87,7 @@ def fitted(small):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [31, 32, 33])
+@pytest.mark.parametrize("seed", [31, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (32, 33))])
 def test_centre_of_gravity_gains_and_friction_are_found(tmp_path, seed):
     recorded = session(tmp_path / "s", seed)
     calibration = calibrate(recorded.machine, recorded.observations, sources())

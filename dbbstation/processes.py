@@ -1,0 +1,86 @@
+"""Work on several cores, each piece in a process of its own, which ends at once where the work is interrupted."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import threading
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterator, Sequence
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def each(work: Callable[[Item], Result], items: Sequence[Item], count: int) -> Generator[tuple[int, Result]]:
+    """Yield the place of an item and what was worked out of it, as they are done; close it where it is not read to its end.
+
+    Where processes cannot be started, or one is ended by the system, the rest is worked out in this one.
+
+    Args:
+        work: can be sent to another process: a function of a module, or a `functools.partial` of one.
+        items: can be sent too.
+        count: of processes; up to 1: this one does it all, in order.
+
+    Raises:
+        Exception: whatever `work` raises.
+    """
+    left = dict(enumerate(items))
+    if count > 1:
+        try:
+            with processes(count) as pool:
+                with deaf():
+                    futures = {pool.submit(work, item): place for place, item in left.items()}
+                for future in as_completed(futures):
+                    result = future.result()
+                    del left[futures[future]]
+                    yield futures[future], result
+        except BrokenProcessPool:
+            pass
+    for place, item in left.items():
+        yield place, work(item)
+
+
+@contextmanager
+def processes(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield processes to work in, which end at once where this one is interrupted; hand them work while `deaf`."""
+    # Started anew rather than forked: a fork would copy the locks of the threads that kernels run on.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(count, mp_context=context) as pool:
+        try:
+            yield pool
+        except BaseException:
+            _say_nothing_of(pool)
+            for child in multiprocessing.active_children():
+                child.terminate()
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _say_nothing_of(pool: ProcessPoolExecutor) -> None:
+    """Keep the thread that hands out a pool's work quiet: its processes are gone, which was asked for and is no news."""
+    before, handing_out = threading.excepthook, getattr(pool, "_executor_manager_thread", None)
+
+    def hook(fault: threading.ExceptHookArgs) -> None:
+        if fault.thread is not handing_out:
+            before(fault)
+
+    threading.excepthook = hook
+
+
+@contextmanager
+def deaf() -> Iterator[None]:
+    """Ignore Ctrl-C: processes that are started now ignore it as long as they live, and this one alone answers it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

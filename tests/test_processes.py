@@ -1,0 +1,48 @@
+"""Work in processes of its own: results, faults, processes that die, and no process left behind."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from contextlib import closing
+
+import pytest
+
+from dbbstation.processes import each
+
+PID = "__import__('os').getpid()"
+IN_CHILD = "__import__('multiprocessing').parent_process()"
+
+
+def none_left():
+    """Whether the processes end by themselves; they were told to a moment ago."""
+    for child in multiprocessing.active_children():
+        child.join(60.0)
+    return multiprocessing.active_children() == []
+
+
+def test_one_process_works_here_and_in_order():
+    assert list(each(eval, [PID, "2", "3"], 1)) == [(0, os.getpid()), (1, 2), (2, 3)]
+
+
+def test_several_work_elsewhere_and_say_which_item_is_done():
+    found = dict(each(eval, [PID, "1 + 1", "'three'"], 2))
+    assert found.pop(0) != os.getpid()
+    assert found == {1: 2, 2: "three"}
+
+
+def test_a_fault_is_raised_here_and_ends_them():
+    with pytest.raises(ZeroDivisionError):
+        list(each(eval, ["1 / 0", "__import__('time').sleep(1000)"], 2))
+    assert none_left()
+
+
+def test_what_a_dead_process_leaves_is_worked_out_here():
+    """As where the system has no memory left for it."""
+    assert dict(each(eval, [f"__import__('os')._exit(9) if {IN_CHILD} else 7", "8"], 2)) == {0: 7, 1: 8}
+
+
+def test_work_that_is_given_up_leaves_no_process():
+    with closing(each(eval, ["1", "__import__('time').sleep(1000)"], 2)) as found:
+        assert next(found) == (0, 1)
+    assert none_left()

@@ -101,7 +101,8 @@ class Front:
         machine = candidates(Kind.MACHINE, self.under)[-1]
         plan = next(path for path in candidates(Kind.PLAN, self.under) if path.name == "ten-minute-check.yaml")
         line = Line(instrument=USUAL_VIRTUAL, port=list(VIRTUAL)[-1])
-        return Choice(self.new_folder("virtual"), machine, plan, line)
+        said = {name: getattr(self.given, name) for name in ("operator", "serial_number", "job", "order", "gate")}
+        return Choice(self.new_folder("virtual"), machine, plan, line, **said)
 
     def goes_on_with(self, folder: Path) -> Choice:
         """Return the choice to go on with a session: plan and machine lie in its folder, the instrument is remembered."""

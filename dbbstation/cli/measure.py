@@ -15,7 +15,7 @@ from dbbstation.cli.instrument_options import chosen_protocol, instrument_option
 from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.order_options import in_order, order_options
+from dbbstation.cli.order_options import in_order, order_options, programs_option
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 from dbbstation.service.patience import RECONNECT_S, driver_patience
@@ -50,7 +50,7 @@ _AUTO_PATIENCE_S = 60.0
     type=Finite(0.1, 100000.0),
     help="Sampling rate [1/s], where it is not the instrument's usual one.",
 )
-@click.option("--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs.")
+@programs_option
 @spy_option
 @loss_option
 @judging_model_options

@@ -1,7 +1,8 @@
-"""Options that say in which order the tests of a plan are measured."""
+"""Options that say in which order the tests of a plan are measured, and by which NC programs."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -30,6 +31,12 @@ _GATE = click.option(
     show_default=True,
     help="What is repeated at the end to show drift, where the plan names nothing: the first test, or that of each holder.",
 )
+
+
+programs_option = click.option(
+    "--programs", type=click.Path(path_type=Path, file_okay=False), help="Folder of TEST-DIRECTION programs."
+)
+"""The NC programs that command the runs; without it they are plain nominal circles."""
 
 
 def order_options(function: _Function) -> _Function:

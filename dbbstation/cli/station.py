@@ -7,6 +7,7 @@ import sys
 import tempfile
 import threading
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from dbbstation.cli.instrument_options import chosen_protocol, instrument_option
 from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
-from dbbstation.cli.order_options import in_order, order_options
+from dbbstation.cli.order_options import in_order, order_options, programs_option
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
@@ -58,6 +59,7 @@ _DEMO_SEED = 3
 @loss_option
 @judging_model_options
 @order_options
+@programs_option
 @session_options
 def station(
     *,
@@ -78,6 +80,7 @@ def station(
     source_files: tuple[Path, ...],
     order: str,
     gate: str,
+    programs: Path | None,
     **told: Any,  # noqa: ANN401 - the session's options, each with a type of its own
 ) -> int:
     r"""Measure a plan on a screen: what to do, the live reading, the live circle, the first figures.
@@ -99,7 +102,9 @@ def station(
     if not virtual and time_scale == 1.0 and plan_file is None and machine_file is None and out is None:
         _check_terminal()
         return _begin(
-            _given(_line(instrument, profile, port, baud, zero_mm), spy, (order, gate), told),
+            replace(
+                _given(_line(instrument, profile, port, baud, zero_mm), spy, (order, gate), told), programs=programs
+            ),
             _limits(largest_loss_percent, largest_bar_age_h),
             judging_model(model_file, source_files),
         )
@@ -113,6 +118,7 @@ def station(
     from dbbstation.files.shipped import shipped_folder
     from dbbstation.service.opening import opener
     from dbbstation.station.assembly import Job
+    from dbbstation.station.programs import load_programs
 
     def demo(what: str) -> Path:
         folder, _, rest = _DEMO[what].partition("/")
@@ -131,6 +137,7 @@ def station(
             plan,
             folder,
             details,
+            {} if programs is None else load_programs(programs, plan.to_domain(), machine),
             rate_hz=protocol.fastest_hz(baud),
             range_mm=protocol.length.range_mm,
             model=judging_model(model_file, source_files),
@@ -140,13 +147,18 @@ def station(
             require_bar(job, largest_bar_age_h)
         helper = None
         if virtual:
-            from dataclasses import replace
-
             from dbbstation.service.virtual_place import virtual_place
 
             click.echo("switching on the virtual machine …", err=True)
             place = stack.enter_context(
-                virtual_place(machine, plan.to_domain(), protocol, time_scale=time_scale, seed=_DEMO_SEED)
+                virtual_place(
+                    machine,
+                    plan.to_domain(),
+                    protocol,
+                    time_scale=time_scale,
+                    seed=_DEMO_SEED,
+                    programs=job.programs,
+                )
             )
             job, port, helper = replace(job, clock=place.clock, time_scale=time_scale), place.port, place.helper
         say_sampling(plan.to_domain(), protocol, baud)

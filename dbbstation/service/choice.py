@@ -20,6 +20,7 @@ from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.station.assembly import Job
 from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
 from dbbstation.station.programs import load_programs
+from dbbstation.station.schedule import Schedule
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -83,7 +84,7 @@ class Choice:
         operator: name.
         serial_number: of the machine.
         job: job or order number.
-        ambient_temp_c: temperature of the shop before [degC]; None: not read.
+        ambient_temp_c: temperature of the shop now [degC]; None: not read. A session that exists gets it as a note.
         order: of the tests; a session that exists keeps its own.
         gate: what is repeated at the end.
     """
@@ -128,10 +129,10 @@ class Prepared:
         job: ready to be opened.
         protocol: of the instrument.
         line: instrument and port.
-        runs: of the whole plan.
+        runs: that are left to be measured; of a new session all of the plan.
         circles_s: time that their circles take at their planned feeds [s].
-        mountings: how often a ball is put up.
-        height_and_drift: how far the height of the tests follows a steady drift, from 0 (not at all) to 1.
+        mountings: how often a ball is put up for them.
+        height_and_drift: how far the height of the plan's tests follows a steady drift, from 0 (not at all) to 1.
     """
 
     job: Job
@@ -189,16 +190,16 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
     domain = plan.to_domain()
     if not (choice.goes_on or choice.line.virtual or details.bar_waiver):
         check_bar_known(bar, domain, datetime.now(UTC), limits.largest_bar_age_h)
-    every = [test.run(direction) for test in domain.tests.values() for direction in test.directions]
-    again = [domain.tests[name].run(way) for name in domain.repeat_at_end for way in domain.tests[name].directions]
+    recorded = read_session(choice.folder).runs if choice.goes_on else ()
+    left = Schedule(domain, lambda _test, _direction: 1, recorded).open
     names = (*domain.tests, *domain.repeat_at_end)
     return Prepared(
         job,
         protocol,
         choice.line,
-        len(every) + len(again),
-        circles_s([*every, *again]),
-        mountings(domain, names),
+        len(left),
+        circles_s(domain.tests[task.test].run(task.direction) for task in left),
+        mountings(domain, [task.test for task in left]),
         height_and_drift([domain.tests[name].circle.centre_mm[2] for name in names], degree=1),
     )
 

@@ -20,6 +20,7 @@ from dbbstation.service.opening import opener
 from dbbstation.service.port_probe import Answer, ports, probe
 from dbbstation.service.runner import Runner
 from dbbstation.service.session_list import list_sessions
+from dbbstation.service.shop_temperature import note_temperature
 from dbbstation.service.virtual_place import virtual_place
 from dbbstation.service.work import Progress, Work
 
@@ -100,7 +101,8 @@ class Front:
         machine = candidates(Kind.MACHINE, self.under)[-1]
         plan = next(path for path in candidates(Kind.PLAN, self.under) if path.name == "ten-minute-check.yaml")
         line = Line(instrument=USUAL_VIRTUAL, port=list(VIRTUAL)[-1])
-        return Choice(self.new_folder("virtual"), machine, plan, line)
+        said = {name: getattr(self.given, name) for name in ("operator", "serial_number", "job", "order", "gate")}
+        return Choice(self.new_folder("virtual"), machine, plan, line, **said)
 
     def goes_on_with(self, folder: Path) -> Choice:
         """Return the choice to go on with a session: plan and machine lie in its folder, the instrument is remembered."""
@@ -143,8 +145,16 @@ class Front:
         """Read and check what was chosen; raises as `choice.prepare`."""
         return prepare(choice, self.limits, self.model)
 
-    def write_programs(self, choice: Choice) -> tuple[int, str]:
-        """Write nominal NC programs of all circles into a new folder beside the session; return how many, and where.
+    def models(self) -> tuple[Path, ...]:
+        """Return the models that programs can be compensated with, the last written first."""
+        return tuple(sorted(candidates(Kind.MODEL, self.under), key=lambda path: -path.stat().st_mtime))
+
+    def write_programs(self, choice: Choice, model: Path | None = None) -> tuple[int, Path]:
+        """Write NC programs of all circles into a new folder beside the session; return how many, and where.
+
+        Args:
+            choice: says plan, machine and session.
+            model: that they are compensated with; None: nominal programs.
 
         Raises:
             StationError: what the command says.
@@ -158,11 +168,13 @@ class Front:
             raise ValueError("plan, machine or folder is missing")
         folder = _not_there(choice.folder.parent, f"{choice.folder.name}-programs")
         names = ["--plan", str(plan.absolute()), "--machine", str(machine.absolute()), "--out", str(folder.absolute())]
-        work = Work(["program", *names], self.under)
+        by_model = [] if model is None else ["--model", str(model.absolute())]
+        settings = [] if self.settings is None else ["--settings", str(self.settings)]
+        work = Work([*settings, "program", *names, *by_model], self.under)
         try:
             if work.wait() is not Progress.DONE:
                 raise StationError(work.failure())
-            return len(work.answer()["programs"]), str(folder)
+            return len(work.answer()["programs"]), folder
         finally:
             work.close()
 
@@ -210,8 +222,10 @@ class Front:
     def open(self, choice: Choice, prepared: Prepared) -> Opened:
         """Switch on what is virtual, remember the choice, and return what runs the sequence.
 
+        A session that goes on gets the temperature of now as a note.
+
         Raises:
-            StationError: the virtual machine refuses.
+            StationError: the virtual machine refuses, or another process writes into the session.
         """
         self.close()
         job, line = prepared.job, prepared.line
@@ -230,6 +244,8 @@ class Front:
             job = replace(job, clock=place.clock, time_scale=line.time_scale)
             port, observers = place.port, [*observers, place.helper]
         self._remember(choice)
+        if choice.goes_on and choice.folder is not None and choice.ambient_temp_c is not None:
+            note_temperature(choice.folder, choice.ambient_temp_c)
         opened = opener(job, prepared.protocol, port, baud=line.baud, observers=observers, time_scale=line.time_scale)
         runner = Runner(opened)
         self._open.callback(runner.close)

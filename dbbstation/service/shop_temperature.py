@@ -37,6 +37,7 @@ def note_temperature(folder: Path, degc: float) -> None:
         OutputError: another process writes into it, or the disk refuses.
     """
     with SessionWriter.open(folder) as writer:
-        # On a virtual machine that runs faster than real time, runs bear times ahead of now.
-        moments = [run.started for run in writer.runs if run.started is not None]
-        writer.note(Note(max([datetime.now(UTC), *moments]), ambient_temp_c=degc))
+        # On a virtual machine that runs faster than real time, runs and notes bear times ahead of now.
+        runs = [run.started for run in writer.runs if run.started is not None]
+        notes = [note.made for note in writer.session.notes]
+        writer.note(Note(max([datetime.now(UTC), *runs, *notes]), ambient_temp_c=degc))

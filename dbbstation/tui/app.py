@@ -203,7 +203,7 @@ class StationApp(App[None]):
         """Do work of some seconds in the background; as `Reception` has it."""
         self._works.append((Background(work), then, failed))
 
-    def open(self, choice: Choice, prepared: Prepared | None, failed: Callable[[Exception], None]) -> None:
+    def open(self, choice: Choice, prepared: Prepared, failed: Callable[[Exception], None]) -> None:
         """Open a job in the background, and show the screen beside the machine; one at a time."""
         front = self._front
         if front is None or self._opening:
@@ -211,7 +211,7 @@ class StationApp(App[None]):
         self._opening = True
 
         def begin() -> Opened:
-            return front.open(choice, prepared or front.prepare(choice))
+            return front.open(choice, prepared)
 
         def refused(error: Exception) -> None:
             self._opening = False

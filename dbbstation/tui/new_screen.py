@@ -268,7 +268,12 @@ class NewScreen(RowScreen):
         if not self.is_current:  # somebody went back meanwhile
             return
         self._show()
-        self.app.push_screen(PrepareScreen(self._reception, self._front, self.choice, prepared))
+        self.app.push_screen(PrepareScreen(self._reception, self._front, self.choice, prepared, self._changed))
+
+    def _changed(self, choice: Choice) -> None:
+        """Take over what the checklist changed."""
+        self.choice = choice
+        self._show()
 
     def _answered(self, answer: Answer) -> None:
         form = texts.NEW_ANSWERS if answer.answers else texts.NEW_SILENT

@@ -1,18 +1,23 @@
-"""The checklist before a session: what the program checked, and what only a person can see."""
+"""The checklist before circles are measured: what the program checked, and what only a person can see."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 from textual.content import Content
 
+from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.tui import texts
+from dbbstation.tui.asking import ChooseQuestion
 from dbbstation.tui.durations import duration
 from dbbstation.tui.panel import lines
 from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.temperature_question import TemperatureQuestion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
 
     from textual.binding import BindingType
     from textual.widgets import OptionList
@@ -26,13 +31,14 @@ _GOOD, _OPEN, _NOTE = "✓", "!", "·"
 
 
 class PrepareScreen(RowScreen):
-    """Pushed over what is measured.
+    """Pushed over what is measured, or over the sessions: one that goes on has a shorter list.
 
     Args:
         reception: opens the job.
         front: writes programs.
         choice: what was chosen.
         prepared: what became of it; it was checked.
+        changed: told of a choice that was changed here.
     """
 
     help_name = "prepare"
@@ -40,14 +46,23 @@ class PrepareScreen(RowScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         ("b", "begin", "Begin"),
         ("y", "all", "Confirm all"),
-        ("w", "programs", "Write NC programs"),
+        ("t", "temperature", "Temperature"),
+        ("w", "programs", "NC programs"),
         ("escape,q", "back", "Back"),
     ]
 
-    def __init__(self, reception: Reception, front: Front, choice: Choice, prepared: Prepared) -> None:
+    def __init__(
+        self,
+        reception: Reception,
+        front: Front,
+        choice: Choice,
+        prepared: Prepared,
+        changed: Callable[[Choice], None] = lambda _choice: None,
+    ) -> None:
         super().__init__()
         self._reception, self._front = reception, front
-        self._choice, self._prepared = choice, prepared
+        self._choice, self._prepared, self._changed = choice, prepared, changed
+        self._goes_on = choice.goes_on
         self._confirmed: set[str] = set()
         self._wrote = ""
 
@@ -55,25 +70,49 @@ class PrepareScreen(RowScreen):
         """Show the list."""
         self._show()
 
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """A session that goes on has its programs, where there are any."""
+        if action == "programs":
+            return not (self._goes_on and self._prepared.job.programs)
+        return super().check_action(action, parameters)
+
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
         """Confirm the chosen line, or take it back."""
-        self._confirmed ^= {list(texts.CONFIRMED)[self.at]}
+        self._confirmed ^= {list(self._list)[self.at]}
         self._show()
 
     def action_all(self) -> None:
         """Confirm every line."""
-        self._confirmed = set(texts.CONFIRMED)
+        self._confirmed = set(self._list)
         self._show()
 
+    def action_temperature(self) -> None:
+        """Take the temperature of the shop before the circles."""
+
+        def answered(text: str | None) -> None:
+            degc = None if text is None else shop_degc(text)
+            if degc is not None:
+                self._take(replace(self._choice, ambient_temp_c=degc))
+
+        self.app.push_screen(TemperatureQuestion(), answered)
+
     def action_programs(self) -> None:
-        """Write nominal programs beside the session."""
-        self.say(texts.CHECK_WRITES)
-        choice = self._choice
-        self._reception.do(lambda: self._front.write_programs(choice), self._written, self._failed)
+        """Write programs beside the session: nominal ones, or those of a new session compensated with a model."""
+        models = () if self._goes_on else self._front.models()
+        if not models:
+            self._write(None)
+            return
+
+        def answered(at: int | None) -> None:
+            if at is not None:
+                self._write(None if at == 0 else models[at - 1])
+
+        labels = [texts.PROGRAMS_NOMINAL, *(texts.PROGRAMS_BY.format(model=path) for path in models)]
+        self.app.push_screen(ChooseQuestion(texts.PROGRAMS_TITLE, labels), answered)
 
     def action_begin(self) -> None:
         """Begin to measure, once everything is confirmed."""
-        if len(self._confirmed) < len(texts.CONFIRMED):
+        if len(self._confirmed) < len(self._list):
             self._show()
             return
         self.say(texts.START_OPENS.format(folder=self._prepared.job.folder.name))
@@ -83,59 +122,92 @@ class PrepareScreen(RowScreen):
         """Go back to what is measured."""
         self.dismiss()
 
+    @property
+    def _list(self) -> Mapping[str, str]:
+        """What a person confirms, by name."""
+        return texts.CONFIRMED_AGAIN if self._goes_on else texts.CONFIRMED
+
     def _show(self) -> None:
         rows = []
-        for name, text in texts.CONFIRMED.items():
+        for name, text in self._list.items():
             done = name in self._confirmed
             rows.append(Content.assemble(("[x] " if done else "[ ] ", "bold"), (text, "" if done else "$text-warning")))
         self.put(rows)
         self.about(lines(*(Content(f"{sign} {text}") for sign, text in self._checked())))
-        left = len(texts.CONFIRMED) - len(self._confirmed)
-        self.say(texts.CHECK_OPEN.format(count=left, all=len(texts.CONFIRMED)) if left else texts.CHECK_READY)
+        left = len(self._list) - len(self._confirmed)
+        self.say(texts.CHECK_OPEN.format(count=left, all=len(self._list)) if left else texts.CHECK_READY)
 
     def _checked(self) -> Iterator[tuple[str, str]]:
         """Yield sign and sentence of what the program knows."""
-        choice, prepared = self._choice, self._prepared
-        job = prepared.job
+        prepared = self._prepared
         yield _GOOD, texts.CHECK_TRAVEL
+        form = texts.CHECK_LEFT if self._goes_on else texts.CHECK_TIME
         time = duration(prepared.circles_s)
-        yield _GOOD, texts.CHECK_TIME.format(runs=prepared.runs, time=time, mountings=prepared.mountings)
-        r = prepared.height_and_drift
-        yield (_NOTE, texts.CHECK_MIXED.format(r=r)) if prepared.mixes_drift else (_GOOD, texts.CHECK_ORDER.format(r=r))
-        if self._wrote:
-            yield _GOOD, self._wrote
-        elif job.programs:
-            yield _GOOD, texts.CHECK_PROGRAMS.format(count=len(job.programs))
+        yield _GOOD, form.format(runs=prepared.runs, time=time, mountings=prepared.mountings)
+        if not self._goes_on:
+            r = prepared.height_and_drift
+            form = texts.CHECK_MIXED if prepared.mixes_drift else texts.CHECK_ORDER
+            yield _NOTE if prepared.mixes_drift else _GOOD, form.format(r=r)
+        if prepared.job.programs:
+            yield _GOOD, self._programs()
         else:
-            yield _NOTE, texts.CHECK_NO_PROGRAMS
-        bar = job.details.bar
+            yield _NOTE, self._wrote or texts.CHECK_NO_PROGRAMS
         if prepared.line.virtual:
             yield _NOTE, texts.CHECK_VIRTUAL
-        if choice.goes_on:
-            yield _NOTE, texts.CHECK_OLD
-            return
-        if bar is not None and bar.calibrated is not None:
+        yield from self._shop()
+
+    def _programs(self) -> str:
+        """What is known of the programs that command the runs."""
+        programs = self._prepared.job.programs.values()
+        models = {program.model_sha256[:12] for program in programs if program.model_sha256}
+        by = texts.CHECK_COMPENSATED.format(models=", ".join(sorted(models))) if models else texts.CHECK_NOMINAL
+        where = "" if self._choice.programs is None else str(self._choice.programs)
+        return texts.CHECK_PROGRAMS.format(count=len(programs), by=by, folder=where).rstrip()
+
+    def _shop(self) -> Iterator[tuple[str, str]]:
+        """Yield what is known of bar, temperature and people."""
+        choice, details = self._choice, self._prepared.job.details
+        bar = details.bar
+        if not self._goes_on and bar is not None and bar.calibrated is not None:
             when = f"{bar.calibrated.astimezone():%Y-%m-%d %H:%M}"
             yield _GOOD, texts.CHECK_BAR.format(serial=bar.serial_number, when=when)
-        elif job.details.bar_waiver:
-            yield _OPEN, texts.CHECK_WAIVED.format(reason=job.details.bar_waiver)
+        elif not self._goes_on and details.bar_waiver:
+            yield _OPEN, texts.CHECK_WAIVED.format(reason=details.bar_waiver)
         if choice.ambient_temp_c is None:
             yield _OPEN, texts.CHECK_NO_TEMPERATURE
         else:
             yield _GOOD, texts.CHECK_TEMPERATURE.format(temp=choice.ambient_temp_c)
-        yield (
-            _NOTE,
-            texts.CHECK_WHO.format(
-                serial=choice.serial_number or texts.UNNAMED,
-                operator=choice.operator or texts.UNNAMED,
-                job=choice.job or texts.UNNAMED,
-            ),
-        )
+        if self._goes_on:
+            yield _NOTE, texts.CHECK_OLD
+            return
+        names = {"serial": choice.serial_number, "operator": choice.operator, "job": choice.job}
+        yield _NOTE, texts.CHECK_WHO.format(**{name: text or texts.UNNAMED for name, text in names.items()})
 
-    def _written(self, found: tuple[int, str]) -> None:
-        count, folder = found
-        self._wrote = texts.CHECK_WROTE.format(count=count, folder=folder)
-        self._show()
+    def _write(self, model: Path | None) -> None:
+        self.say(texts.CHECK_WRITES)
+        choice = self._choice
+
+        def written(found: tuple[int, Path]) -> None:
+            count, folder = found
+            if model is None:
+                self._wrote = texts.CHECK_WROTE.format(count=count, folder=folder)
+                self._show()
+            else:
+                # The session has to know what commands its runs: its circles are no longer the plan's.
+                self._take(replace(choice, programs=folder))
+
+        self._reception.do(lambda: self._front.write_programs(choice, model), written, self._failed)
+
+    def _take(self, choice: Choice) -> None:
+        """Check a changed choice, and go on with it where it holds."""
+        self.say(texts.NEW_CHECKS)
+
+        def prepared(found: Prepared) -> None:
+            self._choice, self._prepared = choice, found
+            self._changed(choice)
+            self._show()
+
+        self._reception.do(lambda: self._front.prepare(choice), prepared, self._failed)
 
     def _failed(self, error: Exception) -> None:
         self.say(str(error), wrong=True)

@@ -24,7 +24,7 @@ class Reception(Protocol):
     ) -> None:
         """Do work of some seconds; `then` takes its outcome, `failed` an error that a user can cause."""
 
-    def open(self, choice: Choice, prepared: Prepared | None, failed: Callable[[Exception], None]) -> None:
+    def open(self, choice: Choice, prepared: Prepared, failed: Callable[[Exception], None]) -> None:
         """Open a job and show the screen beside the machine."""
 
     def show_results(self, folder: Path) -> None:

@@ -9,12 +9,14 @@ from textual.content import Content
 from dbbstation.tui import texts
 from dbbstation.tui.durations import duration
 from dbbstation.tui.new_screen import NewScreen
+from dbbstation.tui.prepare_screen import PrepareScreen
 from dbbstation.tui.row_screen import RowScreen
 
 if TYPE_CHECKING:
     from textual.binding import BindingType
     from textual.widgets import OptionList
 
+    from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
     from dbbstation.service.session_list import SessionLine
     from dbbstation.tui.reception import Reception
@@ -76,8 +78,10 @@ class StartScreen(RowScreen):
         if choice.missing():
             self.app.push_screen(NewScreen(self._reception, self._front, choice))
         else:
-            self.say(texts.START_OPENS.format(folder=line.folder.name))
-            self._reception.open(choice, None, self._failed)
+            self.say(texts.NEW_CHECKS)
+            self._reception.do(
+                lambda: self._front.prepare(choice), lambda prepared: self._prepared(choice, prepared), self._failed
+            )
 
     def on_option_list_option_highlighted(self, _chosen: OptionList.OptionHighlighted) -> None:
         """Tell of the session that the cursor is on."""
@@ -108,6 +112,12 @@ class StartScreen(RowScreen):
         self.say(texts.START_SOME if sessions else texts.START_NONE)
         self._tell()
         self.refresh_bindings()
+
+    def _prepared(self, choice: Choice, prepared: Prepared) -> None:
+        """Show the short checklist, where nobody has gone elsewhere meanwhile."""
+        if self.is_current:
+            self.say(texts.START_SOME)
+            self.app.push_screen(PrepareScreen(self._reception, self._front, choice, prepared))
 
     def _tell(self) -> None:
         line = self.chosen

@@ -163,15 +163,20 @@ HELP = {
         "Checklist",
         (
             (
-                "The upper part has what the program checked: every circle within the travel, the time that the circles take, "
-                "the bar, the temperature."
+                "Below the rows stands what the program checked: every circle within the travel, the time that the circles take, "
+                "whether a drift can look like an effect of height, the bar, the temperature."
             ),
-            "The lower part has what only a person can see at the machine. Each is confirmed once before the session begins.",
+            "The rows have what only a person can see at the machine. Each is confirmed once before the session begins.",
+            "A session that goes on has a shorter list: what can have changed since.",
         ),
         {
             "enter": "Confirm, or take it back.",
             "y": "Confirm all.",
-            "w": "Write the nominal NC programs of all circles into a folder beside the session.",
+            "t": "Take the temperature of the shop before the circles.",
+            "w": (
+                "Write NC programs of all circles into a folder beside the session: nominal, or compensated with a model. "
+                "Compensated ones then command the session."
+            ),
             "b": "Begin to measure.",
             "up": "The line above.",
             "down": "The line below.",
@@ -358,24 +363,41 @@ NO_PROFILE = "usual"
 
 CONFIRMED: Mapping[str, str] = {
     "bar": "The bar, its cable and both balls are clean; the magnets hold.",
-    "holder": "The holder of every test fits its bore, and the bar swings clear of it.",
-    "jig": "The plate is clamped, and the tool stays clear of it at every tilt.",
+    "holder": "The holder of every test is at hand, and sits in its bore without play.",
+    "jig": "The plate sits flat in its seat and is clamped.",
+    "clearance": "Every tilt was run once without the bar: bar and tool stay clear.",
     "spindle": "The spindle is locked and oriented; nobody starts it.",
 }
-"""What only a person can see, by a name that is not shown."""
+"""What only a person can see before a session, by a name that is not shown."""
+
+CONFIRMED_AGAIN: Mapping[str, str] = {
+    "bar": "The bar is in, its cable is free, both balls are clean.",
+    "holder": "The holder stands untouched; if not, M begins the first circle, not Enter.",
+    "jig": "The plate was not moved in its seat, and is clamped.",
+    "spindle": "The spindle is locked, oriented as before; nobody starts it.",
+}
+"""The same of a session that goes on: what can have changed since."""
 
 CHECK_TRAVEL = "Every circle and its feed-in lie within the travel of axes, angles and struts."
 CHECK_TIME = "{runs} runs; their circles take {time} at the planned feeds. {mountings} times a ball is put up, which comes on top."
+CHECK_LEFT = "Left to do: {runs} runs; their circles take {time} at the planned feeds. {mountings} times a ball is put up, which comes on top."
 CHECK_ORDER = "Heights and a steady drift correlate by {r:.2f}: they are told apart."
 CHECK_MIXED = "Heights and a steady drift correlate by {r:.2f}: a drift can look like an effect of height."
-CHECK_PROGRAMS = "{count} NC programs run the circles that they are named after."
+CHECK_PROGRAMS = "{count} NC programs run the circles that they are named after, {by}. {folder}"
+CHECK_NOMINAL = "nominal"
+CHECK_COMPENSATED = "compensated with the model {models} (SHA-256)"
+PROGRAMS_TITLE = "Write NC programs of all circles: arrow keys, Enter; Esc goes back."
+PROGRAMS_NOMINAL = "nominal: the plain circles of the plan"
+PROGRAMS_BY = "compensated with {model}"
 CHECK_NO_PROGRAMS = "The control runs plain circles; W writes NC programs of them."
 CHECK_BAR = "The bar {serial} was on its calibrator, at {when}."
 CHECK_WAIVED = "The bar is not calibrated: {reason}"
 CHECK_VIRTUAL = "Machine, bar and instrument are virtual."
 CHECK_OLD = "The session keeps bar and shop as it has noted them."
 CHECK_TEMPERATURE = "Temperature of the shop before: {temp:g} °C."
-CHECK_NO_TEMPERATURE = "The temperature of the shop was not read; what the bar grows by is not known then."
+CHECK_NO_TEMPERATURE = (
+    "The temperature of the shop was not read: T takes it. What the bar grows by is not known without."
+)
 CHECK_WHO = "Machine {serial}, operator {operator}, job {job}."
 CHECK_WROTE = "{count} NC programs written to {folder}."
 CHECK_OPEN = "Still to be confirmed: {count} of {all}. Enter confirms one, Y all."

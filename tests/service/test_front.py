@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,9 @@ import pytest
 from dbbstation.cli import order_options
 from dbbstation.errors import InputError, TravelError
 from dbbstation.files.formats.plan import read_inline_plan, read_plan
+from dbbstation.files.recordings.entries import Note
+from dbbstation.files.recordings.session import read_session
+from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.duration import circle_s
@@ -23,6 +27,7 @@ from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.service.port_probe import probe
 from dbbstation.service.session_list import list_sessions
+from dbbstation.service.shop_temperature import note_temperature, shop_degc
 from dbbstation.service.work import Progress, Work
 from dbbstation.virtual.wire import VirtualInstrument
 from tests.cli.conftest import call
@@ -280,8 +285,8 @@ def test_programs_are_written_beside_the_session_and_commanded_by(front: Front) 
     plan = read_plan(PLAN)
     runs = [(name, way) for name, test in plan.tests.items() for way in test.directions]
     assert count == again == len(runs)
-    assert (Path(folder).name, Path(other).name) == ("virtual-programs", "virtual-programs-2")
-    prepared = front.prepare(replace(choice, programs=Path(folder)))
+    assert (folder.name, other.name) == ("virtual-programs", "virtual-programs-2")
+    prepared = front.prepare(replace(choice, programs=folder))
     assert set(prepared.job.programs) == set(runs)
 
 
@@ -305,6 +310,30 @@ def test_the_checklist_says_what_an_order_costs_and_whether_heights_follow_a_dri
     assert (as_planned.runs, as_planned.mountings, as_planned.mixes_drift) == (30, 15, True)
     in_turn = front.prepare(replace(choice, order=Order.DRIFT, gate=Gate.HOLDERS))
     assert (in_turn.runs, in_turn.mountings, in_turn.mixes_drift) == (36, 18, False)
+
+
+def test_what_the_command_line_says_holds_for_the_virtual_machine_too(front: Front) -> None:
+    told = replace(front, given=Choice(job="order 4711", order=Order.HOLDER, gate=Gate.FIRST, bar_waiver="none"))
+    choice = told.virtual_choice()
+    assert (choice.job, choice.order, choice.gate, choice.bar_waiver) == ("order 4711", Order.HOLDER, Gate.FIRST, "")
+    assert choice.missing() == ()
+
+
+def test_a_temperature_is_never_noted_before_what_was_noted_already(tmp_path: Path) -> None:
+    """A virtual machine that runs faster than real time is ahead of it."""
+    folder = tmp_path / "session"
+    shutil.copytree(SMALL.parent / "sealed", folder)
+    ahead = datetime.now(UTC) + timedelta(minutes=5)
+    with SessionWriter.open(folder) as writer:
+        writer.note(Note(ahead, ambient_temp_c=20.0))
+    note_temperature(folder, 20.9)
+    assert [(note.made >= ahead, note.ambient_temp_c) for note in read_session(folder).notes[1:]] == [
+        (True, 20.0),
+        (True, 20.9),
+    ]
+    note_temperature(folder, 21.0)
+    assert shop_degc("20,9") == 20.9
+    assert [shop_degc(text) for text in ("", "warm", "nan", "inf", "81", "-31")] == [None] * 6
 
 
 def test_the_orders_of_the_command_line_are_those_of_the_service() -> None:

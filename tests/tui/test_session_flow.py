@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import shutil
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -14,11 +16,13 @@ from dbbstation.errors import InstrumentError
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.plan.circle import Direction
 from dbbstation.service.after import Step
 from dbbstation.service.choice import Part
 from dbbstation.service.front import Front
 from dbbstation.service.memory import Memory
 from dbbstation.service.work import Progress
+from dbbstation.station.programs import RunProgram
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.asking import ChooseQuestion, TypeQuestion
@@ -51,6 +55,11 @@ def now(app: StationApp) -> str:
 def rows(app: StationApp) -> list[str]:
     options = app.screen.query_one("#rows", OptionList)
     return [str(options.get_option_at_index(place).prompt) for place in range(options.option_count)]
+
+
+def below(app: StationApp) -> str:
+    """The text below the rows."""
+    return " ".join(str(app.screen.query_one("#row-text", Static).visual).split())
 
 
 async def until(_pilot: Pilot[None], condition: Callable[[], bool]) -> None:
@@ -156,10 +165,10 @@ def test_from_the_start_screen_to_the_path_of_the_report(front: Front) -> None:
         await choose_all(pilot, app)
         await press(app, "b")
         await until(pilot, on(app, PrepareScreen))
-        assert "4 of 4" in now(app)
+        assert "5 of 5" in now(app)
         await press(app, "b")  # not before everything is confirmed
         await press(app, "enter", "down", "enter", "enter")
-        await until(pilot, lambda: "3 of 4" in now(app))
+        await until(pilot, lambda: "4 of 5" in now(app))
         await confirm_all(pilot, app)
         await measured(pilot, app, 3)
         await until(pilot, lambda: app.board.finished is not None)
@@ -174,8 +183,7 @@ def test_from_the_start_screen_to_the_path_of_the_report(front: Front) -> None:
         await press(app, "r")
         await until(pilot, lambda: after.results[Step.REPORT].progress is Progress.DONE)
         await until(pilot, lambda: "report.html" in str(app.screen.query_one("#row-text", Static).visual))
-        shown = " ".join(str(app.screen.query_one("#row-text", Static).visual).split())
-        assert "NO VERDICT" in shown
+        assert "NO VERDICT" in below(app)
         await press(app, "escape")
         await until(pilot, on(app, MeasureScreen))
         await press(app, "q")
@@ -216,7 +224,14 @@ def test_a_session_is_gone_on_with_where_it_was_left(front: Front) -> None:
     async def second(pilot: Pilot[None], app: StationApp) -> None:
         assert "1 of 2 runs" in rows(app)[0]
         await press(app, "enter")
-        await until(pilot, on(app, MeasureScreen))
+        await until(pilot, on(app, PrepareScreen))
+        assert "4 of 4" in now(app)
+        assert "Left to do: 1 runs" in below(app)
+        await press(app, "t")
+        await answer_temperature(pilot, app, "21,5")
+        await until(pilot, on(app, PrepareScreen))
+        await until(pilot, lambda: "Temperature of the shop before: 21.5 °C." in below(app))
+        await confirm_all(pilot, app)
         await until(pilot, lambda: app.board.state is State.ANNOUNCED)
         assert app.board.accepted == 1
         app.close_down()  # as a polite kill does: not back to the start screen, but to the end
@@ -224,6 +239,7 @@ def test_a_session_is_gone_on_with_where_it_was_left(front: Front) -> None:
 
     play(front, first)
     play(front, second)
+    assert [note.ambient_temp_c for note in read_session(front.under / "virtual").notes] == [21.5]
 
 
 def test_every_key_goes_back_and_wrong_ones_do_nothing(front: Front) -> None:
@@ -328,5 +344,56 @@ def test_an_error_of_the_virtual_machine_stays_on_the_screen(front: Front, monke
         await press(app, "y", "b")
         await until(pilot, lambda: "no pseudo-terminal is left" in now(app))
         assert isinstance(app.screen, PrepareScreen)
+
+    play(front, keys)
+
+
+def test_compensated_programs_are_written_and_command_the_session(front: Front) -> None:
+    small = shipped_folder("fixtures") / "sessions" / "small"
+    shutil.copy(shipped_folder("fixtures") / "models" / "small.yaml", front.under / "model.yaml")
+
+    async def keys(pilot: Pilot[None], app: StationApp) -> None:
+        await press(app, "v")
+        await until(pilot, on(app, NewScreen))
+        app.screen._take(machine=small / "machine.yaml", plan=front.under / "plan.yaml")
+        await press(app, "b")
+        await until(pilot, on(app, PrepareScreen))
+        assert "plain circles" in below(app)
+        await press(app, "w")
+        await until(pilot, on(app, ChooseQuestion))
+        assert [label.split()[0] for label in app.screen._labels] == ["nominal:", "compensated"]
+        await press(app, "escape")
+        await until(pilot, on(app, PrepareScreen))
+        await press(app, "w")
+        await until(pilot, on(app, ChooseQuestion))
+        await press(app, "down", "enter")
+        await until(pilot, lambda: isinstance(app.screen, PrepareScreen) and "compensated with" in below(app))
+        digest = hashlib.sha256((front.under / "model.yaml").read_bytes()).hexdigest()
+        assert f"2 NC programs run the circles that they are named after, compensated with the model {digest[:12]}" in (
+            below(app)
+        )
+        programs = app.screen._prepared.job.programs.values()
+        assert {program.model_sha256 for program in programs} == {digest}
+        await press(app, "escape")
+        await until(pilot, on(app, NewScreen))
+        assert any("virtual-programs" in row for row in rows(app))
+
+    play(front, keys)
+
+
+def test_a_session_under_programs_is_offered_no_others(front: Front) -> None:
+    """What commanded its circles so far commands the rest."""
+    choice = replace(front.virtual_choice(), plan=front.under / "plan.yaml")
+    plain = front.prepare(choice)
+    programs = {("low", Direction.CCW): RunProgram("low-ccw.ngc", b"", "")}
+    prepared = replace(plain, job=replace(plain.job, programs=programs))
+
+    async def keys(_pilot: Pilot[None], app: StationApp) -> None:
+        screen = PrepareScreen(app, front, choice, prepared)
+        screen._goes_on = True
+        await app.push_screen(screen)
+        await press(app, "w")
+        assert app.screen is screen
+        assert not app._works
 
     play(front, keys)

@@ -11,6 +11,7 @@ import asyncio
 import time
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,9 +21,10 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.service.after import After, Result, Step
 from dbbstation.service.bar_calibration import Calibrated
-from dbbstation.service.choice import Choice
+from dbbstation.service.choice import Choice, Prepared
 from dbbstation.service.front import Front
 from dbbstation.service.memory import Line, Memory, Remembered
+from dbbstation.service.order import Gate, Order
 from dbbstation.service.session_list import SessionLine
 from dbbstation.service.work import Progress
 from dbbstation.tui import texts
@@ -98,6 +100,33 @@ def prepare(app: StationApp) -> RowScreen:
     return screen
 
 
+def prepare_again(app: StationApp) -> RowScreen:
+    desk = front()
+    choice = Choice(shipped_folder("fixtures") / "sessions" / "begun", line=DISPLAY)
+    return PrepareScreen(app, desk, choice, desk.prepare(choice))
+
+
+@cache
+def in_turn() -> tuple[Choice, Prepared]:
+    desk = front()
+    table2 = shipped_folder("protocols") / "plans" / "table2.yaml"
+    choice = replace(
+        desk.virtual_choice(),
+        folder=SHOP / "session",
+        plan=table2,
+        line=DISPLAY,
+        bar_waiver="a first look",
+        order=Order.DRIFT,
+        gate=Gate.HOLDERS,
+        job="order 4711",
+    )
+    return choice, desk.prepare(choice)
+
+
+def prepare_in_turn(app: StationApp) -> RowScreen:
+    return PrepareScreen(app, front(), *in_turn())
+
+
 def bar(_app: StationApp) -> RowScreen:
     screen = BarScreen(front(), DISPLAY, lambda _path: None)
     values = dict(zip(texts.BAR_ROWS, ("DBB-0042", "ZB-17", "150.0003", "0.25", "2026-03-01", "20.3"), strict=True))
@@ -149,7 +178,9 @@ def one_time_zone(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-@pytest.mark.parametrize("make", [start, new, prepare, bar, results], ids=lambda make: make.__name__)
+@pytest.mark.parametrize(
+    "make", [start, new, prepare, prepare_again, prepare_in_turn, bar, results], ids=lambda make: make.__name__
+)
 def test_screens_before_and_after_look_as_they_did(
     make: Callable[[StationApp], RowScreen | None], size: tuple[int, int]
 ) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -11,6 +14,10 @@ from click.testing import CliRunner
 
 from dbbstation.cli import COMMANDS
 from dbbstation.cli.station import station
+from dbbstation.files.formats.plan import plan_data, read_inline_plan
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.service.order import Gate, Order, ordered
+from tests.cli.conftest import call
 
 REAL = ["--plan", "p.yaml", "--machine", "m.yaml", "--instrument", "heidenhain-nd281b", "--port", "COM3", "--out", "s"]
 
@@ -76,3 +83,30 @@ def test_what_runs_without_a_screen_never_loads_it() -> None:
 def test_the_help_of_the_station_does_not_load_the_screen_either() -> None:
     code = "import sys; import dbbstation.cli.station; sys.exit('textual' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_order_job_and_programs_reach_the_session_and_the_start_screen(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = importlib.import_module("dbbstation.cli.station")
+    seen: list[Any] = []
+    monkeypatch.setattr(module, "_check_terminal", lambda: None)
+    monkeypatch.setattr(module, "_run", lambda job, _open: seen.append(job) or 0)
+    monkeypatch.setattr(module, "_begin", lambda given, _limits, _model: seen.append(given) or 0)
+    shipped = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
+    machine = shipped_folder("fixtures") / "machines" / "reference.yaml"
+    folder = tmp_path / "programs"
+    done = call("program", "--plan", shipped, "--machine", machine, "--out", folder)
+    assert done.code == 0, done.err
+    said = ["--order", "drift", "--gate", "first", "--job", "order 4711", "--programs", str(folder)]
+    files = ["--plan", str(shipped), "--machine", str(machine), "--out", str(tmp_path / "s")]
+    run(*REAL[4:-2], *files, "--bar-waiver", "a first look", *said)
+    run(*said)
+    job, given = seen
+    planned = ordered(read_inline_plan(shipped), Order.DRIFT, Gate.FIRST)
+    assert plan_data(job.plan) == plan_data(planned)
+    assert set(job.programs) == {
+        (name, way) for name, test in planned.to_domain().tests.items() for way in test.directions
+    }
+    assert job.details.job == given.job == "order 4711"
+    assert (given.order, given.gate, given.programs) == (Order.DRIFT, Gate.FIRST, folder)

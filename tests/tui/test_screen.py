@@ -176,7 +176,7 @@ def test_a_whole_plan_with_every_verdict(short_plan: InlinePlan, tmp_path: Path)
         assert "ccw ✓ accepted" in row(app, "runs")
         assert "1 of 2 accepted" in row(app, "progress")
         await press(app, "q")
-        await until(pilot, lambda: isinstance(app.screen, TemperatureQuestion))
+        await until(pilot, lambda: isinstance(app.screen, TemperatureQuestion) and bool(app.screen.query(Input)))
         app.screen.query_one(Input).value = "20,9"
         await press(app, "enter")
 

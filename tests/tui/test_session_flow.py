@@ -125,7 +125,7 @@ async def confirm_all(pilot: Pilot[None], app: StationApp) -> None:
 
 async def answer_temperature(pilot: Pilot[None], app: StationApp, text: str) -> None:
     """Answer the question for the temperature after the circles; empty: go on without."""
-    await until(pilot, on(app, TemperatureQuestion))
+    await until(pilot, lambda: isinstance(app.screen, TemperatureQuestion) and bool(app.screen.query("Input")))
     app.screen.query_one("Input").value = text
     await press(app, "enter")
 

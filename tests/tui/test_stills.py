@@ -21,7 +21,7 @@ from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
-from dbbstation.quality.finding import Name, found, untold
+from dbbstation.quality.finding import Name, found, undecided
 from dbbstation.station.commands import Accept
 from dbbstation.tui.app import DARK, LIGHT
 from dbbstation.tui.still import still_svg
@@ -49,7 +49,7 @@ def verdict() -> Happening:
 def findings() -> Happening:
     told = (
         found(Name.NOISE, 0.31, 0.61, "µm", "sound", "noisy"),
-        untold(Name.REPEAT, "there is no other run of this test"),
+        undecided(Name.REPEAT, "there is no other run of this test"),
         found(Name.CLOSURE, 4.1, 1.95, "µm", "sound", "the ends are 4.1 µm apart; was the ball touched?"),
     )
     return Happening(findings=told).circle("t0", Direction.CCW)

@@ -42,6 +42,12 @@ if TYPE_CHECKING:
     from dbbstation.station.events import Event
 
 
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Results are written beside the session, which is made up: not into the checkout."""
+    monkeypatch.chdir(tmp_path)
+
+
 class EndsWhileItsMailIsTaken:
     """A sequence that, told to quit, sends its last events just after the mailbox was emptied, and is over."""
 

@@ -1,0 +1,87 @@
+"""`dbbstation study sensitivities`: answers with the constants that decide them halved and doubled."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from studies.sensitivities import Change
+
+_FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
+_FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
+
+
+@click.command()
+@click.argument("drives", metavar="[DRIVE.csv]...", nargs=-1, type=_FILE)
+@click.option(
+    "--amperes",
+    type=(_FILE, click.FloatRange(min=0.0, min_open=True)),
+    multiple=True,
+    metavar="DRIVE.csv N/A",
+    help="A recording of current, and the force that an ampere makes; may be given more than once.",
+)
+@click.option(
+    "--pair",
+    "pairs",
+    type=(_FOLDER, _FOLDER),
+    multiple=True,
+    metavar="A B",
+    help="Two sessions to compare; may be given more than once.",
+)
+@click.option("--jobs", type=click.IntRange(min=1), help="Number of processes [default: all cores].")
+@click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
+def sensitivities(
+    *,
+    drives: tuple[Path, ...],
+    amperes: tuple[tuple[Path, float], ...],
+    pairs: tuple[tuple[Path, Path], ...],
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    r"""Ask again with every constant that decides an answer halved and doubled.
+
+    Drive recordings are asked by the constants of `drive`, pairs of sessions by those of `compare`. A table tells which
+    verdicts change, and which parameter changes most in its standard uncertainties.
+
+    \b
+    Examples:
+      dbbstation study sensitivities drive.csv
+      dbbstation study sensitivities --pair before after --jobs 1
+    """
+    from dbbstation.cli.output import print_json
+    from dbbstation.cli.progress import count_bar
+    from studies.sensitivities import study
+
+    if not (drives or amperes or pairs):
+        raise click.UsageError("give a drive recording, or two sessions with --pair")
+    with count_bar("answers") as progress:
+        changes = study([*((path, None) for path in drives), *amperes], pairs, jobs or os.cpu_count() or 1, progress)
+    if as_json:
+        print_json({"changes": [asdict(change) for change in changes]})
+    else:
+        _print(changes)
+
+
+def _print(changes: list[Change]) -> None:
+    from dbbstation.cli.output import print_table
+
+    print_table(
+        ["constant", "own", "tried", "asked of", "verdicts that change", "most [u]", "parameter"],
+        [
+            [
+                change.constant,
+                f"{change.own:g}",
+                f"{change.tried:g}",
+                change.data,
+                "; ".join(change.verdicts) or "none",
+                f"{change.largest:.2f}",
+                change.parameter,
+            ]
+            for change in changes
+        ],
+    )

@@ -1,0 +1,252 @@
+"""How answers depend on the constants that decide them: each is halved and doubled, on recordings of anybody's."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.diagnosed import default_candidates
+from dbbstation.diagnosis.compare.comparison import compare
+from dbbstation.diagnosis.compare.summary import comparison_summary
+from dbbstation.diagnosis.diagnose import usable_sources
+from dbbstation.diagnosis.drive.identify import identify
+from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
+from dbbstation.diagnosis.drive.summary import drive_summary
+from dbbstation.files.recordings.drive_csv import read_drive
+from dbbstation.processes import each
+from dbbstation.recorded import load_sessions
+from dbbstation.sources.registry import known_sources, sources_named
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number of the program that decides an answer.
+
+    Attributes:
+        module: where it is declared, below `dbbstation.diagnosis`.
+        name: of the constant.
+        others: values to try in its place; empty: half and twice its own.
+    """
+
+    module: str
+    name: str
+    others: tuple[float, ...] = ()
+
+    @property
+    def value(self) -> float:
+        """As the program has it."""
+        return getattr(import_module(f"dbbstation.diagnosis.{self.module}"), self.name)
+
+    @property
+    def tried(self) -> tuple[float, ...]:
+        """Values in its place, whole numbers where it is one."""
+        own = self.value
+        if self.others:
+            return self.others
+        return (max(own // 2, 1), 2 * own) if isinstance(own, int) else (own / 2.0, 2.0 * own)
+
+
+DRIVE = (
+    Constant("drive.channel", "METHOD_SHARE"),
+    Constant("drive.channel", "NEAREST_SHARE"),
+    Constant("drive.channel", "PERIODS_IN_TRAVEL"),
+    Constant("drive.channel", "WAVE_STEP"),
+    Constant("drive.channel", "STRONGEST"),
+    Constant("drive.fit", "METHOD_SHARE"),
+    Constant("drive.signals", "ACCELERATING_SHARE"),
+    Constant("drive.signals", "REACH"),
+    Constant("drive.signals", "MOST"),
+    Constant("drive.pulses", "APART"),
+    Constant("drive.explain", "MOST_LOOKS"),
+)
+"""Of `drive`."""
+
+COMPARE = (
+    Constant("compare.causes", "EQUIVALENT"),
+    Constant("compare.channel", "CHANGE"),
+    Constant("compare.set_up", "JIG_MM"),
+    Constant("compare.comparison", "CENTRED_MM"),
+    Constant("compare.comparison", "CENTRED_SIGMA"),
+    Constant("compare.comparison", "CENTRED_SHAPE"),
+)
+"""Of `compare`."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One answer to be asked for.
+
+    Attributes:
+        constant: which is another; None: the program as it is.
+        value: in its place.
+        paths: one drive recording, or the sessions A and B.
+        force_per_ampere: of a drive recording with a current; None: it has a force [N/A].
+    """
+
+    constant: Constant | None
+    value: float
+    paths: tuple[Path, ...]
+    force_per_ampere: float | None = None
+
+    @property
+    def data(self) -> str:
+        """What it was asked of."""
+        return " and ".join(path.stem for path in self.paths)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the program says.
+
+    Attributes:
+        verdicts: by the name of what was asked.
+        values: value and standard uncertainty of every parameter that is there, by name.
+    """
+
+    verdicts: dict[str, str]
+    values: dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Change:
+    """What another value of a constant does to one answer.
+
+    Attributes:
+        constant: name, with the module that has it.
+        own: as the program has it.
+        tried: in its place.
+        data: what was asked of.
+        verdicts: those that are others, as `name: before -> after`.
+        largest: change of a parameter, in its standard uncertainties.
+        parameter: that one; empty where no parameter is in both answers.
+    """
+
+    constant: str
+    own: float
+    tried: float
+    data: str
+    verdicts: tuple[str, ...]
+    largest: float
+    parameter: str
+
+
+def study(
+    drives: Sequence[tuple[Path, float | None]],
+    pairs: Sequence[tuple[Path, Path]],
+    jobs: int,
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> list[Change]:
+    """Ask for every answer with every constant as it is, halved and doubled.
+
+    Args:
+        drives: recordings, and the force that an ampere makes in each [N/A].
+        pairs: sessions A and B.
+        jobs: processes.
+        progress: told how many answers of how many there are.
+
+    Raises:
+        StationError: a recording cannot be read, or nothing can be said of it.
+    """
+    asked = [((path,), scale, DRIVE) for path, scale in drives] + [((a, b), None, COMPARE) for a, b in pairs]
+    variations = [
+        Variation(constant, value, paths, scale)
+        for paths, scale, constants in asked
+        for constant, value in [
+            (None, 0.0),
+            *((constant, value) for constant in constants for value in constant.tried),
+        ]
+    ]
+    answers: dict[Variation, Answer] = {}
+    for place, answer in each(answer_to, variations, jobs):
+        answers[variations[place]] = answer
+        progress(len(answers), len(variations))
+    return [
+        _change(
+            variation,
+            variation.constant,
+            answers[variation],
+            answers[Variation(None, 0.0, variation.paths, variation.force_per_ampere)],
+        )
+        for variation in variations
+        if variation.constant is not None
+    ]
+
+
+def answer_to(variation: Variation) -> Answer:
+    """Return what the program says with another constant, which has its own value again afterwards."""
+    ask = partial(_pair_answer, *variation.paths) if len(variation.paths) > 1 else partial(_drive_answer, variation)
+    constant = variation.constant
+    if constant is None:
+        return ask()
+    own = constant.value
+    # Modules that import it have it under the same name: a constant of another module of that name is another object or number.
+    holders = [
+        module
+        for name, module in sys.modules.items()
+        if name.startswith("dbbstation.diagnosis.") and getattr(module, constant.name, None) is own
+    ]
+    for module in holders:
+        setattr(module, constant.name, variation.value)
+    try:
+        return ask()
+    finally:
+        for module in holders:
+            setattr(module, constant.name, own)
+
+
+def _drive_answer(variation: Variation) -> Answer:
+    recording = read_drive(variation.paths[0]).recording(variation.force_per_ampere)
+    summary = drive_summary(identify([recording], list(known_drive_sources().values())))
+    base = {name: one for name, one in summary["parameters"].items() if one["identifiable"]}
+    return _answer(summary["sources"], _values(base))
+
+
+def _pair_answer(a: Path, b: Path) -> Answer:
+    one, other = load_sessions([a]), load_sessions([b])
+    candidates = sources_named(default_candidates(known_sources()))
+    usable, lacking = usable_sources(one.machine, [*one.observations, *other.observations], candidates)
+    summary = comparison_summary(compare(one.machine, one.observations, other.observations, usable, lacking), [])
+    answer = _answer(summary["causes"], {})
+    answer.verdicts["the sessions"] = "differ" if summary["differ"] else "do not differ"
+    return answer
+
+
+def _answer(causes: Sequence[dict[str, Any]], values: dict[str, tuple[float, float]]) -> Answer:
+    for cause in causes:
+        if cause["verdict"] == "identified":
+            values |= _values({f"{cause['name']} {name}": one for name, one in cause["parameters"].items()})
+    return Answer({cause["name"]: cause["verdict"] for cause in causes}, values)
+
+
+def _values(numbers: dict[str, dict[str, Any]]) -> dict[str, tuple[float, float]]:
+    return {name: (one["value"], one["uncertainty"]) for name, one in numbers.items() if one["uncertainty"] is not None}
+
+
+def _change(variation: Variation, constant: Constant, now: Answer, before: Answer) -> Change:
+    verdicts = tuple(
+        f"{name}: {verdict} -> {now.verdicts.get(name, 'not asked')}"
+        for name, verdict in before.verdicts.items()
+        if now.verdicts.get(name) != verdict
+    )
+    shifts = {
+        name: abs(now.values[name][0] - value) / uncertainty
+        for name, (value, uncertainty) in before.values.items()
+        if name in now.values and uncertainty > 0.0
+    }
+    most = max(shifts, key=lambda name: shifts[name], default="")
+    return Change(
+        constant=f"{constant.module} {constant.name}",
+        own=constant.value,
+        tried=variation.value,
+        data=variation.data,
+        verdicts=verdicts,
+        largest=shifts.get(most, 0.0),
+        parameter=most,
+    )

@@ -1,0 +1,52 @@
+"""The study of constants: another value holds wherever the constant is used, and only for one answer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import studies.sensitivities as asked
+from dbbstation.diagnosis.drive import channel, fit, identify
+from studies.sensitivities import Answer, Constant, Variation, answer_to, study
+
+SHARE = Constant("drive.channel", "METHOD_SHARE")
+DRIVE = Path("drive.csv")
+
+
+@pytest.fixture
+def answers(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float]]:
+    """What the program had as this share, where it is declared, where it is imported, and its namesake elsewhere."""
+    seen: list[tuple[float, float, float]] = []
+
+    def answer(_: Variation) -> Answer:
+        seen.append((channel.METHOD_SHARE, identify.METHOD_SHARE, fit.METHOD_SHARE))
+        share = 1e3 * channel.METHOD_SHARE
+        return Answer({"play": "identified" if share < 3.0 else "ambiguous"}, {"mass_kg": (10.0 + share, 0.5)})
+
+    monkeypatch.setattr(asked, "_drive_answer", answer)
+    return seen
+
+
+def test_another_value_holds_for_one_answer_and_for_no_namesake(answers):
+    own, namesake = channel.METHOD_SHARE, fit.METHOD_SHARE
+    answer_to(Variation(SHARE, 0.5, (DRIVE,)))
+    answer_to(Variation(None, 0.0, (DRIVE,)))
+    assert answers == [(0.5, 0.5, namesake), (own, own, namesake)]
+
+
+def test_what_changes_is_said_in_verdicts_and_uncertainties(answers, monkeypatch):
+    monkeypatch.setattr(asked, "DRIVE", (SHARE,))
+    half, twice = study([(DRIVE, None)], [], 1)
+    assert len(answers) == 3
+    assert (half.tried, twice.tried) == (0.5 * half.own, 2.0 * half.own)
+    assert half.verdicts == ()
+    assert twice.verdicts == ("play: identified -> ambiguous",)
+    # From 12 to 11 and to 14 kg, with 0.5 kg.
+    assert (half.largest, twice.largest) == (pytest.approx(2.0), pytest.approx(4.0))
+    assert twice.parameter == "mass_kg"
+
+
+def test_whole_numbers_stay_whole_and_above_zero():
+    assert Constant("drive.explain", "MOST_LOOKS").tried == (1, 4)
+    assert Constant("drive.channel", "STRONGEST").tried == (3, 12)

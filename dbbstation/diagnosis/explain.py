@@ -90,7 +90,7 @@ class Settled:
 
     @property
     def noise_mm(self) -> float:
-        """Standard deviation of white noise that smooth things would feel as they feel this one, per sample [mm]."""
+        """Standard deviation, per sample, of white noise that would act on smooth effects as this one does [mm]."""
         return float(np.sqrt(self.noise.power[0]))
 
 

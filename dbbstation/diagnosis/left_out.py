@@ -70,7 +70,7 @@ def _tests_of(observations: Sequence[Observation]) -> list[int]:
 
 
 def _single_noise_mm(observations: Sequence[Observation], noise_mm: float, fine_mm: float) -> float:
-    """Noise of a single sample, where the low harmonics, few of all, feel more of it than the fine ones [mm]."""
+    """Noise of a single sample, where the low harmonics, few of all, carry more of it than the fine ones [mm]."""
     samples = float(np.mean([len(o.raw) for o in observations]))
     low = min((2 * LOW + 1) / samples, 1.0)
     return float(np.sqrt(low * noise_mm**2 + (1.0 - low) * min(fine_mm, noise_mm) ** 2))

@@ -55,7 +55,7 @@ def locate(
     Args:
         observations: runs.
         residual_mm: what the base model leaves of each, shape (n,) [mm].
-        noise_mm: of one sample, as smooth things feel it [mm].
+        noise_mm: of one sample, as it acts on smooth effects [mm].
         struts: per run, what each strut contributes to the reading, shape (n, 6) [mm]; None where none does.
         variable: what organises the misfit.
     """

@@ -14,6 +14,7 @@ from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.read_off import EQUIVALENT
 from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
@@ -29,10 +30,6 @@ TESTABLE_SIGMA = 5.0
 
 TESTABLE_SHARE = 0.5
 """Share of the combinations of a cause's amplitudes that must be seen for the cause to be ruled out."""
-
-EQUIVALENT = 0.999
-"""Cosine between the effects of two causes, beside base and other causes, from which on no test of these tells one from the
-other: what is left of one beside the other is 4.5 % of it, about what real machines depart from a formula."""
 
 EVEN = 0.5
 """Probability from which on a cause that is not certain is rather there than not."""

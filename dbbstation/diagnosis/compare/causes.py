@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
+from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import ALIKE, parts_of
 from dbbstation.inference.channel import Law
+from dbbstation.inference.read_off import EQUIVALENT
 from dbbstation.sources.contract import Effect, LinearSource, Need
 
 if TYPE_CHECKING:
@@ -19,9 +21,9 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.sources.contract import ErrorSource, Parameter
 
-EQUIVALENT = 0.045
+HARDLY_DIFFERENT = sqrt(1.0 - EQUIVALENT**2)
 """Share of an effect by which it differs between the sessions up to which nothing tells what acts in B from what no longer acts as
-it did in A: the cosine between the two is 0.999."""
+it did in A: the sine of the angle whose cosine is `EQUIVALENT`, 4.5 %."""
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,7 @@ class Change:
         of_a, of_b = self._of(0, point), self._of(1, point)
         size = max(float(np.linalg.norm(of_a)), float(np.linalg.norm(of_b)), 1e-300)
         apart = float(np.linalg.norm(of_b - of_a)) / size
-        return (CHANGED,) if apart <= EQUIVALENT else (IN_B, IN_A, IN_BOTH)
+        return (CHANGED,) if apart <= HARDLY_DIFFERENT else (IN_B, IN_A, IN_BOTH)
 
     def _grid(self, k: int, parameter: Parameter) -> tuple[float, ...]:
         """Values of a nonlinear parameter that these runs can show, rising."""

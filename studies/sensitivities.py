@@ -59,7 +59,7 @@ DRIVE = (
     Constant("drive.channel", "PERIODS_IN_TRAVEL"),
     Constant("drive.channel", "WAVE_STEP"),
     Constant("drive.channel", "STRONGEST"),
-    Constant("drive.fit", "METHOD_SHARE"),
+    Constant("drive.fit", "METHOD_U_SHARE"),
     Constant("drive.signals", "ACCELERATING_SHARE"),
     Constant("drive.signals", "REACH"),
     Constant("drive.signals", "MOST"),
@@ -69,7 +69,7 @@ DRIVE = (
 """Of `drive`."""
 
 COMPARE = (
-    Constant("compare.causes", "EQUIVALENT"),
+    Constant("compare.causes", "HARDLY_DIFFERENT"),
     Constant("compare.channel", "CHANGE"),
     Constant("compare.set_up", "JIG_MM"),
     Constant("compare.comparison", "CENTRED_MM"),

@@ -16,11 +16,11 @@ DRIVE = Path("drive.csv")
 
 @pytest.fixture
 def answers(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float]]:
-    """What the program had as this share, where it is declared, where it is imported, and its namesake elsewhere."""
+    """What the program had as this share, where it is declared, where it is imported, and another constant."""
     seen: list[tuple[float, float, float]] = []
 
     def answer(_: Variation) -> Answer:
-        seen.append((channel.METHOD_SHARE, identify.METHOD_SHARE, fit.METHOD_SHARE))
+        seen.append((channel.METHOD_SHARE, identify.METHOD_SHARE, fit.LIKELY))
         share = 1e3 * channel.METHOD_SHARE
         return Answer({"play": "identified" if share < 3.0 else "ambiguous"}, {"mass_kg": (10.0 + share, 0.5)})
 
@@ -28,11 +28,11 @@ def answers(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float, float]]
     return seen
 
 
-def test_another_value_holds_for_one_answer_and_for_no_namesake(answers):
-    own, namesake = channel.METHOD_SHARE, fit.METHOD_SHARE
+def test_another_value_holds_for_one_answer_and_no_other_constant(answers):
+    own, other = channel.METHOD_SHARE, fit.LIKELY
     answer_to(Variation(SHARE, 0.5, (DRIVE,)))
     answer_to(Variation(None, 0.0, (DRIVE,)))
-    assert answers == [(0.5, 0.5, namesake), (own, own, namesake)]
+    assert answers == [(0.5, 0.5, other), (own, own, other)]
 
 
 def test_what_changes_is_said_in_verdicts_and_uncertainties(answers, monkeypatch):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import expit, logsumexp
 
+from dbbstation.calibration.fit.methods import CENTRED_MM
 from dbbstation.diagnosis.compare.channel import channel_of
 from dbbstation.diagnosis.compare.details import both_directions, effects_of, noticed_mm, predicted
 from dbbstation.diagnosis.compare.pairs import match
@@ -39,9 +40,8 @@ if TYPE_CHECKING:
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
 
-CENTRED_MM = 2e-5
 CENTRED_SIGMA = 4.0
-"""A circle whose centre lies this close to the commanded one, in every run, had it removed: balls never sit so well."""
+"""Standard uncertainties by noise within which a centre lies, in every run, where it was removed; or within `CENTRED_MM`."""
 
 CENTRED_SHAPE = 25.0
 """... if what is left of it is this many times the smallest centre that would have been noticed."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.settle import Settled
 
-METHOD_SHARE = 5e-4
+METHOD_U_SHARE = 5e-4
 """Standard uncertainty, of a value, that low-pass, differences and the moment of a reversal leave of a perfect recording;
 on simulated drives they make the mass too small by half of this."""
 
@@ -83,7 +83,7 @@ class DriveFit:
         values = self.values[every]
         width = len(form.amplitudes)
         found = {
-            p.name: Value(float(values[k]), float(np.hypot(sigma[k], METHOD_SHARE * values[k])), p.unit)
+            p.name: Value(float(values[k]), float(np.hypot(sigma[k], METHOD_U_SHARE * values[k])), p.unit)
             for k, p in enumerate(form.amplitudes)
         }
         shaped = moved(law, member, values)
@@ -219,7 +219,7 @@ def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[s
     found = {}
     for name, value in best.base.items():
         between = sum(p * (base[name].value - value.value) ** 2 for p, base in fits)
-        sigma = float(np.sqrt(value.uncertainty**2 + between + (METHOD_SHARE * value.value) ** 2))
+        sigma = float(np.sqrt(value.uncertainty**2 + between + (METHOD_U_SHARE * value.value) ** 2))
         found[name] = Value(value.value, sigma, value.unit)
     return found
 

@@ -55,8 +55,8 @@ def play(
             await app.push_screen(ResultsScreen(after))
             screen = AcceptanceScreen(after, search)
             await app.push_screen(screen)
-            screen._searching.wait()
-            app.look()
+            while screen._found is None and not screen._failure:
+                await pilot.pause(0.02)
             await pilot.pause()
             await keys(pilot, app)
 

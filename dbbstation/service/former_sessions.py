@@ -81,7 +81,9 @@ def before_and_now(folder: Path) -> BeforeAndNow:
     return BeforeAndNow(in_force(now, by_sha256), tuple(formers))
 
 
-def former_sessions(now: SessionFolder, under: Path) -> list[tuple[datetime, SessionFolder]]:
+def former_sessions(
+    now: SessionFolder, under: Path, tests: set[str] | None = None
+) -> list[tuple[datetime, SessionFolder]]:
     """Return sessions of the same machine, plan and jig that ended before this one began, the last first.
 
     The nominal machines are the same, serial numbers do not differ, and every test of this session's accepted runs was run there
@@ -90,10 +92,11 @@ def former_sessions(now: SessionFolder, under: Path) -> list[tuple[datetime, Ses
     Args:
         now: the session.
         under: folder to search, and the folders in it.
+        tests: that must have been run there; None: those above.
     """
     accepted = now.in_state(RunState.ACCEPTED)
     began = min((run.started for run in accepted if run.started is not None), default=None)
-    tests = {run.test for run in accepted} or set(now.plan.tests)
+    tests = tests or {run.test for run in accepted} or set(now.plan.tests)
     found = []
     for _, folder in dated_folders(under):
         if folder == now.folder.absolute():

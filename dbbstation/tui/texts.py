@@ -47,7 +47,8 @@ HELP = {
             "The top line names plan, run and state. The sentence below it says what to do now.",
             (
                 "The circle shows the deviation of the bar from its nominal length, magnified. The dotted circle is the nominal one. "
-                "Counter-clockwise is drawn thick, clockwise thin. A mark shows where the machine is."
+                "Counter-clockwise is drawn thick, clockwise thin. A mark shows where the machine is. Dim beneath lies the last accepted "
+                "circle of the session before, of the same machine and test, where there is one."
             ),
             (
                 "On the right: the live reading, the set-up with a map of the plate, the figures of the last two runs, all runs of "

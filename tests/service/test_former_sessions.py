@@ -7,12 +7,15 @@ import shutil
 from datetime import timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.plan.circle import Direction
 from dbbstation.service.after import USUAL, After, Step
 from dbbstation.service.former_sessions import Former, InForce, before_and_now, former_sessions, keep_models
+from dbbstation.service.last_session import last_traces
 from dbbstation.service.work import Progress
 from tests.plant.mechanisms.balls import CmmScatter
 from tests.plant.plan import subset, table_ii_plan
@@ -116,3 +119,33 @@ def test_an_acceptance_is_the_report_of_both_sessions(shop: Path) -> None:
     after.look()
     assert after.results[Step.ACCEPTANCE].path == after.folder / "acceptance.html"
     assert [path.parent for path in after.kept] == [after.folder]
+
+
+def test_the_last_circles_of_a_test_come_from_disk_with_their_lengths(shop: Path) -> None:
+    """Against the rows of the run's file: every length on the turn, less the bar's nominal length."""
+    traces = last_traces(shop / "now", "a")
+    assert set(traces) == {Direction.CCW, Direction.CW}
+    for direction, trace in traces.items():
+        (file,) = (shop / "gone" / "runs").glob(f"a-{direction}*.csv")
+        rows = [row.split(",") for row in file.read_text("utf-8").splitlines() if not row.startswith("#")]
+        column = rows[0].index("length_mm")
+        lengths = {round(float(row[column]), 6) for row in rows[1:]}
+        measured = np.round(trace.circle.bar_mm + trace.deviation_um / 1e3, 6)
+        assert len(trace) > 100
+        assert set(measured.tolist()) <= lengths
+        assert trace.centred is not None
+        # About its own centre the first undulation is gone.
+        once = np.exp(-1j * np.radians(trace.theta_deg))
+        assert abs(np.mean(trace.centred.deviation_um * once)) < 0.1 * abs(np.mean(trace.deviation_um * once)) + 0.1
+    assert last_traces(shop / "now", "no such test") == {}
+    assert last_traces(shop / "nominal", "a") == {}
+
+
+def test_a_session_with_a_damaged_run_is_passed_over(shop: Path) -> None:
+    newest = last_traces(shop / "now", "a")[Direction.CW].deviation_um
+    (file,) = (shop / "gone" / "runs").glob("a-ccw*.csv")
+    file.write_text("no run", "utf-8")
+    assert names(shop) == ["there", "nominal"]
+    traces = last_traces(shop / "now", "a")
+    assert set(traces) == {Direction.CCW, Direction.CW}
+    assert not np.array_equal(traces[Direction.CW].deviation_um, newest)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.plan.tolerance import Tolerance
     from dbbstation.tolerated import Held, ToleratedCircle
 
 
@@ -68,9 +69,11 @@ class Reported:
 def numbers_of(reported: Reported) -> dict[str, Any]:
     """Return the numbers of a report: what its command prints as JSON, and its template shows."""
     now = tolerated_circles(reported.found.circles)
-    held = held_against(reported.settings.tolerances, now, reported.coverage_factor)
+    tolerances = reported.settings.tolerances
+    held = held_against(tolerances, now, reported.coverage_factor)
     verdict = verdict_of(held, reported.found, reported.coverage_factor)
     before = () if reported.before is None else tolerated_circles(reported.before.circles)
+    tests = dict.fromkeys(one.test for one in now)
     rows = list(_side_by_side(now, before))
     return {
         "verdict": {
@@ -80,7 +83,13 @@ def numbers_of(reported: Reported) -> dict[str, Any]:
             "to_do": list(verdict.to_do),
         },
         "coverage_factor": reported.coverage_factor,
-        "tolerances": [_held_data(one, reported.coverage_factor) for one in held],
+        "tolerances": [_held_both(one, now, before, reported.coverage_factor) for one in tolerances],
+        "tolerances_by_test": [
+            {"test": test, **_held_both(one, _of_test(now, test), _of_test(before, test), reported.coverage_factor)}
+            for test in tests
+            for one in tolerances
+            if any(one.holds_for(circle.test, circle.direction) for circle in _of_test(now, test))
+        ],
         "measured": rows,
         "measured_means": _means(rows),
         "circles": circled_summary(reported.found, reported.chosen),
@@ -150,6 +159,20 @@ def _notes_before(reported: Reported) -> list[str]:
 
 def _tests_of(found: Circled, session: str) -> list[str]:
     return list(dict.fromkeys(one.entry.test for one in found.circles if one.session == session))
+
+
+def _of_test(circles: Sequence[ToleratedCircle], test: str) -> list[ToleratedCircle]:
+    return [one for one in circles if one.test == test]
+
+
+def _held_both(
+    tolerance: Tolerance, now: Sequence[ToleratedCircle], before: Sequence[ToleratedCircle], coverage_factor: float
+) -> dict[str, Any]:
+    """Return what one tolerance says of circles now and before; nothing of before where it holds for none of them."""
+    (held,) = held_against((tolerance,), now, coverage_factor)
+    (former,) = held_against((tolerance,), before, coverage_factor)
+    told = None if former.worst is None else _held_data(former, coverage_factor)
+    return {**_held_data(held, coverage_factor), "before": told}
 
 
 def _held_data(held: Held, coverage_factor: float) -> dict[str, Any]:

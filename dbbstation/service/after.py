@@ -6,11 +6,14 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.service.former_sessions import keep_models
 from dbbstation.service.work import Progress, Work
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
+
+    from dbbstation.service.former_sessions import Former
 
 
 class Step(StrEnum):
@@ -20,9 +23,14 @@ class Step(StrEnum):
     DIAGNOSE = "diagnose"
     PROGRAMS = "programs"
     REPORT = "report"
+    ACCEPTANCE = "acceptance"
 
+
+USUAL = (Step.CALIBRATE, Step.DIAGNOSE, Step.PROGRAMS, Step.REPORT)
+"""Steps on the session alone: an acceptance also needs one that was measured before."""
 
 KINEMATIC, JOINT, PROGRAMS, REPORT = "model.yaml", "joint-model.yaml", "programs", "report.html"
+ACCEPTANCE = "acceptance.html"
 """Names in the folder of results."""
 
 
@@ -55,6 +63,12 @@ class After:
         model: of an earlier calibration, that the circles are held against until this one has a model; None: none.
         settings: file of the shop's settings where one was named; None: those that are found.
         start: starts a command; a process of its own.
+
+    Attributes:
+        session: its folder.
+        results: how each step stands.
+        former: session that an acceptance holds it against; None: none was chosen.
+        kept: copies of the models in force then.
     """
 
     def __init__(
@@ -72,6 +86,8 @@ class After:
         self._folder: Path | None = None
         self._running: tuple[Step, Work] | None = None
         self._waiting: list[Step] = []
+        self.former: Former | None = None
+        self.kept: tuple[Path, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -97,7 +113,21 @@ class After:
 
     def can(self, step: Step) -> bool:
         """Whether a step can be begun now."""
-        return self.busy is None and not (step is Step.PROGRAMS and self.model is None)
+        lacking = {Step.PROGRAMS: self.model is None, Step.ACCEPTANCE: self.former is None}
+        return self.busy is None and not lacking.get(step, False)
+
+    def accept(self, former: Former) -> None:
+        """Hold the session against one that was measured before; the models in force then are copied first.
+
+        Raises:
+            OutputError: a copy cannot be written.
+            OSError: a model cannot be read.
+        """
+        if self.busy is not None:
+            return
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.former, self.kept = former, keep_models(former, self.folder)
+        self.do(Step.ACCEPTANCE)
 
     def do(self, *steps: Step) -> None:
         """Do these steps, one behind the other; a step that fails or is cancelled ends the row."""
@@ -158,6 +188,10 @@ class After:
                 return [*settings, "program", "--plan", plan, "--machine", machine, *model, *out]
             case Step.REPORT:
                 return [*settings, "report", session, *model, *out]
+            case Step.ACCEPTANCE:
+                if self.former is None:
+                    raise ValueError("no session was chosen to hold this one against")
+                return [*settings, "report", session, "--before", str(self.former.folder), *out]
 
     def _files(self) -> tuple[str, str]:
         from dbbstation.files.recordings.session import read_session  # noqa: PLC0415 - read when it is needed, anew
@@ -167,4 +201,6 @@ class After:
 
     @staticmethod
     def _out(step: Step) -> str:
-        return {Step.CALIBRATE: KINEMATIC, Step.DIAGNOSE: JOINT, Step.PROGRAMS: PROGRAMS, Step.REPORT: REPORT}[step]
+        return {**dict(zip(USUAL, (KINEMATIC, JOINT, PROGRAMS, REPORT), strict=True)), Step.ACCEPTANCE: ACCEPTANCE}[
+            step
+        ]

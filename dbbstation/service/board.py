@@ -92,6 +92,7 @@ class Board:
         lost: samples that the line lost during the run that goes on, or went on last.
         swept_deg: travelled since the feed-in [deg].
         traces: of the test that was started last, by direction.
+        last: circles of the same test in the session before, by direction; empty where none were found.
         difference: of their directions; None before both are complete.
         running: direction of the run that is on its circle; None where none is.
         results: what completed runs say, the last ones.
@@ -116,6 +117,7 @@ class Board:
     lost: int = 0
     swept_deg: float = 0.0
     traces: dict[Direction, LiveTrace] = field(default_factory=dict)
+    last: Mapping[Direction, LiveTrace] = field(default_factory=dict)
     difference: Derived | None = None
     running: Direction | None = None
     results: deque[events.RunCompleted] = field(default_factory=lambda: deque(maxlen=2))
@@ -146,6 +148,26 @@ class Board:
         if self.difference is not None:
             views[View.DIFFERENCE] = {Direction.CCW: self.difference}
         return views
+
+    @property
+    def beneath(self) -> dict[View, Mapping[Direction, LiveTrace | Derived]]:
+        """What the session before showed of the directions that are drawn; nothing of another test, or beneath a difference."""
+        views = self.views
+        mine = {way: one for way, one in self.last.items() if one.run.test == self.test}
+        return {
+            View.MEASURED: {way: one for way, one in mine.items() if way in views[View.MEASURED]},
+            View.CENTRED: {
+                way: one.centred
+                for way, one in mine.items()
+                if one.centred is not None and way in views.get(View.CENTRED, {})
+            },
+        }
+
+    @property
+    def test(self) -> str:
+        """Name of the test that the traces are of, before the first run of the announced one; empty before anything."""
+        announced = self.announced.run.test if self.announced else ""
+        return next((trace.run.test for trace in self.traces.values()), announced)
 
     @property
     def accepted(self) -> int:

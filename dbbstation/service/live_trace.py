@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from dbbstation.plan.circle import Circle
     from dbbstation.station.events import RunId, Sample
+    from dbbstation.trace.circle import RawCircle
 
 _FIRST_ROOM = 4096
 
@@ -58,6 +59,16 @@ class LiveTrace:
         self._count = 0
         self._step, self._step_from = -1, 0
         self._data = np.empty((2, _FIRST_ROOM))
+
+    @classmethod
+    def of(cls, run: RunId, turn: RawCircle) -> LiveTrace:
+        """Return the trace of a recorded turn, centred too; every sample of it is kept."""
+        trace = cls(run, turn.circle)
+        deviation_um = 1e3 * (turn.length_mm - turn.circle.bar_mm)
+        trace._append(turn.circle.theta_deg(turn.phi_deg), deviation_um)
+        trace.largest_um = float(np.abs(deviation_um).max())
+        trace.centre()
+        return trace
 
     def __len__(self) -> int:
         return self._count

@@ -64,6 +64,11 @@ def list_sessions(under: Path, remembered: Iterable[Path] = ()) -> tuple[Session
         under: folder to search, and the folders in it.
         remembered: further session folders; those that are gone are left out.
     """
+    return tuple(_line(folder, datetime.fromtimestamp(at, UTC)) for at, folder in dated_folders(under, remembered))
+
+
+def dated_folders(under: Path, remembered: Iterable[Path] = ()) -> list[tuple[float, Path]]:
+    """Return session folders with the time that their files were written [s since 1970]; arguments as of `list_sessions`."""
     folders = {folder.absolute() for folder in (*_found(under, DEPTH), *remembered)}
     dated = []
     for folder in folders:
@@ -72,7 +77,7 @@ def list_sessions(under: Path, remembered: Iterable[Path] = ()) -> tuple[Session
         except OSError:
             continue
     dated.sort(key=lambda one: (-one[0], one[1]))
-    return tuple(_line(folder, datetime.fromtimestamp(at, UTC)) for at, folder in dated[:MOST])
+    return dated[:MOST]
 
 
 def _found(folder: Path, depth: int) -> Iterator[Path]:

@@ -15,6 +15,7 @@ from dbbstation.errors import StationError
 from dbbstation.service.after import After
 from dbbstation.service.background import Background
 from dbbstation.service.board import Board
+from dbbstation.service.last_session import last_traces
 from dbbstation.service.messages import Message, Weight
 from dbbstation.service.shop_temperature import note_temperature, shop_degc
 from dbbstation.station.commands import Command, Note, Quit
@@ -35,15 +36,17 @@ from dbbstation.tui.temperature_question import TemperatureQuestion
 from dbbstation.tui.texts import HELP
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     from textual.binding import BindingType
     from textual.events import Event as ScreenEvent
     from textual.screen import Screen
 
+    from dbbstation.plan.circle import Direction
     from dbbstation.service.board import SequenceOpened
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front, Opened
+    from dbbstation.service.live_trace import LiveTrace
     from dbbstation.station.events import Event
 
 __all__ = ["DARK", "LIGHT", "LOOK_S", "Sequence", "Shown", "StationApp"]
@@ -128,6 +131,7 @@ class StationApp(App[None]):
         self._leaving = self._opening = self._wholly = False
         self._works: list[tuple[Background[Any], Callable[[Any], None], Callable[[Exception], None]]] = []
         self._after: dict[Path, After] = {}
+        self._looked_up: tuple[Path, str] | None = None
 
     def get_default_screen(self) -> MeasureScreen | StartScreen:
         """Return the screen at the bottom of the stack."""
@@ -175,6 +179,7 @@ class StationApp(App[None]):
             self.board.take(event)
         if self.board.state in VERDICT and before not in VERDICT:
             self.bell()
+        self._look_up_last()
         self._drop_stale_question()
         self.draw()
         if runner.crash is not None:
@@ -186,6 +191,20 @@ class StationApp(App[None]):
     def crash(self) -> Exception | None:
         """What ended the sequence and should not have: a mistake in the program."""
         return None if self._runner is None else self._runner.crash
+
+    def _look_up_last(self) -> None:
+        """Have the circles of the session before read, once a test; where there are none, none are drawn."""
+        board, folder = self.board, Path(self.board.session)
+        if not board.session or not board.test or self._looked_up == (folder, board.test):
+            return
+        test = board.test
+        self._looked_up = folder, test
+
+        def found(traces: Mapping[Direction, LiveTrace]) -> None:
+            board.last = traces
+
+        # What is wrong with the session itself, the sequence says.
+        self.do(lambda: last_traces(folder, test), found, lambda _error: None)
 
     def _finish_works(self) -> None:
         """Pass on what was done in the background."""

@@ -94,7 +94,9 @@ class MeasureScreen(RunScreen):
         views = board.views
         view = self._view if self._view in views else View.MEASURED
         for trace in self.query(TraceView):
-            trace.show(board.circle, views[view], board.running if view is View.MEASURED else None)
+            trace.show(
+                board.circle, views[view], board.running if view is View.MEASURED else None, board.beneath.get(view, {})
+            )
         judged = board.state in VERDICT and board.completed is not None and bool(board.completed.findings)
         self.set_class(judged, "-verdict")
 

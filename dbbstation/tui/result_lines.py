@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from dbbstation.service.after import Step
 from dbbstation.tui import texts
+from dbbstation.tui.acceptance_lines import worst_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -70,9 +71,15 @@ def _reported(answer: Mapping[str, Any]) -> Iterator[str]:
     yield from verdict["to_do"][:_MOST]
 
 
+def _accepted(answer: Mapping[str, Any]) -> Iterator[str]:
+    yield texts.ACCEPTANCE_VERDICT[answer["verdict"]["kind"]]
+    yield from worst_lines(answer)
+
+
 _LINES = {
     Step.CALIBRATE: _calibrated,
     Step.DIAGNOSE: _diagnosed,
     Step.PROGRAMS: _programmed,
     Step.REPORT: _reported,
+    Step.ACCEPTANCE: _accepted,
 }

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.content import Content
 from textual.widgets import OptionList
 
-from dbbstation.service.after import Step
+from dbbstation.service.after import USUAL, Step
 from dbbstation.service.work import Progress
 from dbbstation.tui import texts
+from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.durations import duration
 from dbbstation.tui.panel import lines
 from dbbstation.tui.question import YesQuestion
@@ -40,6 +41,7 @@ class ResultsScreen(RowScreen):
         ("d", "step('diagnose')", "Diagnose"),
         ("p", "step('programs')", "Programs"),
         ("r", "step('report')", "Report"),
+        ("b", "acceptance", "Acceptance"),
         ("x", "cancel", "End"),
         ("escape,q", "back", "Back"),
     ]
@@ -77,8 +79,10 @@ class ResultsScreen(RowScreen):
         self._draw()
 
     def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
-        """Do the chosen step."""
-        if self._after.can(STEPS[self.at]):
+        """Do the chosen step; an acceptance has a screen of its own."""
+        if STEPS[self.at] is Step.ACCEPTANCE:
+            self.action_acceptance()
+        elif self._after.can(STEPS[self.at]):
             self._begin(STEPS[self.at])
 
     def action_step(self, name: str) -> None:
@@ -87,7 +91,12 @@ class ResultsScreen(RowScreen):
 
     def action_every(self) -> None:
         """Do all steps, one behind the other."""
-        self._begin(*STEPS)
+        self._begin(*USUAL)
+
+    def action_acceptance(self) -> None:
+        """Hold the session against one that was measured before."""
+        self._go_to(Step.ACCEPTANCE)
+        self.app.push_screen(AcceptanceScreen(self._after))
 
     def action_cancel(self) -> None:
         """End what is being done."""

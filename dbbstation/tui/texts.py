@@ -47,7 +47,8 @@ HELP = {
             "The top line names plan, run and state. The sentence below it says what to do now.",
             (
                 "The circle shows the deviation of the bar from its nominal length, magnified. The dotted circle is the nominal one. "
-                "Counter-clockwise is drawn thick, clockwise thin. A mark shows where the machine is."
+                "Counter-clockwise is drawn thick, clockwise thin. A mark shows where the machine is. Dim beneath lies the last accepted "
+                "circle of the session before, of the same machine and test, where there is one."
             ),
             (
                 "On the right: the live reading, the set-up with a map of the plate, the figures of the last two runs, all runs of "
@@ -187,25 +188,53 @@ HELP = {
         "Results",
         (
             (
-                "Four steps on the accepted runs. Each is a command of the program in a process of its own, so that it can be ended; "
+                "Five steps on the accepted runs. Each is a command of the program in a process of its own, so that it can be ended; "
                 "what it wrote before stays. Files go into a new folder beside the session."
             ),
             (
                 "Calibrate fits the kinematic parameters and says what the plan could not see. Diagnose looks for causes that the "
                 "calibration leaves out. Programs are compensated with the best model there is. The report holds the circles "
-                "against the shop's tolerances, with their uncertainty: whether a calibration is due."
+                "against the shop's tolerances, with their uncertainty: whether a calibration is due. Acceptance puts the circles "
+                "beside those of a session before."
             ),
         ),
         {
-            "a": "All four steps, one behind the other.",
+            "a": "The first four steps, one behind the other.",
             "c": "Calibrate.",
             "d": "Diagnose.",
             "p": "Write compensated NC programs.",
             "r": "Write the report: the verdict against the shop's tolerances.",
+            "b": "Acceptance: circles as measured before and now, against the shop's tolerances.",
             "x": "End the step that is being done.",
             "up": "The step above; its result stands below the list.",
             "down": "The step below.",
             "escape": "Back. A step that is being done is ended, after a question.",
+        },
+    ),
+    "acceptance": Help(
+        "Acceptance",
+        (
+            (
+                "Circles as measured before and now; nothing here is predicted. The sessions before are those of the same machine, "
+                "plan and jig beside this one, that ended before it began."
+            ),
+            (
+                "A row for each test and tolerance of the shop's settings: its worst circle before and now [µm], the limit [µm], "
+                "U (k = 2) now [µm]. PASS: the figure and U keep within the limit. FAIL: the figure less U exceeds it. CANNOT TELL: "
+                "the limit lies within U."
+            ),
+            (
+                "Below the list stand the worst circles of all tests, what the circles ran by, and the way back: the model that was "
+                "in force before is copied beside the report, and nothing is overwritten."
+            ),
+        ),
+        {
+            "enter": "Hold the session against the chosen one.",
+            "b": "Choose another session before.",
+            "x": "End the comparison that is being made.",
+            "up": "The row above.",
+            "down": "The row below.",
+            "escape": "Back to the results.",
         },
     ),
     "everywhere": Help(
@@ -427,6 +456,7 @@ STEPS: Mapping[Step, tuple[str, str]] = {
     Step.DIAGNOSE: ("D", "Diagnose: what the calibration leaves out"),
     Step.PROGRAMS: ("P", "Programs: compensated NC programs of the circles"),
     Step.REPORT: ("R", "Report: verdict against the shop's tolerances"),
+    Step.ACCEPTANCE: ("B", "Acceptance: before and now, as measured"),
 }
 STEP_WORDS: Mapping[Progress | None, str] = {
     None: "not yet",
@@ -443,7 +473,7 @@ STEP_SIGNS: Mapping[Progress | None, str] = {
     Progress.CANCELLED: "-",
 }
 STEP_BEGINS = "beginning"
-RESULTS_IDLE = "A does all steps, X ends one; results go to {folder}."
+RESULTS_IDLE = "A does the first four, X ends one; results go to {folder}."
 RESULTS_BUSY = "Working; X ends the step, Esc goes back."
 RESULTS_NO_MODEL = "Programs need a model: C calibrates, D diagnoses."
 RESULTS_EMPTY = "Nothing yet."
@@ -479,6 +509,50 @@ REPORT_VERDICT: Mapping[str, str] = {
     "cannot tell": "CANNOT TELL: a limit lies within the uncertainty.",
     "none": "NO VERDICT: the shop's settings have no tolerances.",
 }
+
+ACCEPTANCE_VERDICT: Mapping[str, str] = {
+    "within": "PASS: every circle is within the shop's tolerances under the programs of this session.",
+    "exceeded": "FAIL: a circle exceeds the shop's tolerances under the programs of this session.",
+    "cannot tell": "CANNOT TELL: a limit lies within the uncertainty of a figure.",
+    "none": "NO VERDICT: the shop's settings have no tolerances for these circles.",
+}
+ACCEPTANCE_BUSY = "Comparing: {stage} ({passed}). X ends it."
+ACCEPTANCE_CANCELLED = "Ended before it was done; nothing of it was written. B chooses a session before."
+ACCEPTANCE_WAITS = "Another step is being done; the acceptance can begin when that has ended."
+ACCEPTANCE_HEADING: Mapping[str, str] = {
+    "test": "test",
+    "figure": "worst figure, µm",
+    "before": "before",
+    "now": "now",
+    "limit": "limit",
+    "expanded": "U k=2",
+    "verdict": "verdict",
+}
+CONFORMITY_WORDS: Mapping[str, str] = {"within": "PASS", "exceeded": "FAIL", "cannot tell": "CANNOT TELL"}
+FIGURE_NAMES: Mapping[str, str] = {
+    "circular-deviation": "circular deviation",
+    "centre-deviation": "centre deviation",
+    "mean-radial-error": "mean radial error",
+}
+FORMER_TITLE = "Hold this session against which one before? Arrow keys, Enter; Esc goes back."
+FORMER = "{name:20} {when}  {by}"
+FORMER_LOOKS = "Looking for sessions measured before …"
+FORMER_SOME = "Choose the session measured before: Enter. Then both are held against the shop's tolerances."
+FORMER_NONE = (
+    "No session of the same machine, plan and jig beside this one ended before it began: there is nothing to compare."
+)
+NOT_BEFORE = "-"
+WORST = "{figure}: before {before}; now {now}; at most {limit:g} µm: {word}."
+WORST_CIRCLE = "{um:.1f} µm, U {expanded_um:.1f} µm ({test} {direction} {repeat})"
+RUN_BY_NOW = "The circles of this session ran by {by}."
+RUN_BY_PLAIN = "the control's own circles"
+RUN_BY_NOMINAL = "nominal programs"
+RUN_BY_SOME = "compensated programs for {count} of {all} only"
+RUN_BY_COMPENSATED = "compensated programs"
+WAY_BACK_NOMINAL = "Way back: before, nothing was compensated; machine and plan lie in {folder}."
+WAY_BACK_MODEL = "Way back: the model in force before is kept in {path}."
+WAY_BACK_LOST = "Way back: the model with SHA-256 {sha256}… was in force before and lies nowhere beside the sessions."
+WAY_BACK_PROGRAMS = "Way back: the programs that ran before lie in {path}."
 
 SEATED = "seated"
 NOT_SEATED_SHORT = "{mm:.1f} mm short of feed-in"

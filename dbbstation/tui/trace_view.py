@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from dbbstation.service.live_trace import LiveTrace
     from dbbstation.tui.braille import Plane
 
-_SCALE, _CCW, _CW, _LABEL = 1, 2, 4, 8
+_SCALE, _CCW, _CW, _LAST, _LABEL = 1, 2, 4, 8, 16
 """Who has a dot in a cell: the bits of `braille.overlay`, in the order the planes are given, and one for text."""
 
 _HEADS = {Direction.CCW: "●", Direction.CW: "○"}
@@ -56,11 +56,19 @@ class TraceView(Widget):
         cell_aspect: height of a terminal's cell over its width.
     """
 
-    COMPONENT_CLASSES: ClassVar[set[str]] = {"trace--scale", "trace--ccw", "trace--cw", "trace--both", "trace--label"}
+    COMPONENT_CLASSES: ClassVar[set[str]] = {
+        "trace--scale",
+        "trace--last",
+        "trace--ccw",
+        "trace--cw",
+        "trace--both",
+        "trace--label",
+    }
 
     DEFAULT_CSS = """
     TraceView {
         & > .trace--scale { color: $foreground 50%; }
+        & > .trace--last { color: $foreground 40%; }
         & > .trace--ccw { color: $text-primary; text-style: bold; }
         & > .trace--cw { color: $text-warning; }
         & > .trace--both { color: $foreground; text-style: bold; }
@@ -74,11 +82,12 @@ class TraceView(Widget):
         self._traces: dict[Direction, LiveTrace | Derived] = {}
         self._drawn: dict[Direction, tuple[LiveTrace | Derived, int]] = {}
         self._head: Direction | None = None
+        self._beneath: dict[Direction, LiveTrace | Derived] = {}
         self._circle: Circle | None = None
         self._scale_um = SMALLEST_SCALE_UM
         self._dial = Dial(1, 1)
         self._planes: dict[Direction, Plane] = {}
-        self._background = self._dial.empty()
+        self._background, self._last = self._dial.empty(), self._dial.empty()
         self._codes: NDArray[np.uint32] = np.zeros((0, 0), dtype=np.uint32)
         self._members: NDArray[np.uint8] = np.zeros((0, 0), dtype=np.uint8)
         self._captioned = ""
@@ -89,7 +98,11 @@ class TraceView(Widget):
         return self._scale_um
 
     def show(
-        self, circle: Circle | None, traces: Mapping[Direction, LiveTrace | Derived], head: Direction | None = None
+        self,
+        circle: Circle | None,
+        traces: Mapping[Direction, LiveTrace | Derived],
+        head: Direction | None = None,
+        beneath: Mapping[Direction, LiveTrace | Derived] | None = None,
     ) -> None:
         """Draw what has come since the last call.
 
@@ -97,16 +110,20 @@ class TraceView(Widget):
             circle: what the dial is labelled for; None before the first run.
             traces: those of one test, by direction.
             head: the direction that runs now; a mark shows where it is.
+            beneath: circles of the session before, drawn dim.
         """
         fresh = circle is not self._circle or any(
             traces.get(direction) is not trace for direction, (trace, _) in self._drawn.items()
         )
         if fresh:
             self._scale_um = SMALLEST_SCALE_UM
-        self._circle, self._traces, self._head = circle, dict(traces), head
-        scale = grown_scale_um(self._scale_um, max((trace.largest_um for trace in traces.values()), default=0.0))
+        beneath = dict(beneath or {})
+        others = {way: id(one) for way, one in beneath.items()} != {way: id(one) for way, one in self._beneath.items()}
+        self._circle, self._traces, self._head, self._beneath = circle, dict(traces), head, beneath
+        drawn = (*traces.values(), *beneath.values())
+        scale = grown_scale_um(self._scale_um, max((trace.largest_um for trace in drawn), default=0.0))
         size = Size(self.size.width, self.size.height - 2)
-        if fresh or scale != self._scale_um or size != (self._dial.columns, self._dial.rows):
+        if fresh or others or scale != self._scale_um or size != (self._dial.columns, self._dial.rows):
             self._begin(size, scale)
         self._extend()
         self._compose_cells()
@@ -116,6 +133,9 @@ class TraceView(Widget):
         self._scale_um = scale_um
         self._dial = Dial(max(size.width, 1), max(size.height, 1), self._cell_aspect)
         self._background = self._dial.empty()
+        self._last = self._dial.empty()
+        for one in self._beneath.values():
+            draw_trace(self._last, self._dial, one.theta_deg, one.deviation_um, scale_um)
         self._planes = {direction: self._dial.empty() for direction in Direction}
         self._drawn = {}
         draw_scale(self._background, self._dial, None if self._circle is None else self._circle.start_deg)
@@ -139,7 +159,7 @@ class TraceView(Widget):
 
     def _compose_cells(self) -> None:
         """Lay planes and texts over each other, and ask for the rows that look different now."""
-        planes = (self._background, self._planes[Direction.CCW], self._planes[Direction.CW])
+        planes = (self._background, self._planes[Direction.CCW], self._planes[Direction.CW], self._last)
         codes, members = braille.overlay(planes)
         self._letter(codes, members)
         if codes.shape != self._codes.shape:
@@ -181,7 +201,7 @@ class TraceView(Widget):
 
     def on_resize(self) -> None:
         """Draw for the new size."""
-        self.show(self._circle, self._traces, self._head)
+        self.show(self._circle, self._traces, self._head, self._beneath)
 
     def notify_style_update(self) -> None:
         """Colours changed: draw all rows with them."""
@@ -209,10 +229,12 @@ class TraceView(Widget):
 
     def _styles(self) -> dict[int, Style]:
         """Return the style of a cell by whose dots it has: a trace goes before the scale."""
-        scale, ccw, cw, both, label = (
-            self.get_component_rich_style(f"trace--{part}") for part in ("scale", "ccw", "cw", "both", "label")
+        scale, last, ccw, cw, both, label = (
+            self.get_component_rich_style(f"trace--{part}") for part in ("scale", "last", "ccw", "cw", "both", "label")
         )
-        traces = {0: scale, _CCW: ccw, _CW: cw, _CCW | _CW: both}
+        traces = {0: scale, _LAST: last}
+        for member, style in ((_CCW, ccw), (_CW, cw), (_CCW | _CW, both)):
+            traces |= {member: style, member | _LAST: style}
         return {member | under: style for member, style in traces.items() for under in (0, _SCALE)} | {_LABEL: label}
 
     def _caption(self) -> str:
@@ -235,6 +257,9 @@ class TraceView(Widget):
         parts = [("━━ ccw, thick", _CCW), ("   ", 0), ("── cw, thin", _CW), ("   ", 0), ("·· nominal", _SCALE)]
         if self._view is View.DIFFERENCE:
             parts = [("━━ ccw less cw", _CCW), ("   ", 0), ("·· none", _SCALE)]
+        if self._beneath:
+            # Short, so that 80 columns show all of it.
+            parts = [("━━ ccw", _CCW), ("  ", 0), ("── cw", _CW), ("  ", 0), ("── before", _LAST), ("  ", 0), parts[-1]]
         segments = [Segment(text, base + styles[member]) for text, member in parts]
         return Strip(segments).adjust_cell_length(wide, base)
 

@@ -308,3 +308,25 @@ def test_a_browser_prints(session, tmp_path, monkeypatch):
     failed = call("report", session, "--test", "a", "--out", tmp_path / "s.html", "--pdf", tmp_path / "s.pdf")
     assert failed.code == FAILED
     assert "did not print: no display" in failed.err
+
+
+def test_each_test_is_held_against_the_tolerances_before_and_now(session, better, tmp_path):
+    """By hand from the figures of each circle: the decision rule of ISO 14253-1, the worst circle of a test stands for it."""
+    limits = settings(tmp_path, ("centre-deviation", "18"), ("circular-deviation", "9"))
+    outcome = call("--settings", limits, "report", better, "--before", session, "--out", tmp_path / "r.html", "--json")
+    told = {(one["test"], one["quantity"]): one for one in outcome.data["tolerances_by_test"]}
+    assert set(told) == {(test, name) for test in "af" for name in ("centre-deviation", "circular-deviation")}
+    said = set()
+    for (test, quantity), one in told.items():
+        rows = [row for row in outcome.data["measured"] if row["test"] == test]
+        for when, held in (("now", one), ("before", one["before"])):
+            sizes = [row[when][quantity] for row in rows]
+            limit = one["largest_um"]
+            low, high = (max(size["um"] + sign * 2 * size["u_um"] for size in sizes) for sign in (-1, 1))
+            expected = "exceeded" if low > limit else "within" if high <= limit else "cannot tell"
+            assert held["conformity"] == expected
+            assert held["worst"]["um"] == max(size["um"] for size in sizes)
+            said.add((when, expected))
+    assert len({kind for _, kind in said}) > 1, said
+    before = outcome.data["tolerances"][0]["before"]
+    assert before["worst"]["um"] == max(row["before"]["centre-deviation"]["um"] for row in outcome.data["measured"])

@@ -19,9 +19,11 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.report.conditions import conditions
+from dbbstation.service.live_trace import LiveTrace
 from dbbstation.station.commands import Accept, GoTo, Judge, Note, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
+from dbbstation.tui.large_screen import LargeScreen
 from dbbstation.tui.overview_panels import ChosenRun
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import GiveUpQuestion
@@ -29,7 +31,7 @@ from dbbstation.tui.reason_question import ReasonQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.temperature_question import TemperatureQuestion
 from dbbstation.tui.texts import HELP
-from dbbstation.tui.trace_view import TraceView
+from dbbstation.tui.trace_view import _LAST, TraceView
 from tests.tui.happenings import Happening, make_plan
 
 if TYPE_CHECKING:
@@ -444,3 +446,55 @@ def test_a_session_that_another_process_writes_into_says_so_and_can_be_left(tmp_
     with SessionWriter.open(folder):
         assert played(happening, play).sent == [Quit()]
     assert [note.ambient_temp_c for note in read_session(folder).notes] == [20.1]
+
+
+def test_the_session_before_is_drawn_dim_beneath_its_own_direction_and_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measured and centred views have it; a difference, another test and a direction that has not run have not."""
+    happening = complete()
+    former = happening.board().traces[Direction.CCW]
+    before = LiveTrace(former.run, former.circle)
+    before._append(former.theta_deg, former.deviation_um + 40.0)
+    before.largest_um = former.largest_um + 40.0
+    before.centre()
+    asked = []
+
+    def last(folder: Path, test: str) -> dict[Direction, LiveTrace]:
+        asked.append((folder.name, test))
+        return {Direction.CCW: before, Direction.CW: before}
+
+    monkeypatch.setattr("dbbstation.tui.app.last_traces", last)
+
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        while not app.board.last:
+            app.look()
+            await pilot.pause(0.02)
+        app.look()
+        view = app.screen.query_one(TraceView)
+        assert view._beneath == {Direction.CCW: before}
+        assert ((view._members & 30) == _LAST).sum() > 10  # alone in a cell, or on the scale
+        assert view._legend(view.size.width).text.strip() == "━━ ccw  ── cw  ── before  ·· nominal"
+        await pilot.press("v")
+        assert view._beneath == {Direction.CCW: before.centred}
+        app.board.last = {Direction.CCW: LiveTrace(replace(former.run, test="another"), former.circle)}
+        app.draw()
+        assert view._beneath == {}
+        assert not (view._members & _LAST).any()
+
+    played(happening, play)
+    assert asked == [("session-7", former.run.test)]
+
+
+def test_after_escape_f_opens_large_figures_from_the_overview() -> None:
+    """Key by key, as they are pressed: earlier run, taken back, not after all, back, large figures."""
+
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("o")
+        await pilot.press("up", "left")
+        await pilot.press("e", "e", "x")
+        assert isinstance(app.screen, ReasonQuestion)
+        await pilot.press("escape", "f")
+        assert isinstance(app.screen, OverviewScreen)  # F means nothing in the overview
+        await pilot.press("escape", "f")
+        assert isinstance(app.screen, LargeScreen)
+
+    played(twice(), play)

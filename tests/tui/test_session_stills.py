@@ -22,12 +22,14 @@ from dbbstation.instrument.reading import Reading
 from dbbstation.service.after import After, Result, Step
 from dbbstation.service.bar_calibration import Calibrated
 from dbbstation.service.choice import Choice, Prepared
+from dbbstation.service.former_sessions import BeforeAndNow, Former, InForce
 from dbbstation.service.front import Front
 from dbbstation.service.memory import Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order
 from dbbstation.service.session_list import SessionLine
 from dbbstation.service.work import Progress
 from dbbstation.tui import texts
+from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.bar_screen import BarScreen
 from dbbstation.tui.new_screen import NewScreen
@@ -152,6 +154,41 @@ def results(_app: StationApp) -> RowScreen:
     return ResultsScreen(after)
 
 
+def held(um: float, u_um: float, largest_um: float, conformity: str, test: str) -> dict[str, object]:
+    worst = {"test": test, "direction": "ccw", "repeat": 1, "um": um, "expanded_um": 2.0 * u_um}
+    return {"quantity": "circular-deviation", "largest_um": largest_um, "conformity": conformity, "worst": worst}
+
+
+def acceptance(_app: StationApp) -> RowScreen:
+    """Three tests; the limit of the last lies within U of its figure."""
+    after = After(SHOP / "verified")
+    before = [held(21.4, 0.6, 8.0, "exceeded", "level"), held(17.0, 0.6, 8.0, "exceeded", "side")]
+    tests = [
+        {"test": "level", **held(4.8, 0.6, 8.0, "within", "level"), "before": before[0]},
+        {"test": "side", **held(5.1, 0.6, 8.0, "within", "side"), "before": before[1]},
+        {"test": "high", **held(7.6, 0.6, 8.0, "cannot tell", "high"), "before": None},
+    ]
+    worst = {**held(7.6, 0.6, 8.0, "cannot tell", "high"), "before": before[0]}
+    answer = {"verdict": {"kind": "cannot tell"}, "tolerances": [worst], "tolerances_by_test": tests}
+    page = SHOP / "verified-results" / "acceptance.html"
+    after.results[Step.ACCEPTANCE] = Result(Progress.DONE, "", 4.2, answer, "", page)
+    programs = SHOP / "monday" / "programs"
+    after.former = Former(SHOP / "monday", MEASURED, InForce(6, 6, programs, (SHOP / "joint-model.yaml",)))
+    after.kept = (SHOP / "verified-results" / "former-model-1f0c9a22.yaml",)
+    found = BeforeAndNow(InForce(6, 6, SHOP / "verified" / "programs"), (after.former,))
+    return AcceptanceScreen(after, lambda _folder: found)
+
+
+def formers(_app: StationApp) -> RowScreen:
+    """Nothing chosen yet."""
+    offered = (
+        Former(SHOP / "tuesday", MEASURED, InForce(6, 4, SHOP / "tuesday" / "programs")),
+        Former(SHOP / "monday", MEASURED, InForce(6, 0, None)),
+    )
+    found = BeforeAndNow(InForce(6, 6, SHOP / "verified" / "programs"), offered)
+    return AcceptanceScreen(After(SHOP / "verified"), lambda _folder: found)
+
+
 async def still(make: Callable[[StationApp], RowScreen | None], size: tuple[int, int]) -> str:
     app = StationApp(None, None, front=front())
     async with app.run_test(size=size) as pilot:
@@ -164,6 +201,8 @@ async def still(make: Callable[[StationApp], RowScreen | None], size: tuple[int,
             await app.push_screen(screen)
         if isinstance(screen, ResultsScreen):
             await pilot.press("down", "down", "down")
+        if isinstance(screen, AcceptanceScreen) and screen._searching is not None:
+            screen._searching.wait()
         for _ in range(4):
             await pilot.pause()
             app.look()
@@ -179,7 +218,9 @@ def one_time_zone(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 @pytest.mark.parametrize(
-    "make", [start, new, prepare, prepare_again, prepare_in_turn, bar, results], ids=lambda make: make.__name__
+    "make",
+    [start, new, prepare, prepare_again, prepare_in_turn, bar, results, acceptance, formers],
+    ids=lambda make: make.__name__,
 )
 def test_screens_before_and_after_look_as_they_did(
     make: Callable[[StationApp], RowScreen | None], size: tuple[int, int]

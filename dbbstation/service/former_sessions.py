@@ -1,0 +1,167 @@
+"""Sessions measured before this one on the same machine, plan and jig, and what the circles ran by then."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError
+from dbbstation.files.atomic import write_bytes
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.session import read_session
+from dbbstation.machine.difference import differences
+from dbbstation.service.candidates import Kind, candidates
+from dbbstation.service.session_list import dated_folders
+
+if TYPE_CHECKING:
+    from datetime import datetime
+    from pathlib import Path
+
+    from dbbstation.files.recordings.session import SessionFolder
+
+
+@dataclass(frozen=True)
+class InForce:
+    """What the accepted circles of a session ran by.
+
+    Attributes:
+        circles: accepted runs.
+        compensated: how many of them ran a compensated program.
+        programs: folder of the session's copies of the programs; None where the control ran plain circles.
+        models: files that the programs were compensated with, as far as they were found.
+        lost: SHA-256 of models that were not found.
+    """
+
+    circles: int
+    compensated: int
+    programs: Path | None
+    models: tuple[Path, ...] = ()
+    lost: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Former:
+    """A session measured before.
+
+    Attributes:
+        folder: of the session.
+        measured: start of its last accepted run.
+        in_force: what its circles ran by.
+    """
+
+    folder: Path
+    measured: datetime
+    in_force: InForce
+
+
+@dataclass(frozen=True)
+class BeforeAndNow:
+    """What an acceptance can compare.
+
+    Attributes:
+        now: what the circles of the session ran by.
+        formers: sessions before it, the last first.
+    """
+
+    now: InForce
+    formers: tuple[Former, ...]
+
+
+def before_and_now(folder: Path) -> BeforeAndNow:
+    """Return the sessions that one can be held against: those beside it, as `former_sessions`.
+
+    Raises:
+        InputError: the session cannot be read.
+    """
+    now = read_session(folder)
+    under = folder.absolute().parent
+    by_sha256 = {_sha256(path): path for path in candidates(Kind.MODEL, under)}
+    formers = (Former(one.folder, at, in_force(one, by_sha256)) for at, one in former_sessions(now, under))
+    return BeforeAndNow(in_force(now, by_sha256), tuple(formers))
+
+
+def former_sessions(
+    now: SessionFolder, under: Path, tests: set[str] | None = None
+) -> list[tuple[datetime, SessionFolder]]:
+    """Return sessions of the same machine, plan and jig that ended before this one began, the last first.
+
+    The nominal machines are the same, serial numbers do not differ, and every test of this session's accepted runs was run there
+    about the same ball in the same place. Before it has an accepted run, that holds for every test of its plan.
+
+    Args:
+        now: the session.
+        under: folder to search, and the folders in it.
+        tests: that must have been run there; None: those above.
+    """
+    accepted = now.in_state(RunState.ACCEPTED)
+    began = min((run.started for run in accepted if run.started is not None), default=None)
+    tests = tests or {run.test for run in accepted} or set(now.plan.tests)
+    found = []
+    for _, folder in dated_folders(under):
+        if folder == now.folder.absolute():
+            continue
+        try:
+            then = read_session(folder)
+        except InputError:
+            continue  # the list of sessions says what is wrong with it
+        runs = then.in_state(RunState.ACCEPTED)
+        ended = max((run.started for run in runs if run.started is not None), default=None)
+        measured = {run.test for run in runs}
+        if ended is not None and (began is None or ended < began) and tests <= measured and _alike(now, then, tests):
+            found.append((ended, then))
+    return sorted(found, key=lambda one: one[0], reverse=True)
+
+
+def in_force(session: SessionFolder, models: dict[str, Path]) -> InForce:
+    """Return what the accepted circles of a session ran by.
+
+    Args:
+        session: that was measured.
+        models: model files by their SHA-256.
+    """
+    runs = session.in_state(RunState.ACCEPTED)
+    programs = [run.program for run in runs if run.program is not None]
+    used = sorted({program.model_sha256 for program in programs if program.model_sha256})
+    return InForce(
+        circles=len(runs),
+        compensated=sum(bool(program.model_sha256) for program in programs),
+        programs=programs[0].path.parent if programs else None,
+        models=tuple(models[sha256] for sha256 in used if sha256 in models),
+        lost=tuple(sha256 for sha256 in used if sha256 not in models),
+    )
+
+
+def keep_models(former: Former, folder: Path) -> tuple[Path, ...]:
+    """Copy the models of a former session into a folder, so that the way back stays; return the copies.
+
+    A copy is named after its content and never overwritten.
+
+    Raises:
+        OutputError: one cannot be written.
+        OSError: one cannot be read.
+    """
+    copies = []
+    for model in former.in_force.models:
+        data = model.read_bytes()
+        copy = folder / f"former-model-{hashlib.sha256(data).hexdigest()[:8]}.yaml"
+        if not copy.exists():
+            write_bytes(copy, data)
+        copies.append(copy)
+    return tuple(copies)
+
+
+def _alike(now: SessionFolder, then: SessionFolder, tests: set[str]) -> bool:
+    serials = {one.serial_number for one in (now, then) if one.serial_number}
+    same = all(
+        name in now.plan.tests
+        and name in then.plan.tests
+        and (now.plan.tests[name].ball, now.plan.tests[name].circle)
+        == (then.plan.tests[name].ball, then.plan.tests[name].circle)
+        for name in tests
+    )
+    return len(serials) < 2 and same and not differences(now.machine, then.machine)  # noqa: PLR2004 - two different ones
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

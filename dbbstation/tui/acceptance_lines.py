@@ -1,0 +1,90 @@
+"""The rows and sentences of an acceptance; the numbers are those that `report --before` prints."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from textual.content import Content
+
+from dbbstation.tui import texts
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from dbbstation.service.former_sessions import Former, InForce
+
+_WIDE = 12
+"""Letters of a test's name that its column takes."""
+
+_ROW = f"{{test:{_WIDE}}}  " + "{figure:18} {before:>6} {now:>6} {limit:>6} {expanded:>5}  "
+
+HEADING = _ROW.format(**texts.ACCEPTANCE_HEADING) + texts.ACCEPTANCE_HEADING["verdict"]
+
+_STYLES = {"within": "$text-success", "exceeded": "$text-error", "cannot tell": "$text-warning"}
+_DIGEST = 8
+"""Digits of a SHA-256 that are shown: people compare them, nothing is looked up by them."""
+
+
+def test_line(one: Mapping[str, Any]) -> Content:
+    """Return the row of one test and figure: its worst circle before and now, limit, U and a word."""
+    row = _ROW.format(
+        test=_short(one["test"]),
+        figure=texts.FIGURE_NAMES[one["quantity"]],
+        before=_um(one["before"]),
+        now=_um(one),
+        limit=f"{one['largest_um']:g}",
+        expanded=f"{one['worst']['expanded_um']:.1f}",
+    )
+    word = texts.CONFORMITY_WORDS[one["conformity"]]
+    return Content.assemble(row, (word, f"bold {_STYLES[one['conformity']]}"))
+
+
+def worst_lines(answer: Mapping[str, Any]) -> Iterator[str]:
+    """Yield a sentence for each tolerance: the worst circle before and now; where there is none, what is missing."""
+    told = [one for one in answer["tolerances"] if one["worst"] is not None]
+    for one in told:
+        worst, before = one["worst"], one["before"]
+        yield texts.WORST.format(
+            figure=texts.FIGURE_NAMES[one["quantity"]],
+            before=texts.NOT_BEFORE if before is None else _circle(before["worst"]),
+            now=_circle(worst),
+            limit=one["largest_um"],
+            word=texts.CONFORMITY_WORDS[one["conformity"]],
+        )
+    if not told:
+        yield from (answer["verdict"]["headline"], *answer["verdict"]["to_do"])
+
+
+def in_force_line(in_force: InForce) -> str:
+    """Return in words what the circles of a session ran by."""
+    if in_force.compensated == 0:
+        return texts.RUN_BY_NOMINAL if in_force.programs else texts.RUN_BY_PLAIN
+    if in_force.compensated < in_force.circles:
+        return texts.RUN_BY_SOME.format(count=in_force.compensated, all=in_force.circles)
+    return texts.RUN_BY_COMPENSATED
+
+
+def way_back_lines(former: Former, kept: tuple[Path, ...]) -> Iterator[str]:
+    """Yield where that lies which the circles before ran by."""
+    in_force = former.in_force
+    if in_force.compensated == 0:
+        yield texts.WAY_BACK_NOMINAL.format(folder=former.folder)
+    for path in kept:
+        yield texts.WAY_BACK_MODEL.format(path=path)
+    for sha256 in in_force.lost:
+        yield texts.WAY_BACK_LOST.format(sha256=sha256[:_DIGEST])
+    if in_force.programs is not None:
+        yield texts.WAY_BACK_PROGRAMS.format(path=in_force.programs)
+
+
+def _circle(worst: Mapping[str, Any]) -> str:
+    return texts.WORST_CIRCLE.format(**worst)
+
+
+def _um(held: Mapping[str, Any] | None) -> str:
+    return texts.NOT_BEFORE if held is None else f"{held['worst']['um']:.1f}"
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= _WIDE else f"{name[: _WIDE - 1]}…"

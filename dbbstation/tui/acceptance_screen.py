@@ -1,0 +1,181 @@
+"""Acceptance: circles as measured before and now, held against the shop's tolerances; where the way back lies."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from textual.content import Content
+
+from dbbstation.errors import StationError
+from dbbstation.service.after import Step
+from dbbstation.service.background import Background
+from dbbstation.service.former_sessions import before_and_now
+from dbbstation.service.work import Progress
+from dbbstation.tui import texts
+from dbbstation.tui.acceptance_lines import HEADING, in_force_line, test_line, way_back_lines, worst_lines
+from dbbstation.tui.asking import ChooseQuestion
+from dbbstation.tui.durations import duration
+from dbbstation.tui.panel import lines
+from dbbstation.tui.row_screen import RowScreen
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from textual.binding import BindingType
+    from textual.widgets import OptionList
+
+    from dbbstation.service.after import After, Result
+    from dbbstation.service.former_sessions import BeforeAndNow
+
+
+class AcceptanceScreen(RowScreen):
+    """Pushed over the results.
+
+    Args:
+        after: does the work.
+        search: looks for sessions that this one can be held against.
+    """
+
+    help_name = "acceptance"
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("b", "former", "Session before"),
+        ("x", "cancel", "End"),
+        ("escape,q", "back", "Back"),
+    ]
+
+    def __init__(self, after: After, search: Callable[[Path], BeforeAndNow] = before_and_now) -> None:
+        super().__init__()
+        self._after, self._search = after, search
+        self._searching: Background[BeforeAndNow] | None = None
+        self._found: BeforeAndNow | None = None
+        self._failure = ""
+        self._seen: object = None
+
+    def on_mount(self) -> None:
+        """Look for sessions measured before."""
+        self._searching = Background(lambda: self._search(self._after.session))
+        self._draw()
+
+    def look(self) -> None:
+        """Take in what was found, and how far the work has come."""
+        if self._searching is not None and self._searching.done:
+            searching, self._searching = self._searching, None
+            try:
+                self._found = searching.outcome()
+            except (StationError, OSError) as error:
+                self._failure = str(error)
+        self._after.look()
+        self._draw()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Only keys that mean something now stand in the footer and do something."""
+        if action == "former":
+            return self._after.busy is None and self._found is not None and bool(self._found.formers)
+        if action == "cancel":
+            return self._after.busy is Step.ACCEPTANCE
+        return super().check_action(action, parameters)
+
+    def on_option_list_option_highlighted(self, _chosen: OptionList.OptionHighlighted) -> None:
+        """Tell of the row that the cursor is on."""
+        self._draw()
+
+    def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
+        """Choose the session before, while none is."""
+        if self._after.former is None and self.check_action("former", ()):
+            self._accept(self.at)
+
+    def action_former(self) -> None:
+        """Ask for the session before."""
+        if self._found is not None:
+            self.app.push_screen(ChooseQuestion(texts.FORMER_TITLE, self._offered()), self._accept)
+
+    def action_cancel(self) -> None:
+        """End what is being done."""
+        self._after.cancel()
+
+    def action_back(self) -> None:
+        """Go back to the results; the work goes on there."""
+        self.dismiss()
+
+    def _offered(self) -> list[str]:
+        formers = self._found.formers if self._found is not None else ()
+        return [
+            texts.FORMER.format(
+                name=one.folder.name,
+                when=f"{one.measured.astimezone():%Y-%m-%d %H:%M}",
+                by=in_force_line(one.in_force),
+            )
+            for one in formers
+        ]
+
+    def _accept(self, place: int | None) -> None:
+        if place is None or self._found is None or place >= len(self._found.formers):
+            return
+        self._failure = ""
+        try:
+            self._after.accept(self._found.formers[place])
+        except (StationError, OSError) as error:
+            self._failure = str(error)
+        self._draw()
+
+    def _draw(self) -> None:
+        if not self.stands:
+            return
+        answer = self._after.results[Step.ACCEPTANCE].answer
+        sentence, wrong = self._sentence()
+        self.say(sentence, wrong=wrong)
+        tests: list[dict[str, Any]] = answer.get("tolerances_by_test", [])
+        if self._after.former is None:
+            self.put([Content(label) for label in self._offered()])
+            self.about(self._about_now())
+        else:
+            self.put([Content.styled(HEADING, "dim"), *(test_line(one) for one in tests)])
+            self.about(lines(*self._notes(answer)))
+        if self._seen != (self._after.busy, self._found, self._after.former):
+            self._seen = self._after.busy, self._found, self._after.former
+            self.refresh_bindings()
+
+    def _sentence(self) -> tuple[str, bool]:
+        """Return the sentence at the top, and whether it tells of something wrong."""
+        result = self._after.results[Step.ACCEPTANCE]
+        if self._failure:
+            return self._failure, True
+        if self._after.former is not None and result.progress is not None:
+            return self._compared(result)
+        if self._after.busy is not None:
+            return texts.ACCEPTANCE_WAITS, False
+        if self._found is None:
+            return texts.FORMER_LOOKS, False
+        return texts.FORMER_SOME if self._found.formers else texts.FORMER_NONE, False
+
+    @staticmethod
+    def _compared(result: Result) -> tuple[str, bool]:
+        """Return what is to be said of the comparison."""
+        match result.progress:
+            case Progress.DONE:
+                kind = result.answer["verdict"]["kind"]
+                return texts.ACCEPTANCE_VERDICT[kind], kind == "exceeded"
+            case Progress.FAILED:
+                return result.failure, True
+            case Progress.CANCELLED:
+                return texts.ACCEPTANCE_CANCELLED, False
+        stage = result.stage or texts.STEP_BEGINS
+        return texts.ACCEPTANCE_BUSY.format(stage=stage, passed=duration(result.passed_s)), False
+
+    def _about_now(self) -> Content:
+        return Content("" if self._found is None else texts.RUN_BY_NOW.format(by=in_force_line(self._found.now)))
+
+    def _notes(self, answer: dict[str, Any]) -> list[Content]:
+        """Return what stands below the list: worst figures, what the circles ran by, the way back, the file."""
+        after = self._after
+        told = [] if not answer else [Content(text) for text in worst_lines(answer)]
+        if self._found is not None:
+            now = self._found.now
+            style = "" if now.compensated == now.circles else "$text-warning"
+            told.append(Content.styled(texts.RUN_BY_NOW.format(by=in_force_line(now)), style))
+        if after.former is not None:
+            told += [Content(text) for text in way_back_lines(after.former, after.kept)]
+        path = after.results[Step.ACCEPTANCE].path
+        return [*told, *([] if path is None else [Content.styled(str(path), "bold")])]

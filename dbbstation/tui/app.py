@@ -98,6 +98,7 @@ class StationApp(App[None]):
     """
 
     TITLE = "dbbstation"
+    CSS_PATH = "station.tcss"
     ENABLE_COMMAND_PALETTE = True
     VERTICAL_BREAKPOINTS = [(0, "-low"), (_TALL_ROWS, "-tall")]  # noqa: RUF012 - declared by Textual, as an attribute of instances
     BINDINGS: ClassVar[list[BindingType]] = [

@@ -30,14 +30,6 @@ class HelpScreen(ModalScreen[None]):
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,f1,question_mark,q", "dismiss", "Close")]
 
-    DEFAULT_CSS = """
-    HelpScreen {
-        align: center middle;
-        & > VerticalScroll { width: 90%; max-width: 100; height: auto; max-height: 95%; padding: 0 2; background: $panel; border: thick $primary; }
-        & Static { width: 1fr; margin-bottom: 1; }
-    }
-    """
-
     def __init__(self, name: str) -> None:
         super().__init__()
         self._help = name

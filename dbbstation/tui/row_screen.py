@@ -21,16 +21,6 @@ if TYPE_CHECKING:
 class RowScreen(ExplainedScreen):
     """Title, sentence, rows, a text about the chosen row, keys."""
 
-    DEFAULT_CSS = """
-    RowScreen {
-        & #row-title { height: 1; background: $panel; text-style: bold; }
-        & #row-now { height: auto; min-height: 2; max-height: 7; padding: 0 1; text-style: bold; background: $primary-muted; }
-        & #row-now.-wrong { background: $error-muted; }
-        & #rows { height: auto; max-height: 1fr; border: none; padding: 0 1; }
-        & #row-about { height: 1fr; padding: 0 2; margin-top: 1; }
-    }
-    """
-
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""
         yield Static(Content(f" dbbstation · {HELP[self.help_name].title}"), id="row-title")

@@ -9,8 +9,8 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
+from dbbstation.tui.help_texts import HELP, HELP_CLOSES, KEY_NAMES
 from dbbstation.tui.panel import lines
-from dbbstation.tui.texts import HELP, HELP_CLOSES, KEY_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -10,7 +10,7 @@ from textual.widgets import Footer, OptionList, Static
 from textual.widgets.option_list import Option
 
 from dbbstation.tui.explained import ExplainedScreen
-from dbbstation.tui.texts import HELP
+from dbbstation.tui.help_texts import HELP
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

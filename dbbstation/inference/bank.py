@@ -176,7 +176,7 @@ class Bank:
             if self.channel.time is not None and not white and innovation > least:
                 found = self._colour_of(left, draws, stretches, found)
             self._take(found, spread)
-            if _alike(found, before) and not uneven:
+            if alike(found, before) and not uneven:
                 break
         return self.noise
 
@@ -225,7 +225,7 @@ class Bank:
         power = bands.log_power - taken - np.log(self.noise.gain(bands.frequency))
         found = coloured_noise(Bands(bands.frequency[seen], power[seen], bands.count[seen]))
         # Squares say the level best once the colour is right.
-        return level if _alike(found.with_innovation(level.innovation), level) else found
+        return level if alike(found.with_innovation(level.innovation), level) else found
 
     def _taking_part(self, beside: BesideBase) -> NDArray[np.float64]:
         """Prior standard deviations of all columns that noise is measured beside, zero for the others."""
@@ -384,7 +384,7 @@ def amplitudes_of(variant: Variant) -> NDArray[np.int64]:
     return np.searchsorted(variant.whole, variant.columns)
 
 
-def _alike(one: Coloured, other: Coloured) -> bool:
+def alike(one: Coloured, other: Coloured) -> bool:
     """Whether two noises are the same for anything that is compared."""
     pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
     return all(abs(a - b) < SETTLED * max(a, b) for a, b in pairs)

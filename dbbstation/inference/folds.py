@@ -66,21 +66,21 @@ class HeldOutError:
 
 def held_out_error(
     channel: Channel,
-    choose: Callable[[Channel], Settled],
+    choose_without: Callable[[Channel, NDArray[np.bool_]], Settled],
     progress: Callable[[str, int, int], None] = lambda _text, _done, _of: None,
 ) -> HeldOutError:
     """Hold back parts in turn: blocks where there are five or more, else ten stretches of consecutive rows.
 
     Args:
         channel: all rows.
-        choose: the whole selection, laws, patterns, noise and looks, from the rows that a channel keeps.
+        choose_without: the whole selection, laws, patterns, noise and looks, without rows that are held back, shape (n,).
         progress: told what is being done, and how much of how much.
     """
     found = []
     parts = parts_of(channel)
     for done, (name, rows) in enumerate(parts):
         progress("held-out part", done, len(parts))
-        settled = choose(channel.without(rows))
+        settled = choose_without(channel, rows)
         none = np.zeros(len(channel.residual))
         base = channel.base.samples @ settled.base_values(none)
         before, after = channel.residual[rows] - base[rows], (channel.residual - settled.predicted())[rows]

@@ -14,8 +14,10 @@ discrepancy].
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
-from typing import TYPE_CHECKING
+from operator import is_
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
@@ -41,6 +43,10 @@ slack that nothing calls for would count against a cause that is there."""
 
 MOST_SLACK = 1.5
 """Times the amplitudes that the slack of a variant was made for up to which it grows with them."""
+
+
+_Eliminated: TypeAlias = "tuple[NDArray[np.float64], NDArray[np.float64], float]"
+"""Cholesky factor, what it makes of the target, log evidence."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +117,12 @@ class Member:
     slack_scale: float = 1.0
     slack_share: float = 1.0
 
-    @property
+    @cached_property
     def columns(self) -> NDArray[np.int64]:
         """Columns of amplitudes, then of slack."""
         return np.concatenate([self.variant.columns, self.variant.slack])
 
-    @property
+    @cached_property
     def sd(self) -> NDArray[np.float64]:
         """Prior standard deviations of these."""
         return np.concatenate([self.variant.plausible * self.scale, self.variant.slack_sd * self.slack_scale])
@@ -159,6 +165,7 @@ class ModelComparison:
 
     def __init__(self, gram: NDArray[np.float64], towards: NDArray[np.float64]) -> None:
         self._gram, self._towards = gram, towards
+        self._last: tuple[tuple[Member, ...], _Eliminated] | None = None
 
     def log_evidence(self, members: Sequence[Member]) -> float:
         """Log marginal likelihood of base and members over that of the base alone."""
@@ -185,7 +192,9 @@ class ModelComparison:
             return own
         lower, _, _ = self._eliminated(members)
         taken, sd = _stacked(members)
-        across = solve_triangular(lower, sd[:, None] * self._gram[np.ix_(taken, columns)], lower=True)
+        across = solve_triangular(
+            lower, sd[:, None] * self._gram[np.ix_(taken, columns)], lower=True, check_finite=False
+        )
         return np.asarray(own - across.T @ across, dtype=np.float64)
 
     def log_evidence_of_pairs(self, members: Sequence[Member], more: Sequence[Member]) -> dict[tuple[int, int], float]:
@@ -197,7 +206,9 @@ class ModelComparison:
         gram = self._gram[np.ix_(columns, columns)]
         if members:
             taken, taken_sd = _stacked(members)
-            across = solve_triangular(lower, taken_sd[:, None] * self._gram[np.ix_(taken, columns)], lower=True)
+            across = solve_triangular(
+                lower, taken_sd[:, None] * self._gram[np.ix_(taken, columns)], lower=True, check_finite=False
+            )
             gram, towards = gram - across.T @ across, towards - across.T @ z
         information, along = sd[:, None] * gram * sd + np.eye(len(sd)), sd * towards
         ends = np.cumsum([0, *(len(m.variant.columns) for m in more)])
@@ -226,7 +237,9 @@ class ModelComparison:
         if members:
             lower, z, _ = self._eliminated(members)
             taken, sd = _stacked(members)
-            across = solve_triangular(lower, sd[:, None] * self._gram[np.ix_(taken, needed)], lower=True)
+            across = solve_triangular(
+                lower, sd[:, None] * self._gram[np.ix_(taken, needed)], lower=True, check_finite=False
+            )
             towards = towards - across.T @ z
         by_size: dict[int, list[int]] = {}
         for number, (_, variant) in enumerate(variants):
@@ -294,15 +307,20 @@ class ModelComparison:
             found.append((replace(member, scale=float(SCALES[best])), averaged, float(factors[best])))
         return found
 
-    def _eliminated(self, members: Sequence[Member]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    def _eliminated(self, members: Sequence[Member]) -> _Eliminated:
         """Cholesky factor of the members' information, what it makes of the target, and their log evidence."""
         if not members:
             return np.zeros((0, 0)), np.zeros(0), 0.0
+        # A search scans beside a set of members and asks for the evidence of the same set right after it.
+        if self._last is not None and len(self._last[0]) == len(members) and all(map(is_, self._last[0], members)):
+            return self._last[1]
         columns, sd = _stacked(members)
         information = sd[:, None] * self._gram[np.ix_(columns, columns)] * sd + np.eye(len(sd))
         lower = np.asarray(np.linalg.cholesky(information), dtype=np.float64)
-        z = solve_triangular(lower, sd * self._towards[columns], lower=True)
-        return lower, z, 0.5 * float(z @ z) - float(np.log(np.diag(lower)).sum())
+        z = solve_triangular(lower, sd * self._towards[columns], lower=True, check_finite=False)
+        found = lower, z, 0.5 * float(z @ z) - float(np.log(np.diag(lower)).sum())
+        self._last = tuple(members), found
+        return found
 
 
 def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:

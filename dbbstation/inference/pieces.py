@@ -135,9 +135,8 @@ class Sums:
         flat = curves.reshape(pieces, many * count)
         rest = (flat.T @ self.rest).reshape(many, count)
         side = (flat.T @ self.axes).reshape(many, count, -1)
-        normal = np.einsum("bmp,b,bmq->mpq", curves, self.squares, curves, optimize=True) - side @ side.transpose(
-            0, 2, 1
-        )
+        each = curves.transpose(1, 2, 0)
+        normal = (each * self.squares) @ each.transpose(0, 2, 1) - side @ side.transpose(0, 2, 1)
         normal = normal + np.eye(count) / size**2
         return np.asarray(np.einsum("mp,mp->m", rest, np.linalg.solve(normal, rest[:, :, None])[:, :, 0]))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.bank import Bank, amplitudes_of
+from dbbstation.inference.bank import Bank, alike, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import IN_TIME, edges_anew, seen
@@ -57,7 +57,7 @@ class Settled:
         channel: that was explained.
         bank: columns and causes.
         noise: of one row, from what everything together leaves.
-        measured_noise: whether rows are in time order, so that their noise is known apart from its neighbours' resemblance.
+        causes: that were compared.
         comparison: that the posterior came from.
         posterior: over sets of causes.
         refused: laws that would have to be what they cannot be, and why.
@@ -66,6 +66,7 @@ class Settled:
     channel: Channel
     bank: Bank
     noise: Coloured
+    causes: tuple[Cause, ...]
     comparison: ModelComparison
     posterior: Posterior
     refused: Mapping[str, str] = field(default_factory=dict)
@@ -74,11 +75,6 @@ class Settled:
     def best(self) -> Hypothesis:
         """The most probable hypothesis."""
         return self.posterior.best
-
-    @property
-    def causes(self) -> tuple[Cause, ...]:
-        """That were compared."""
-        return tuple(cause for cause in self.bank.causes if cause.name not in self.refused)
 
     def effect(self, names: Sequence[str] | None = None) -> NDArray[np.float64]:
         """What members of the best hypothesis do, over all rows, in the unit of the residual, shape (n,).
@@ -116,6 +112,7 @@ def settle(
     most_expanded: int = MOST_EXPANDED,
     most_looks: int = MOST_LOOKS,
     in_time: bool = True,
+    thorough: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns on a channel.
@@ -127,6 +124,8 @@ def settle(
         most_expanded: hypotheses whose neighbours are looked at in a search, at the most.
         most_looks: looks at what is left, one beside what the other brought, at the most.
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
+        thorough: begin from several places, and look once more beside what a search ends at; False: begin with nothing and search
+            once, where a selection is repeated many times and may be somewhat worse.
         progress: told what is being done.
     """
     options = _Options(
@@ -135,6 +134,7 @@ def settle(
         most_expanded=most_expanded,
         most_looks=most_looks,
         in_time=in_time,
+        thorough=thorough,
     )
     return _settled(_begun(channel, options), options, progress)
 
@@ -146,6 +146,7 @@ class _Options:
     most_expanded: int
     most_looks: int
     in_time: bool
+    thorough: bool
 
 
 def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
@@ -175,15 +176,17 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
     laid_out: set[str] = set()
     refused: dict[str, str] = {}
     looked: set[frozenset[str]] = set()
-    started, most_probable = False, -np.inf
+    compared: Settled | None = None  # after the last look
+    most_probable = -np.inf
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
     looking = look and not channel.laws
     for number in range(MOST_ROUNDS):
         bank.measure_noise()
         starts: list[tuple[Member, ...]] = []
         if looking:
-            best, starts = _looked_about(bank, best, refused, progress, options, first=not started)
-            started = True
+            best, starts = _looked_about(bank, best, refused, progress, options, first=compared is None)
+            if compared is not None and _would_be_the_same(compared, bank, best, refused):
+                return compared
         progress(f"sets of causes, round {number + 1}")
         beside = bank.beside()
         comparison = beside.comparison(bank.target)
@@ -191,12 +194,12 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
         starts = [grown(comparison, causes, members) for members in (*starts, best)]
         posterior = search(comparison, causes, [*starts, *seeds.values()], options.most_expanded)
         seeds |= {h.names: h.members for h in posterior.hypotheses[:SEEDS]}
-        settled = Settled(channel, bank, bank.noise, comparison, posterior, dict(refused))
+        settled = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
         best = posterior.best.members
+        compared = settled if looking else None
         if rough := [m for m in _laws_of(settled) if m.cause.name not in laid_out]:
-            for member in rough:
-                laid_out.add(member.cause.name)
-                _lay_out(bank, beside, posterior.best, member)
+            laid_out |= {member.cause.name for member in rough}
+            _lay_out(bank, beside, posterior.best, rough)
             continue
         if impossible := _negative(settled):
             refused |= impossible
@@ -209,7 +212,7 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
             best = edges_anew(bank, best, stretched)
             laid_out |= stretched | {member.cause.name for member in best}
             continue
-        if not look or (looking and posterior.best.names in looked):
+        if not look or (looking and (not options.thorough or posterior.best.names in looked)):
             break
         if looking:
             looked.add(posterior.best.names)
@@ -219,6 +222,14 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
                 break
         looking = look
     return settled
+
+
+def _would_be_the_same(compared: Settled, bank: Bank, best: Sequence[Member], refused: Mapping[str, str]) -> bool:
+    """Whether a search would compare what it compared before: nothing more stood out, and the noise is as it was."""
+    there = {cause.name: cause.variants for cause in bank.but_for(refused)}
+    before = {cause.name: cause.variants for cause in compared.causes}
+    same = {member.cause.name for member in best} == compared.best.names and there == before
+    return same and alike(bank.noise, compared.noise)
 
 
 def _looked(
@@ -272,7 +283,7 @@ def _looked_about(
 ) -> tuple[tuple[Member, ...], list[tuple[Member, ...]]]:
     """Members with what stands out beside them; the first time, other places for a search to start from, too."""
     starts: list[tuple[Member, ...]] = []
-    if first and options.in_time:
+    if first and options.in_time and options.thorough:
         # Stretches of time can stand for whatever has a history, and curves over time for what comes at once. So effects that
         # follow variables have a start of their own, and what comes at once has one beside the laws alone.
         begun = _grown_in(bank)
@@ -345,8 +356,13 @@ def _laws_of(settled: Settled) -> list[Member]:
     return list({m.cause.name: m for m in found}.values())
 
 
-def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, member: Member) -> None:
-    """Lay out a law at its best values in the best hypothesis, or beside it in the place of what it competes with."""
+def _lay_out(bank: Bank, beside: BesideBase, best: Hypothesis, rough: Sequence[Member]) -> None:
+    """Lay out laws at their best values in the best hypothesis, or beside it in the place of what they compete with."""
+    for member in rough:
+        _lay_out_one(bank, beside, best, member)
+
+
+def _lay_out_one(bank: Bank, beside: BesideBase, best: Hypothesis, member: Member) -> None:
     target, law = bank.target, bank.laws[member.cause.name]
     others = best.without(member.cause.name)
     for _ in range(STEPS if law.grids or law.at else 1):

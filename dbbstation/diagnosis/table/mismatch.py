@@ -30,11 +30,6 @@ if TYPE_CHECKING:
     from dbbstation.inference.settle import Settled
     from dbbstation.texts import Texts
 
-FOLD_EXPANDED = 2
-"""Hypotheses whose neighbours are looked at in a search of rows that others are held back from: a quarter of the usual number. The
-selection is all repeated; it is searched less widely, which can only make its held-out error larger."""
-
-
 FOLD_ROWS = 3000
 """Rows that a selection for a held-out part is made from, at the most, evenly spaced: fewer rows can only make its error larger."""
 
@@ -159,13 +154,7 @@ def find_mismatch(
     channel = replace(channel, static=static_patterns(channel))
     settled = settle(channel, progress=progress)
     findings = read_off(settled)
-    held_out = None
-    if hold_out:
-
-        def choose(part: Channel) -> Settled:
-            return settle(part.thinned(FOLD_ROWS), most_expanded=FOLD_EXPANDED)
-
-        held_out = held_out_error(channel, choose, progress)
+    held_out = held_out_error(channel, choose_without, progress) if hold_out else None
     return Mismatch(
         table=table,
         settled=settled,
@@ -179,6 +168,14 @@ def find_mismatch(
         texts={source.name: source.texts for source in sources},
         second_start=_second_start(settled, findings),
     )
+
+
+def choose_without(channel: Channel, rows: NDArray[np.bool_]) -> Settled:
+    """Repeat the whole selection without some rows, shape (n,).
+
+    It is searched less widely than all rows are, from one beginning, which can only make the error of its predictions larger.
+    """
+    return settle(channel.without(rows).thinned(FOLD_ROWS), most_expanded=0, thorough=False)
 
 
 def _second_start(settled: Settled, findings: Sequence[Finding]) -> float:

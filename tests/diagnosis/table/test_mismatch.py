@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from dbbstation.diagnosis.table.mismatch import Mismatch, find_mismatch
+from dbbstation.diagnosis.table.mismatch import Mismatch, choose_without, find_mismatch
 from dbbstation.diagnosis.table.next_measurement import next_measurements
 from dbbstation.diagnosis.table.summary import mismatch_summary
+from dbbstation.inference import looks
+from dbbstation.inference.bank import Bank
 from dbbstation.inference.channel import Base, Channel
+from dbbstation.inference.folds import parts_of
 from dbbstation.inference.read_off import read_off
-from dbbstation.inference.settle import settle
+from dbbstation.inference.seen import seen
+from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
 from dbbstation.tabulated import Asked, load_tables
@@ -142,6 +147,31 @@ def test_without_order_noise_is_said_to_be_fitted_jointly(tmp_path):
     found = find_mismatch(load_tables([path], ASKED).table, hold_out=False)
     assert not mismatch_summary(found)["noise"]["measured_in_order"]
     assert any("--time rows" in step.text for step in next_measurements(found))
+
+
+def test_rows_that_are_held_back_decide_nothing(tmp_path):
+    path = record(Truth(play_um=8.0, expansion_um_k=1.5)).write(tmp_path / "x.csv")
+    whole = load_tables([path], ASKED).table.channel(())
+    whole = replace(whole, static=static_patterns(whole))
+    _, rows = parts_of(whole)[4]
+    other = replace(whole, residual=np.where(rows, 1.0 + np.sin(np.arange(len(rows))), whole.residual))
+    chosen, anew = (choose_without(channel, rows) for channel in (whole, other))
+    assert chosen.best.names == anew.best.names
+    assert "linear in oil_temp_c" in chosen.best.names
+    np.testing.assert_array_equal(chosen.predicted(), anew.predicted())
+
+
+@pytest.mark.parametrize("name", ["twice", "product", "play"])
+def test_what_a_first_list_shows_to_be_hopeless_is_never_taken_in(tmp_path, monkeypatch, name):
+    """The same table with every peak of every list made finer."""
+    path = record(FOUND[name][0]).write(tmp_path / "x.csv")
+    channel = load_tables([path], ASKED).table.channel(())
+    bank = Bank(channel)
+    bank.measure_noise(white=True)
+    quick = [pattern.name for pattern in seen(bank, (), in_time=False)]
+    monkeypatch.setattr(looks, "NEIGHBOUR", 0.0)
+    assert [pattern.name for pattern in seen(bank, (), in_time=False)] == quick
+    assert quick
 
 
 @pytest.mark.slow

@@ -43,7 +43,7 @@ def ended_when_hung_up(last: Callable[[], None]) -> Iterator[None]:
 
 def _watch(terminal: int, over: threading.Event, last: Callable[[], None]) -> None:
     poll = select.poll()
-    poll.register(terminal, 0)  # a hang-up is told whatever is asked for
+    poll.register(terminal, 0)  # a hang-up is reported whatever is asked for
     while not poll.poll(_LOOK_MS):
         if over.is_set():
             return

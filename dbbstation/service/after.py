@@ -201,6 +201,10 @@ class After:
 
     @staticmethod
     def _out(step: Step) -> str:
-        return {**dict(zip(USUAL, (KINEMATIC, JOINT, PROGRAMS, REPORT), strict=True)), Step.ACCEPTANCE: ACCEPTANCE}[
-            step
-        ]
+        return {
+            Step.CALIBRATE: KINEMATIC,
+            Step.DIAGNOSE: JOINT,
+            Step.PROGRAMS: PROGRAMS,
+            Step.REPORT: REPORT,
+            Step.ACCEPTANCE: ACCEPTANCE,
+        }[step]

@@ -10,7 +10,7 @@ import studies.sensitivities as asked
 from dbbstation.diagnosis.drive import channel, fit, identify
 from studies.sensitivities import Answer, Constant, Variation, answer_to, study
 
-SHARE = Constant("drive.channel", "METHOD_SHARE")
+SHARE = Constant("diagnosis.drive.channel", "METHOD_SHARE")
 DRIVE = Path("drive.csv")
 
 
@@ -48,5 +48,5 @@ def test_what_changes_is_said_in_verdicts_and_uncertainties(answers, monkeypatch
 
 
 def test_whole_numbers_stay_whole_and_above_zero():
-    assert Constant("drive.explain", "MOST_LOOKS").tried == (1, 4)
-    assert Constant("drive.channel", "STRONGEST").tried == (3, 12)
+    assert Constant("diagnosis.drive.explain", "MOST_LOOKS").tried == (1, 4)
+    assert Constant("diagnosis.drive.channel", "STRONGEST").tried == (3, 12)

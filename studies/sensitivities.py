@@ -157,7 +157,7 @@ def study(
         drives: recordings, and the force that an ampere makes in each [N/A].
         pairs: sessions A and B.
         jobs: processes.
-        progress: told how many answers of how many there are.
+        progress: called with how many answers of how many there are.
 
     Raises:
         StationError: a recording cannot be read, or nothing can be said of it.

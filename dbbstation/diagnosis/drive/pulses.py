@@ -117,7 +117,7 @@ def pulse_parts(explained: Explained, names: Sequence[str]) -> list[Part]:
     def part(first: float, last: float, less: NDArray[np.float64]) -> Part:
         return Part("", {"force_n": size(less), "duration_s": Value(last - first, apart, "s")}, (first, last))
 
-    edges = _told_apart(np.concatenate([times[[0, -1]], within.ravel()]), apart)
+    edges = _distinct(np.concatenate([times[[0, -1]], within.ravel()]), apart)
     levels: list[tuple[float, float, NDArray[np.float64]]] = []
     for first, last in pairwise(edges):
         middle = 0.5 * (first + last)
@@ -163,7 +163,7 @@ def _peak(
     return first, last, own - around
 
 
-def _told_apart(times: NDArray[np.float64], apart: float) -> list[float]:
+def _distinct(times: NDArray[np.float64], apart: float) -> list[float]:
     """Times, rising, of which those that are closer together than the band tells apart are one, at their mean."""
     rising = np.sort(times)
     return [float(part.mean()) for part in np.split(rising, np.flatnonzero(np.diff(rising) > apart) + 1)]

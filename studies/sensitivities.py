@@ -21,7 +21,7 @@ from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
     from pathlib import Path
 
 
@@ -150,6 +150,7 @@ def study(
     pairs: Sequence[tuple[Path, Path]],
     jobs: int,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
+    only: Collection[str] = (),
 ) -> list[Change]:
     """Ask for every answer with every constant as it is, halved and doubled.
 
@@ -158,6 +159,7 @@ def study(
         pairs: sessions A and B.
         jobs: processes.
         progress: called with how many answers of how many there are.
+        only: names of the constants to vary; all if empty.
 
     Raises:
         StationError: a recording cannot be read, or nothing can be said of it.
@@ -168,7 +170,12 @@ def study(
         for paths, scale, constants in asked
         for constant, value in [
             (None, 0.0),
-            *((constant, value) for constant in constants for value in constant.tried),
+            *(
+                (constant, value)
+                for constant in constants
+                if not only or constant.name in only
+                for value in constant.tried
+            ),
         ]
     ]
     answers: dict[Variation, Answer] = {}

@@ -24,6 +24,7 @@ from dbbstation.station.states import FINAL, RECORDING, VERDICT
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
 from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.help_screen import HelpScreen
+from dbbstation.tui.help_texts import HELP
 from dbbstation.tui.large_screen import LargeScreen
 from dbbstation.tui.measure_screen import MeasureScreen
 from dbbstation.tui.overview_screen import OverviewScreen
@@ -33,7 +34,6 @@ from dbbstation.tui.row_screen import RowScreen
 from dbbstation.tui.shown import Shown
 from dbbstation.tui.start_screen import StartScreen
 from dbbstation.tui.temperature_question import TemperatureQuestion
-from dbbstation.tui.texts import HELP
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -98,6 +98,7 @@ class StationApp(App[None]):
     """
 
     TITLE = "dbbstation"
+    CSS_PATH = "station.tcss"
     ENABLE_COMMAND_PALETTE = True
     VERTICAL_BREAKPOINTS = [(0, "-low"), (_TALL_ROWS, "-tall")]  # noqa: RUF012 - declared by Textual, as an attribute of instances
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -311,7 +312,7 @@ class StationApp(App[None]):
         if action == "command_palette":
             return bool(self.screen_stack) and not isinstance(self.screen_stack[-1], ModalScreen)
         if action in {"overview", "large"}:
-            return self._measuring and not isinstance(self.drawn, OverviewScreen)
+            return self._measuring and not (action == "overview" and isinstance(self.drawn, OverviewScreen))
         return super().check_action(action, parameters)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
@@ -332,10 +333,11 @@ class StationApp(App[None]):
         self.push_screen(OverviewScreen(self, self._show))
 
     def action_large(self) -> None:
-        """Change between the screen beside the machine and large figures."""
-        if isinstance(self.drawn, LargeScreen):
+        """Change between the screen beside the machine and large figures; an overview makes way for these."""
+        before = self.drawn
+        if isinstance(before, LargeScreen | OverviewScreen):
             self.pop_screen()
-        else:
+        if not isinstance(before, LargeScreen) and not isinstance(self.drawn, LargeScreen):
             self.push_screen(LargeScreen(self, self._show, clock=self._clock))
 
     def action_explain(self) -> None:

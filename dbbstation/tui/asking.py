@@ -30,14 +30,6 @@ class ChooseQuestion(ModalScreen[int | None]):
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,q,ctrl+c", "dismiss(None)", "Back")]
 
-    DEFAULT_CSS = """
-    ChooseQuestion {
-        align: center middle;
-        & > Vertical { width: 76; max-width: 95%; height: auto; max-height: 95%; padding: 0 1; background: $panel; border: thick $primary; }
-        & OptionList { height: auto; max-height: 16; }
-    }
-    """
-
     def __init__(self, title: str, labels: Sequence[str], at: int = 0) -> None:
         super().__init__()
         self._title, self._labels, self._at = title, labels, at
@@ -68,13 +60,6 @@ class TypeQuestion(ModalScreen[str | None]):
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,ctrl+c", "dismiss(None)", "Back")]
-
-    DEFAULT_CSS = """
-    TypeQuestion {
-        align: center middle;
-        & > Vertical { width: 76; max-width: 95%; height: auto; padding: 0 1; background: $panel; border: thick $primary; }
-    }
-    """
 
     def __init__(self, title: str, text: str = "") -> None:
         super().__init__()

@@ -25,8 +25,6 @@ _DISTANCE, _MEAN = (8, 7), (7, 6)
 class FiguresPanel(Panel):
     """A table of two runs at most, so that both directions can be compared."""
 
-    DEFAULT_CSS = "FiguresPanel { height: 3; }"
-
     def text(self, board: Board) -> Content:
         """Return titles and rows."""
         wide = self.content_size.width >= _WIDE

@@ -32,8 +32,6 @@ class FindingsPanel(Panel):
 
     can_grow = True
 
-    DEFAULT_CSS = "FindingsPanel { height: auto; }"
-
     def text(self, board: Board) -> Content:
         """Return the findings of the run that was completed last."""
         findings = board.completed.findings if board.completed else ()

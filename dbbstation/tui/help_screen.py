@@ -9,8 +9,8 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
+from dbbstation.tui.help_texts import HELP, HELP_CLOSES, KEY_NAMES
 from dbbstation.tui.panel import lines
-from dbbstation.tui.texts import HELP, HELP_CLOSES, KEY_NAMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,14 +29,6 @@ class HelpScreen(ModalScreen[None]):
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape,f1,question_mark,q", "dismiss", "Close")]
-
-    DEFAULT_CSS = """
-    HelpScreen {
-        align: center middle;
-        & > VerticalScroll { width: 90%; max-width: 100; height: auto; max-height: 95%; padding: 0 2; background: $panel; border: thick $primary; }
-        & Static { width: 1fr; margin-bottom: 1; }
-    }
-    """
 
     def __init__(self, name: str) -> None:
         super().__init__()

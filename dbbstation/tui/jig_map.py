@@ -26,11 +26,10 @@ class JigMap(Panel):
         bores: number of each bore with its x, y on the plate [mm].
     """
 
-    DEFAULT_CSS = f"JigMap {{ width: {COLUMNS}; height: {ROWS}; }}"
-
     def __init__(self, bores: Mapping[int, tuple[float, float]], *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._bores = bores
+        self.styles.width, self.styles.height = COLUMNS, ROWS
 
     def text(self, board: Board) -> Content:
         """Return the map."""

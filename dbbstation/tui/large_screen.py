@@ -37,8 +37,6 @@ class LargeFigures(Panel):
         clock: real time, for telling an old reading [s].
     """
 
-    DEFAULT_CSS = "LargeFigures { height: 1fr; padding: 0 1; }"
-
     def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._age = Age(clock)

@@ -47,23 +47,6 @@ class MeasureScreen(RunScreen):
 
     BINDINGS: ClassVar[list[BindingType]] = [("v", "view", "View")]
 
-    DEFAULT_CSS = """
-    MeasureScreen {
-        #middle { height: 1fr; }
-        #trace { width: 1fr; padding: 0 1; }
-        #side { width: 40%; min-width: 38; max-width: 52; padding: 0 1 0 0; }
-        #side > * { margin-bottom: 1; }
-        #table { height: 5; }
-        FindingsPanel { display: none; }
-        &.-low StepsPanel { display: none; }
-        &.-verdict {
-            FindingsPanel { display: block; }
-            #table, StepsPanel { display: none; }
-        }
-        &.-low.-verdict RunList { display: none; }
-    }
-    """
-
     def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(desk, shown, clock=clock)
         self._view = View.MEASURED

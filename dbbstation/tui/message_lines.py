@@ -18,8 +18,6 @@ _STYLES = {Weight.NOTE: "", Weight.WARNING: "$text-warning", Weight.FAULT: "bold
 class MessageLines(Panel):
     """As many as fit, each in one line; what needs all its words stands above in the sentence of now."""
 
-    DEFAULT_CSS = "MessageLines { height: 2; padding: 0 1; }"
-
     def text(self, board: Board) -> Content:
         """Return the last messages."""
         height = max(self.size.height, 1)

@@ -22,16 +22,6 @@ class NowLine(Panel):
 
     can_grow = True
 
-    DEFAULT_CSS = """
-    NowLine {
-        height: auto; min-height: 2; max-height: 7; padding: 0 1; text-style: bold;
-        background: $surface; color: $foreground;
-        &.-asking { background: $primary-muted; color: $foreground; }
-        &.-running { background: $surface; }
-        &.-fault { background: $error-muted; color: $foreground; }
-    }
-    """
-
     def text(self, board: Board) -> Content:
         """Return the sentence."""
         return Content(now(board))

@@ -80,8 +80,6 @@ class Choice:
 class LeftLine(Panel):
     """What is left and how long that takes; a hint where the keys have to wait."""
 
-    DEFAULT_CSS = "LeftLine { height: 2; padding: 0 1; background: $surface; }"
-
     def __init__(self, shown: Shown, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._show = shown
@@ -102,8 +100,6 @@ class PlateMap(Panel):
 
     Where there is not, a row per test with a sign for each direction and the greater circularity; the list has the words.
     """
-
-    DEFAULT_CSS = "PlateMap { height: 1fr; }"
 
     def __init__(self, shown: Shown, choice: Choice, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
@@ -192,8 +188,6 @@ class TestList(Panel):
     __test__ = False
     """Not one of pytest's."""
 
-    DEFAULT_CSS = "TestList { height: 1fr; padding: 0 1; }"
-
     def __init__(self, choice: Choice, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._choice = choice
@@ -227,8 +221,6 @@ class TestList(Panel):
 
 class ChosenRun(Panel):
     """The chosen run: figures, verdict with its reason, what was found wrong; which of how many it is."""
-
-    DEFAULT_CSS = "ChosenRun { height: 3; padding: 0 1; background: $surface; text-style: bold; }"
 
     def __init__(self, shown: Shown, choice: Choice, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)

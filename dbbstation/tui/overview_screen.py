@@ -51,14 +51,6 @@ class OverviewScreen(BoardScreen):
         ("o,escape", "back", "Back"),
     ]
 
-    DEFAULT_CSS = """
-    OverviewScreen {
-        #plate-and-tests { height: 1fr; }
-        #plate { width: 1fr; min-width: 38; }
-        #tests { width: 40%; min-width: 40; }
-    }
-    """
-
     def __init__(self, desk: Desk, shown: Shown) -> None:
         super().__init__(desk)
         self._show = shown

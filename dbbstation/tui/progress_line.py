@@ -21,8 +21,6 @@ _SHORTEST = 6
 class ProgressLine(Panel):
     """Two bars with their numbers in one line."""
 
-    DEFAULT_CSS = "ProgressLine { height: 1; padding: 0 1; }"
-
     def text(self, board: Board) -> Content:
         """Return the line."""
         length = max((self.size.width - _FIXED) // 2, _SHORTEST)

@@ -26,13 +26,6 @@ class GiveUpQuestion(ModalScreen[bool]):
         ("n,escape,ctrl+c,q", "answer(False)", "Go on"),
     ]
 
-    DEFAULT_CSS = """
-    GiveUpQuestion {
-        align: center middle;
-        & > Vertical { width: 60; max-width: 90%; height: auto; padding: 1 2; background: $panel; border: thick $warning; }
-    }
-    """
-
     def __init__(self, run: str, act: str) -> None:
         super().__init__()
         self.run = run

@@ -59,8 +59,6 @@ class ReadingPanel(Panel):
         clock: real time, for telling an old reading [s].
     """
 
-    DEFAULT_CSS = "ReadingPanel { height: 2; }"
-
     def __init__(self, *, clock: Callable[[], float] = time.monotonic, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._age = Age(clock)

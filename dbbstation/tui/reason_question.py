@@ -28,15 +28,6 @@ class ReasonQuestion(ModalScreen[str | None]):
         ("escape,ctrl+c", "dismiss", "Back"),
     ]
 
-    DEFAULT_CSS = """
-    ReasonQuestion {
-        align: center middle;
-        & > Vertical { width: 60; max-width: 90%; height: auto; padding: 1 2; background: $panel; border: thick $warning; }
-        & Input { display: none; margin-top: 1; }
-        & Input.-typing { display: block; }
-    }
-    """
-
     def __init__(self, run: str) -> None:
         super().__init__()
         self._run_label = run

@@ -10,7 +10,7 @@ from textual.widgets import Footer, OptionList, Static
 from textual.widgets.option_list import Option
 
 from dbbstation.tui.explained import ExplainedScreen
-from dbbstation.tui.texts import HELP
+from dbbstation.tui.help_texts import HELP
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,16 +20,6 @@ if TYPE_CHECKING:
 
 class RowScreen(ExplainedScreen):
     """Title, sentence, rows, a text about the chosen row, keys."""
-
-    DEFAULT_CSS = """
-    RowScreen {
-        & #row-title { height: 1; background: $panel; text-style: bold; }
-        & #row-now { height: auto; min-height: 2; max-height: 7; padding: 0 1; text-style: bold; background: $primary-muted; }
-        & #row-now.-wrong { background: $error-muted; }
-        & #rows { height: auto; max-height: 1fr; border: none; padding: 0 1; }
-        & #row-about { height: 1fr; padding: 0 2; margin-top: 1; }
-    }
-    """
 
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""

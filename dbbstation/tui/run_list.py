@@ -32,8 +32,6 @@ _SHORTEST_NAME = 4
 class RunList(Panel):
     """As many tests as fit, the one of now among them."""
 
-    DEFAULT_CSS = "RunList { height: 1fr; min-height: 2; }"
-
     def text(self, board: Board) -> Content:
         """Return a row per test."""
         numbered = enumerate(zip(board.tasks, board.marks, strict=True), start=1)

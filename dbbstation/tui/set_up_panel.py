@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 class SetUpPanel(Panel):
     """Five rows."""
 
-    DEFAULT_CSS = "SetUpPanel { height: 5; width: 1fr; }"
-
     def text(self, board: Board) -> Content:
         """Return what has to stand where."""
         announced = board.announced

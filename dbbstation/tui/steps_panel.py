@@ -18,8 +18,6 @@ class StepsPanel(Panel):
 
     can_grow = True
 
-    DEFAULT_CSS = "StepsPanel { height: auto; max-height: 10; }"
-
     def text(self, board: Board) -> Content:
         """Return the steps."""
         if board.announced is None or board.finished is not None:

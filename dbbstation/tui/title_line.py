@@ -19,8 +19,6 @@ class TitleLine(Panel):
         plan: name of the plan.
     """
 
-    DEFAULT_CSS = "TitleLine { height: 1; background: $panel; color: $foreground; }"
-
     def __init__(self, plan: str, *, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._plan = plan

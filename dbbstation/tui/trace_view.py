@@ -65,17 +65,6 @@ class TraceView(Widget):
         "trace--label",
     }
 
-    DEFAULT_CSS = """
-    TraceView {
-        & > .trace--scale { color: $foreground 50%; }
-        & > .trace--last { color: $foreground 40%; }
-        & > .trace--ccw { color: $text-primary; text-style: bold; }
-        & > .trace--cw { color: $text-warning; }
-        & > .trace--both { color: $foreground; text-style: bold; }
-        & > .trace--label { color: $foreground 75%; }
-    }
-    """
-
     def __init__(self, *, cell_aspect: float = CELL_ASPECT, id: str | None = None) -> None:  # noqa: A002 - Textual's name
         super().__init__(id=id)
         self._cell_aspect = cell_aspect

@@ -15,7 +15,7 @@ import pytest
 from dbbstation.cli import cli
 from dbbstation.cli.diagnose import _print as print_diagnosis
 from dbbstation.files.shipped import shipped_folder
-from tests.cli.conftest import call
+from tests.cli.conftest import Outcome, call
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record
@@ -171,7 +171,37 @@ def workshop(tmp_path_factory):
     second = next(k for k, line in enumerate(plan) if "{name: b," in line)
     plan[second] = plan[second].replace("elevation_deg", "elevaton_deg")
     (folder / "plan.yaml").write_text("\n".join(plan) + "\n", encoding="utf-8")
-    return folder
+    return Workshop(folder)
+
+
+class Workshop:
+    """Where commands of the documents are run, each once: what one writes, the next ones of its page read.
+
+    Tests of one page may run in several processes, and in any order.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._outcomes: dict[str, Outcome] = {}
+
+    def outcome_of(self, command: Command) -> Outcome:
+        """Return what a command prints behind the commands above it on its page."""
+        page = [one for one in COMPARED if one.document == command.document and one.number <= command.number]
+        for one in page:
+            if str(one) not in self._outcomes and (one is command or one.kind not in SLOW):
+                with pytest.MonkeyPatch.context() as patch:
+                    self._outcomes[str(one)] = self._run(words_of(one), patch)
+        return self._outcomes[str(command)]
+
+    def _run(self, words: list[str], patch: pytest.MonkeyPatch) -> Outcome:
+        patch.chdir(self.folder)
+        assert words[0] == "dbbstation"
+        if words[1:4] == ["compare", "before", "after"]:
+            record_before_and_after(self.folder)
+        if words[1:3] == ["history", "sessions"]:
+            sessions_over_time(self.folder / "sessions", 16, seed=1, step_at=13, step_um=8.0)
+            patch.setenv("XDG_CACHE_HOME", str(self.folder / "cache"))
+        return call(*words[1:])
 
 
 def record_before_and_after(folder: Path) -> None:
@@ -187,16 +217,8 @@ def record_before_and_after(folder: Path) -> None:
     "command",
     [pytest.param(c, id=str(c), marks=[pytest.mark.slow] if c.kind in SLOW else []) for c in COMPARED],
 )
-def test_a_command_prints_what_is_shown(command, workshop, monkeypatch):
-    monkeypatch.chdir(workshop)
-    words = words_of(command)
-    assert words[0] == "dbbstation"
-    if words[1:4] == ["compare", "before", "after"]:
-        record_before_and_after(workshop)
-    if words[1:3] == ["history", "sessions"]:
-        sessions_over_time(workshop / "sessions", 16, seed=1, step_at=13, step_um=8.0)
-        monkeypatch.setenv("XDG_CACHE_HOME", str(workshop / "cache"))
-    outcome = call(*words[1:])
+def test_a_command_prints_what_is_shown(command, workshop):
+    outcome = workshop.outcome_of(command)
     # On a terminal both streams are seen; which comes first depends on the command.
     printed = [outcome.out, outcome.err + outcome.out, outcome.out + outcome.err]
     assert any(is_shown_by(command.shown, one.splitlines()) for one in printed), "\n".join(printed)

@@ -23,14 +23,15 @@ from dbbstation.service.live_trace import LiveTrace
 from dbbstation.station.commands import Accept, GoTo, Judge, Note, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
+from dbbstation.tui.help_texts import HELP
 from dbbstation.tui.large_screen import LargeScreen
+from dbbstation.tui.measure_screen import MeasureScreen
 from dbbstation.tui.overview_panels import ChosenRun
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import GiveUpQuestion
 from dbbstation.tui.reason_question import ReasonQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.temperature_question import TemperatureQuestion
-from dbbstation.tui.texts import HELP
 from dbbstation.tui.trace_view import _LAST, TraceView
 from tests.tui.happenings import Happening, make_plan
 
@@ -316,6 +317,23 @@ def test_a_rejected_run_before_the_last_is_seen_and_counts_again() -> None:
     assert (taken_back.repeat, taken_back.accepted) == (2, False)
 
 
+def test_large_figures_are_one_key_from_the_overview_once_a_question_is_closed() -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        await pilot.press("o", "up", "left", "e", "e", "x")
+        assert isinstance(app.screen, ReasonQuestion)
+        await pilot.press("f")
+        assert isinstance(app.screen, ReasonQuestion)
+        await pilot.press("escape", "f")
+        assert isinstance(app.screen, LargeScreen)
+        await pilot.press("o", "f")  # lies beneath the overview already
+        assert isinstance(app.screen, LargeScreen)
+        assert len(app.screen_stack) == 2
+        await pilot.press("f")
+        assert isinstance(app.screen, MeasureScreen)
+
+    assert played(twice(), play).sent == []
+
+
 def test_views_are_those_there_is_something_for() -> None:
     async def views(pilot: Pilot[None], app: StationApp) -> list[str]:
         seen = []
@@ -482,19 +500,3 @@ def test_the_session_before_is_drawn_dim_beneath_its_own_direction_and_test(monk
 
     played(happening, play)
     assert asked == [("session-7", former.run.test)]
-
-
-def test_after_escape_f_opens_large_figures_from_the_overview() -> None:
-    """Key by key, as they are pressed: earlier run, taken back, not after all, back, large figures."""
-
-    async def play(pilot: Pilot[None], app: StationApp) -> None:
-        await pilot.press("o")
-        await pilot.press("up", "left")
-        await pilot.press("e", "e", "x")
-        assert isinstance(app.screen, ReasonQuestion)
-        await pilot.press("escape", "f")
-        assert isinstance(app.screen, OverviewScreen)  # F means nothing in the overview
-        await pilot.press("escape", "f")
-        assert isinstance(app.screen, LargeScreen)
-
-    played(twice(), play)

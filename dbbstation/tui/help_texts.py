@@ -1,0 +1,266 @@
+"""Help on every screen and key; what the screens say themselves is in `texts`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@dataclass(frozen=True)
+class Help:
+    """Help on one screen.
+
+    Attributes:
+        title: name of the screen.
+        shows: what stands on it, a paragraph each.
+        keys: a sentence for each key, by Textual's name of the key.
+    """
+
+    title: str
+    shows: tuple[str, ...] = ()
+    keys: Mapping[str, str] = field(default_factory=dict)
+
+
+_RUN_KEYS = {
+    "enter": "The ball stands and the bar is in: the station waits for the machine.",
+    "m": "The same, and the holder was touched although nobody asked for it: a new mounting begins.",
+    "a": "The complete run counts; the next one is announced.",
+    "r": "The run does not count and is measured again. While the circle runs, the station asks first.",
+    "x": "The run does not count and the next one is announced. While the circle runs, the station asks first.",
+    "s": "The announced run is left out for now.",
+    "p": "A pause: nothing is waited for. P again goes on.",
+}
+
+HELP = {
+    "measure": Help(
+        "Measure",
+        (
+            "The top line names plan, run and state. The sentence below it says what to do now.",
+            (
+                "The circle shows the deviation of the bar from its nominal length, magnified. The dotted circle is the nominal one. "
+                "Counter-clockwise is drawn thick, clockwise thin. A mark shows where the machine is. Dim beneath lies the last accepted "
+                "circle of the session before, of the same machine and test, where there is one."
+            ),
+            (
+                "On the right: the live reading, the set-up with a map of the plate, the figures of the last two runs, all runs of "
+                "the plan with a sign and a word each. At the bottom: progress, messages, keys."
+            ),
+            (
+                "While a run waits for its verdict, its findings stand on the right: number, limit, and good, cannot tell or wrong. "
+                "What is wrong comes first."
+            ),
+        ),
+        {
+            **_RUN_KEYS,
+            "v": (
+                "As measured; complete circles about their own centre on a scale of their own; the form counter-clockwise less that clockwise."
+            ),
+        },
+    ),
+    "large": Help(
+        "Large figures",
+        (
+            "To be read from two metres: the length of the bar [mm], the state of the sequence, what to do next.",
+            (
+                "Dashes stand instead of the length where no bar is in or no reading has come for a while. The bell rings when a "
+                "run waits for its verdict."
+            ),
+        ),
+        {**_RUN_KEYS, "escape": "Back to the screen with the circle."},
+    ),
+    "overview": Help(
+        "Overview",
+        (
+            (
+                "The map shows the plate from above, X to the right and Y up. Under each bore stand its tests: where there is room, a "
+                "row for each direction with sign, word and circularity; else a sign for each direction and the greater circularity. "
+                "The list has signs and words always."
+            ),
+            (
+                "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict with its "
+                "reason, findings that are wrong with number and limit. E shows the runs before it, rejected ones too."
+            ),
+            "The time left is that of the circles at their planned feeds. Putting up balls comes on top.",
+        ),
+        {
+            "up": "The test above.",
+            "down": "The test below.",
+            "left": "The first direction of the test.",
+            "right": "The second direction of the test.",
+            "enter": "The chosen test and direction is measured next; the plan goes on from there.",
+            "e": "An earlier run of the test and direction; behind the first comes the last again.",
+            "x": "The accepted run does not count any more; the station asks for the reason.",
+            "a": "The rejected run counts again.",
+            "o": "Back.",
+            "escape": "Back.",
+        },
+    ),
+    "start": Help(
+        "Start",
+        (
+            (
+                "The list has the sessions under the working folder and those that were open lately, the last first: how many runs "
+                "are accepted, and how long the circles take that are left. Plan and machine of a session lie in its folder; the "
+                "instrument is that of last time."
+            ),
+            "A session with faults is listed with what is wrong with it; `dbbstation check` tells all of it.",
+        ),
+        {
+            "enter": "Go on with the session where it was left.",
+            "n": "A new session: machine, plan, instrument, port.",
+            "i": "Go on with the session by another instrument or port.",
+            "e": "Results of the session: calibrate, diagnose, programs, report. No instrument is needed.",
+            "v": "Try everything on a virtual machine, without hardware.",
+            "up": "The session above.",
+            "down": "The session below.",
+        },
+    ),
+    "new": Help(
+        "What is measured",
+        (
+            "A row for each thing that a session needs. The sentence at the top says what is still missing.",
+            (
+                "Machines, plans and calibrations of bars are looked for in the working folder; examples come with the program. "
+                "The port list has the ports of this computer, and virtual machines to try everything on."
+            ),
+        ),
+        {
+            "enter": "Change the row: choose from a list, or type.",
+            "b": "Begin: read and check everything, then the checklist.",
+            "t": "Ask the port what answers there.",
+            "delete": "Empty the row.",
+            "up": "The row above.",
+            "down": "The row below.",
+            "escape": "Back to the sessions.",
+        },
+    ),
+    "bar": Help(
+        "The bar on its calibrator",
+        (
+            "Put the bar on its calibrator, a block of known length, and wait until both have the temperature of the shop.",
+            (
+                "The readings are averaged, and a file of the calibration is written. What the bar reads too long is noted and "
+                "never taken off a recording."
+            ),
+        ),
+        {
+            "enter": "Change the row.",
+            "b": "Read the bar.",
+            "up": "The row above.",
+            "down": "The row below.",
+            "escape": "Back; readings that are being taken are given up.",
+        },
+    ),
+    "prepare": Help(
+        "Checklist",
+        (
+            (
+                "Below the rows stands what the program checked: every circle within the travel, the time that the circles take, "
+                "whether a drift can look like an effect of height, the bar, the temperature."
+            ),
+            "The rows have what only a person can see at the machine. Each is confirmed once before the session begins.",
+            "A session that goes on has a shorter list: what can have changed since.",
+        ),
+        {
+            "enter": "Confirm, or take it back.",
+            "y": "Confirm all.",
+            "t": "Take the temperature of the shop before the circles.",
+            "w": (
+                "Write NC programs of all circles into a folder beside the session: nominal, or compensated with a model. "
+                "Compensated ones then command the session."
+            ),
+            "b": "Begin to measure.",
+            "up": "The line above.",
+            "down": "The line below.",
+            "escape": "Back to what is measured.",
+        },
+    ),
+    "results": Help(
+        "Results",
+        (
+            (
+                "Five steps on the accepted runs. Each is a command of the program in a process of its own, so that it can be ended; "
+                "what it wrote before stays. Files go into a new folder beside the session."
+            ),
+            (
+                "Calibrate fits the kinematic parameters and says what the plan could not see. Diagnose looks for causes that the "
+                "calibration leaves out. Programs are compensated with the best model there is. The report holds the circles "
+                "against the shop's tolerances, with their uncertainty: whether a calibration is due. Acceptance puts the circles "
+                "beside those of a session before."
+            ),
+        ),
+        {
+            "a": "The first four steps, one behind the other.",
+            "c": "Calibrate.",
+            "d": "Diagnose.",
+            "p": "Write compensated NC programs.",
+            "r": "Write the report: the verdict against the shop's tolerances.",
+            "b": "Acceptance: circles as measured before and now, against the shop's tolerances.",
+            "x": "End the step that is being done.",
+            "up": "The step above; its result stands below the list.",
+            "down": "The step below.",
+            "escape": "Back. A step that is being done is ended, after a question.",
+        },
+    ),
+    "acceptance": Help(
+        "Acceptance",
+        (
+            (
+                "Circles as measured before and now; nothing here is predicted. The sessions before are those of the same machine, "
+                "plan and jig beside this one, that ended before it began."
+            ),
+            (
+                "A row for each test and tolerance of the shop's settings: its worst circle before and now [µm], the limit [µm], "
+                "U (k = 2) now [µm]. PASS: the figure and U keep within the limit. FAIL: the figure less U exceeds it. CANNOT TELL: "
+                "the limit lies within U."
+            ),
+            (
+                "Below the list stand the worst circles of all tests, what the circles ran by, and the way back: the model that was "
+                "in force before is copied beside the report, and nothing is overwritten."
+            ),
+        ),
+        {
+            "enter": "Hold the session against the chosen one.",
+            "b": "Choose another session before.",
+            "x": "End the comparison that is being made.",
+            "up": "The row above.",
+            "down": "The row below.",
+            "escape": "Back to the results.",
+        },
+    ),
+    "everywhere": Help(
+        "On every screen",
+        keys={
+            "o": "All tests of the plan on a map of the plate.",
+            "f": "Large figures for two metres, and back.",
+            "c": "After a fault: open instrument and session again.",
+            "e": "Results of the session: calibrate, diagnose, programs, report.",
+            "t": "Note the temperature of the shop. After circles it is asked for before the session is left.",
+            "d": "Dark or light.",
+            "f1": "This help.",
+            "question_mark": "This help.",
+            "ctrl+p": "Search the commands of the screen by their names.",
+            "q": "Quit. While a circle is recorded, the station asks first.",
+        },
+    ),
+}
+"""By the name that a screen has for its help."""
+
+KEY_NAMES = {
+    "enter": "Enter",
+    "escape": "Esc",
+    "up": "Up",
+    "down": "Down",
+    "left": "Left",
+    "right": "Right",
+    "question_mark": "?",
+    "f1": "F1",
+    "ctrl+p": "Ctrl-P",
+    "delete": "Delete",
+}
+"""How keys are called that are no letter."""
+
+HELP_CLOSES = "Esc, F1 or ? closes this help; arrow keys scroll."

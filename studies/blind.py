@@ -46,7 +46,7 @@ def judge_sessions(
         folder: with one session folder each for what was recorded.
         candidates: names of the error sources to look for.
         jobs: processes.
-        progress: told how many of how many sessions are judged.
+        progress: called with how many of how many sessions are judged.
         again: judge all of them anew, for a diagnosis that has changed since.
 
     Returns:

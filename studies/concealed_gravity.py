@@ -62,7 +62,7 @@ def concealed_gravity(
         jig: the fifteen circles of [CAL Table II].
         conditions: the nine of [GRAV Table 4].
         seed: of machine and measurement.
-        progress: told what is being done.
+        progress: called with what is being done.
     """
     rng = np.random.default_rng(seed)
     kinematics = random_kinematics(machine, seed)

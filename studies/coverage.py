@@ -84,7 +84,7 @@ def coverage(
         machine: nominal machine.
         plan: what is recorded.
         seeds: of the machines and their sessions.
-        progress: told how many machines are done.
+        progress: called with how many machines are done.
         level: no raised bar in the plan: machines are drawn without a common height of their base joints, which
             level bars do not see and which would reach the other parameters in second order.
     """

@@ -186,7 +186,7 @@ def gravity_study(
         jig: the fifteen circles of [CAL Table II].
         conditions: the nine of [GRAV Table 4].
         seeds: of the machines.
-        progress: told how many machines are done.
+        progress: called with how many machines are done.
     """
     done = []
     for one in over_machines(partial(_machine, machine, jig, conditions), seeds):

@@ -87,7 +87,7 @@ def study(size: Size, progress: Callable[[int, int], None] = lambda _done, _of: 
 
     Args:
         size: how much of it.
-        progress: told how many of how many parts are done.
+        progress: called with how many of how many parts are done.
     """
     of = len(SCATTERS) + len(WAYS)
     rng = np.random.default_rng(size.seed)

@@ -79,7 +79,7 @@ def platform_joints(
         jig: the fifteen circles of [CAL Table II].
         seed: of machine and measurements.
         joint_error_mm: standard deviation of a platform joint's coordinate [mm].
-        progress: told what is being done.
+        progress: called with what is being done.
         most_rounds: times that tests are added.
     """
     rng = np.random.default_rng([seed, 9])

@@ -21,7 +21,7 @@ from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
     from pathlib import Path
 
 
@@ -30,7 +30,7 @@ class Constant:
     """A number of the program that decides an answer.
 
     Attributes:
-        module: where it is declared, below `dbbstation.diagnosis`.
+        module: where it is declared, below `dbbstation`.
         name: of the constant.
         others: values to try in its place; empty: half and twice its own.
     """
@@ -42,7 +42,7 @@ class Constant:
     @property
     def value(self) -> float:
         """As the program has it."""
-        return getattr(import_module(f"dbbstation.diagnosis.{self.module}"), self.name)
+        return getattr(import_module(f"dbbstation.{self.module}"), self.name)
 
     @property
     def tried(self) -> tuple[float, ...]:
@@ -53,28 +53,36 @@ class Constant:
         return (max(own // 2, 1), 2 * own) if isinstance(own, int) else (own / 2.0, 2.0 * own)
 
 
+ENGINE = (
+    Constant("inference.read_off", "EQUIVALENT", (0.998, 0.9995)),
+    Constant("inference.bank", "LEAST_LEFT"),
+    Constant("inference.settle", "BETTER"),
+)
+"""Of whatever compares sets of causes. Of a cosine, what it lacks of one is halved and doubled."""
+
 DRIVE = (
-    Constant("drive.channel", "METHOD_SHARE"),
-    Constant("drive.channel", "NEAREST_SHARE"),
-    Constant("drive.channel", "PERIODS_IN_TRAVEL"),
-    Constant("drive.channel", "WAVE_STEP"),
-    Constant("drive.channel", "STRONGEST"),
-    Constant("drive.fit", "METHOD_U_SHARE"),
-    Constant("drive.signals", "ACCELERATING_SHARE"),
-    Constant("drive.signals", "REACH"),
-    Constant("drive.signals", "MOST"),
-    Constant("drive.pulses", "APART"),
-    Constant("drive.explain", "MOST_LOOKS"),
+    *ENGINE,
+    Constant("diagnosis.drive.channel", "METHOD_SHARE"),
+    Constant("diagnosis.drive.channel", "PERIODS_IN_TRAVEL"),
+    Constant("diagnosis.drive.channel", "WAVE_STEP"),
+    Constant("diagnosis.drive.channel", "STRONGEST"),
+    Constant("diagnosis.drive.fit", "METHOD_U_SHARE"),
+    Constant("diagnosis.drive.signals", "ACCELERATING_SHARE"),
+    Constant("diagnosis.drive.signals", "REACH"),
+    Constant("diagnosis.drive.signals", "MOST"),
+    Constant("diagnosis.drive.pulses", "APART"),
+    Constant("diagnosis.drive.explain", "MOST_LOOKS"),
 )
 """Of `drive`."""
 
 COMPARE = (
-    Constant("compare.causes", "HARDLY_DIFFERENT"),
-    Constant("compare.channel", "CHANGE"),
-    Constant("compare.set_up", "JIG_MM"),
-    Constant("compare.comparison", "CENTRED_MM"),
-    Constant("compare.comparison", "CENTRED_SIGMA"),
-    Constant("compare.comparison", "CENTRED_SHAPE"),
+    *ENGINE,
+    Constant("diagnosis.compare.causes", "HARDLY_DIFFERENT"),
+    Constant("diagnosis.compare.channel", "CHANGE"),
+    Constant("diagnosis.compare.set_up", "JIG_MM"),
+    Constant("calibration.fit.methods", "CENTRED_MM"),
+    Constant("diagnosis.compare.comparison", "CENTRED_SIGMA"),
+    Constant("diagnosis.compare.comparison", "CENTRED_SHAPE"),
 )
 """Of `compare`."""
 
@@ -142,6 +150,7 @@ def study(
     pairs: Sequence[tuple[Path, Path]],
     jobs: int,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
+    only: Collection[str] = (),
 ) -> list[Change]:
     """Ask for every answer with every constant as it is, halved and doubled.
 
@@ -149,7 +158,8 @@ def study(
         drives: recordings, and the force that an ampere makes in each [N/A].
         pairs: sessions A and B.
         jobs: processes.
-        progress: told how many answers of how many there are.
+        progress: called with how many answers of how many there are.
+        only: names of the constants to vary; all if empty.
 
     Raises:
         StationError: a recording cannot be read, or nothing can be said of it.
@@ -160,7 +170,12 @@ def study(
         for paths, scale, constants in asked
         for constant, value in [
             (None, 0.0),
-            *((constant, value) for constant in constants for value in constant.tried),
+            *(
+                (constant, value)
+                for constant in constants
+                if not only or constant.name in only
+                for value in constant.tried
+            ),
         ]
     ]
     answers: dict[Variation, Answer] = {}
@@ -190,7 +205,7 @@ def answer_to(variation: Variation) -> Answer:
     holders = [
         module
         for name, module in sys.modules.items()
-        if name.startswith("dbbstation.diagnosis.") and getattr(module, constant.name, None) is own
+        if name.startswith("dbbstation.") and getattr(module, constant.name, None) is own
     ]
     for module in holders:
         setattr(module, constant.name, variation.value)

@@ -138,7 +138,7 @@ def table_iii(
         conventional: plan with balls put up under the spindle.
         jig: plan on the jig plate.
         seeds: of the machines.
-        progress: told how many machines are done.
+        progress: called with how many machines are done.
         gravity: the machines' struts are elastic, which no calibration models.
     """
     verified: dict[str, list[Verified]] = {str(method): [] for method in METHODS}

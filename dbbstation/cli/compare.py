@@ -82,7 +82,7 @@ def compare(
 
 
 def _both(a: Path, b: Path, tests: tuple[str, ...], exclude: tuple[str, ...]) -> tuple[Recorded, Recorded]:
-    """Read both sessions, told apart by more than their names.
+    """Read both sessions, distinguished by more than their names.
 
     Raises:
         InputError: a fault of either; one session given twice.

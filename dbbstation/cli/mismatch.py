@@ -151,9 +151,9 @@ def _print(summary: Mapping[str, Any]) -> None:
     click.echo()
     _print_whether(summary)
     there = [f for f in summary["findings"] if f["verdict"] == "identified"]
-    told = {name for f in there for name in f["equivalent"]}
+    equivalent = {name for f in there for name in f["equivalent"]}
     likely = [f for f in summary["findings"] if f["verdict"] == "ambiguous" and f["probability"] >= LIKELY]
-    likely = [f for f in likely if f["name"] not in told]
+    likely = [f for f in likely if f["name"] not in equivalent]
     there += likely
     if there:
         click.echo()
@@ -189,13 +189,13 @@ def _print_whether(summary: Mapping[str, Any]) -> None:
         click.echo(
             f"There is a mismatch: {rms['before']:.3g} {unit} rms, of which {rms['after']:.3g} {unit} is not explained."
         )
-    told = (
+    fitted = (
         ""
         if noise["measured_in_order"]
         else "; fitted jointly, since nothing says in which order the rows were measured"
     )
     alike = f", {noise['rows_as_one']:.3g} rows count as one" if noise["rows_as_one"] > 1.0 else ""
-    click.echo(f"noise of one row: {noise['sigma']:.3g} {unit}{alike}{told}")
+    click.echo(f"noise of one row: {noise['sigma']:.3g} {unit}{alike}{fitted}")
     if summary["led_by"]:
         led = ", ".join(
             f"{s['variable']} {100 * s['share']:.0f} % ({100 * s['lost']:.0f} %)"
@@ -239,7 +239,7 @@ LIKELY = 0.5
 """Probability from which on an effect that is not certain is printed; all of them are in the JSON."""
 
 MOST_TOLD = 12
-"""Effects from which on only those that are certain are told in full."""
+"""Effects from which on only those that are certain are printed in full."""
 
 MOST_VALUES = 6
 """Values of an effect that are printed; those of a curve say little by themselves, and are in the JSON."""

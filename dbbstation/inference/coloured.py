@@ -75,7 +75,7 @@ class Coloured:
 
     @property
     def effective(self) -> float:
-        """Standard deviation of white noise that smooth things would feel as they feel this one."""
+        """Standard deviation of white noise with the same power at frequency zero."""
         return self.sigma * float(np.sqrt(self.correlation_samples))
 
     @property

@@ -74,7 +74,7 @@ def held_out_error(
     Args:
         channel: all rows.
         choose_without: the whole selection, laws, patterns, noise and looks, without rows that are held back, shape (n,).
-        progress: told what is being done, and how much of how much.
+        progress: called with what is being done, and how much of how much.
     """
     found = []
     parts = parts_of(channel)

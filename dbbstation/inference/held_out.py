@@ -46,7 +46,7 @@ def held_out(
         groups: group of each block, such as the fold of its test.
         known: priors and scales of all columns.
         active: columns that the model uses, shape (a,).
-        noise: standard deviation of one measurement, as anything smooth feels it.
+        noise: standard deviation of one measurement that white noise of the same power at low frequencies would have.
         held: directions of the fitted columns to keep at zero, in units of their scales.
         single: standard deviation of a single measurement, less than `noise` where neighbours resemble each other;
             the same if None.

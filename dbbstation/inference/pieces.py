@@ -5,7 +5,7 @@ What a curve would explain beside a base and causes is still exact but for the w
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -54,14 +54,7 @@ class Left:
             coloured: noise before it was whitened.
             whitening: that made it white.
         """
-        noise = coloured.innovation
-        bounded = np.flatnonzero(np.isfinite(sd))
-        size = np.where(np.isfinite(sd), sd, noise / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
-        priors = np.zeros((len(bounded), columns.shape[1]))
-        priors[np.arange(len(bounded)), bounded] = 1.0
-        axes = np.linalg.qr(np.vstack([columns * (size / noise), priors]))[0][: len(columns)]
-        weighted = target / noise
-        return cls(weighted - axes @ (axes.T @ weighted), axes, noise, coloured, whitening)
+        return Fitting.of(columns, sd, coloured, whitening).left(target)
 
     @cached_property
     def towards(self) -> NDArray[np.float64]:
@@ -80,6 +73,51 @@ class Left:
     def transposed(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transpose of whitening, applied to whitened rows."""
         return rows if self.whitening is None else np.asarray(self.whitening.T @ rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitting:
+    """Whitened columns with Gaussian amplitudes, made orthonormal; further ones may stand beside them.
+
+    Attributes:
+        axes: orthonormal, of rows and of one more row for every amplitude with a prior, shape (n + b, k).
+        rows: of the channel, n.
+        coloured: noise before it was whitened.
+        whitening: that made it white; None where it was.
+    """
+
+    axes: NDArray[np.float64]
+    rows: int
+    coloured: Coloured
+    whitening: csr_array | None
+
+    @classmethod
+    def of(
+        cls, columns: NDArray[np.float64], sd: NDArray[np.float64], coloured: Coloured, whitening: csr_array | None
+    ) -> Fitting:
+        """Columns by themselves; arguments as of `Left.of`."""
+        none = np.zeros((len(columns), 0))
+        return cls(none, len(columns), coloured, whitening).beside(columns, sd)
+
+    def beside(self, columns: NDArray[np.float64], sd: NDArray[np.float64]) -> Fitting:
+        """These with more columns, shape (n, k), whose amplitudes have standard deviations, infinite where nothing is known."""
+        noise = self.coloured.innovation
+        bounded = np.flatnonzero(np.isfinite(sd))
+        size = np.where(np.isfinite(sd), sd, noise / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))
+        known, more = len(self.axes) - self.rows, len(bounded)
+        priors = np.zeros((known + more, columns.shape[1]))
+        priors[known + np.arange(more), bounded] = 1.0
+        old = np.vstack([self.axes, np.zeros((more, self.axes.shape[1]))])
+        new = np.vstack([columns * (size / noise), priors])
+        for _ in range(2 if old.shape[1] else 0):  # twice is enough [Giraud et al., Numer. Math. 101 (2005) 87]
+            new = new - old @ (old.T @ new)
+        return replace(self, axes=np.hstack([old, np.linalg.qr(new)[0]]))
+
+    def left(self, target: NDArray[np.float64]) -> Left:
+        """What these leave of a whitened target, shape (n,)."""
+        noise, axes = self.coloured.innovation, self.axes[: self.rows]
+        weighted = target / noise
+        return Left(weighted - axes @ (axes.T @ weighted), axes, noise, self.coloured, self.whitening)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 
 from dbbstation.inference.looks import looked_for
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pieces import Left
+from dbbstation.inference.pieces import Fitting, Left
 from dbbstation.inference.square_root import free_directions
 from dbbstation.inference.stretches import refined, stretches
 from dbbstation.inference.variables import Kind, Variable
@@ -68,11 +68,10 @@ def edges_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> 
         others, sd = _fitted(bank, [*members[:number], *members[number + 1 :]])
         count = len(member.variant.columns)
 
-        sd = np.concatenate([sd, member.sd[:-1]])
         better = refined(
             pattern,
             count,
-            partial(_left_beside, bank, others, sd),
+            partial(_left_beside, bank, Fitting.of(others, sd, bank.noise, bank.whitening), member.sd[:-1]),
             channel.blocks,
             channel.kept,
             channel.size / bank.noise.innovation,
@@ -87,11 +86,9 @@ def edges_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> 
     return tuple(members)
 
 
-def _left_beside(
-    bank: Bank, others: NDArray[np.float64], sd: NDArray[np.float64], but_for: int, own: NDArray[np.float64]
-) -> Left:
+def _left_beside(bank: Bank, others: Fitting, sd: NDArray[np.float64], but_for: int, own: NDArray[np.float64]) -> Left:
     """What is left beside others and all but one of some columns that are not whitened."""
-    return _left(bank, np.hstack([others, np.delete(bank.whitened(own), but_for, axis=1)]), sd)
+    return others.beside(np.delete(bank.whitened(own), but_for, axis=1), sd).left(bank.target)
 
 
 def _in_time(left: Left, channel: Channel, size: float) -> list[Pattern]:

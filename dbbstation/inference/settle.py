@@ -126,7 +126,7 @@ def settle(
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
         thorough: begin from several places, and look once more beside what a search ends at; False: begin with nothing and search
             once, where a selection is repeated many times and may be somewhat worse.
-        progress: told what is being done.
+        progress: called with what is being done.
     """
     options = _Options(
         look=look,
@@ -168,7 +168,7 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
     Args:
         bank: of columns; they become more.
         options: of `settle`.
-        progress: told what is being done.
+        progress: called with what is being done.
     """
     channel, look = bank.channel, options.look
     best: tuple[Member, ...] = ()
@@ -247,7 +247,7 @@ def _looked(
         bank: of columns; they become more.
         members: to begin with.
         refused: laws that cannot be what they would have to be.
-        progress: told what is being done.
+        progress: called with what is being done.
         most_looks: looks at the most.
         in_time: look for steps and pulses in time, too.
     """

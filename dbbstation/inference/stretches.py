@@ -287,7 +287,12 @@ class _Look:
     def _best_edges(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[float, float]:
         """Those edges of some between which one value explains most; the middle ones where they are alike."""
         columns = self._whitened(begins, ends)
-        along, taken = columns.T @ self._rest, self._axes.T @ columns
+        # Stretches differ about the edge that moves only, and what is alike in them is multiplied once.
+        one = columns[:, :1]
+        away = columns - one
+        near = np.flatnonzero(away.any(axis=1))
+        along = one.T @ self._rest + away[near].T @ self._rest[near]
+        taken = self._axes.T @ one + self._axes[near].T @ away[near]
         own = np.sum(columns**2, axis=0) - np.sum(taken**2, axis=0)
         explained = along**2 / (np.maximum(own, 0.0) + 1.0 / self._size**2)
         order = np.argsort(np.abs(np.arange(len(begins)) - len(begins) // 2), kind="stable")

@@ -33,6 +33,9 @@ _FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
     metavar="A B",
     help="Two sessions to compare; may be given more than once.",
 )
+@click.option(
+    "--only", multiple=True, metavar="NAME", help="Vary this constant; may be given more than once [default: all]."
+)
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of processes [default: all cores].")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 def sensitivities(
@@ -40,6 +43,7 @@ def sensitivities(
     drives: tuple[Path, ...],
     amperes: tuple[tuple[Path, float], ...],
     pairs: tuple[tuple[Path, Path], ...],
+    only: tuple[str, ...],
     jobs: int | None,
     as_json: bool,
 ) -> None:
@@ -52,15 +56,21 @@ def sensitivities(
     Examples:
       dbbstation study sensitivities drive.csv
       dbbstation study sensitivities --pair before after --jobs 1
+      dbbstation study sensitivities drive.csv --only APART --only REACH
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import count_bar
-    from studies.sensitivities import study
+    from studies.sensitivities import COMPARE, DRIVE, study
 
     if not (drives or amperes or pairs):
         raise click.UsageError("give a drive recording, or two sessions with --pair")
+    unknown = set(only) - {constant.name for constant in (*DRIVE, *COMPARE)}
+    if unknown:
+        known = ", ".join(sorted({constant.name for constant in (*DRIVE, *COMPARE)}))
+        raise click.UsageError(f"no constant of this study: {', '.join(sorted(unknown))}; it has {known}")
+    recordings = [*((path, None) for path in drives), *amperes]
     with count_bar("answers") as progress:
-        changes = study([*((path, None) for path in drives), *amperes], pairs, jobs or os.cpu_count() or 1, progress)
+        changes = study(recordings, pairs, jobs or os.cpu_count() or 1, progress, only)
     if as_json:
         print_json({"changes": [asdict(change) for change in changes]})
     else:

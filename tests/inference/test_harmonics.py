@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dbbstation.inference import harmonics
 from dbbstation.inference.harmonics import STRETCH, WORST_CONDITION, amplitudes, basis, coefficients, smooth
 
 
@@ -65,3 +66,24 @@ def test_amplitudes_are_those_that_values_were_made_of(count, share):
     values = 3.0 + 2.0 * np.cos(phase) - 1.0 * np.sin(phase) + 0.5 * np.cos(3.0 * phase - np.radians(40.0))
     expected = [3.0, 2.0 + 1.0j, 0.0, 0.5 * np.exp(-1j * np.radians(40.0)), 0.0]
     assert amplitudes(values, phase, 4) == pytest.approx(np.array(expected), abs=1e-9 if share == 1.0 else 1e-6)
+
+
+@pytest.mark.parametrize("at_once", [3, 8, 32])
+def test_how_many_harmonics_are_made_at_once_decides_nothing(rng, monkeypatch, at_once):
+    phase, values = np.sort(rng.uniform(0.0, 2.0 * np.pi, 900)), rng.normal(size=900)
+    before = coefficients(values, phase, 61), smooth(values, phase)
+    monkeypatch.setattr(harmonics, "AT_ONCE", at_once)
+    np.testing.assert_allclose(coefficients(values, phase, 61), before[0], atol=1e-12)
+    np.testing.assert_allclose(smooth(values, phase), before[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("gap_deg", [12.0, 30.0, 45.0])
+def test_where_normal_equations_give_way_to_the_basis_decides_nothing(rng, monkeypatch, gap_deg):
+    """Phases that leave a part of the period out: both ways to the same least squares, to 1e-5 of the noise."""
+    phase = np.sort(rng.uniform(np.radians(gap_deg), 2.0 * np.pi, 2000))
+    values = np.cos(3.0 * phase) + 0.1 * rng.normal(size=2000)
+    found = []
+    for worst in (0.0, 1e12):
+        monkeypatch.setattr(harmonics, "WORST_CONDITION", worst)
+        found.append(smooth(values, phase))
+    np.testing.assert_allclose(*found, atol=1e-6)

@@ -5,13 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import studies.sensitivities as asked
 from dbbstation.diagnosis.drive import channel, fit, identify
+from studies.commands.sensitivities import sensitivities
 from studies.sensitivities import Answer, Constant, Variation, answer_to, study
 
-SHARE = Constant("drive.channel", "METHOD_SHARE")
+SHARE = Constant("diagnosis.drive.channel", "METHOD_SHARE")
 DRIVE = Path("drive.csv")
+USAGE = 2
 
 
 @pytest.fixture
@@ -47,6 +50,20 @@ def test_what_changes_is_said_in_verdicts_and_uncertainties(answers, monkeypatch
     assert twice.parameter == "mass_kg"
 
 
+def test_only_what_is_asked_for_is_varied(answers, monkeypatch):
+    monkeypatch.setattr(asked, "DRIVE", (SHARE, Constant("diagnosis.drive.explain", "MOST_LOOKS")))
+    found = study([(DRIVE, None)], [], 1, only=["METHOD_SHARE"])
+    assert {one.constant for one in found} == {"diagnosis.drive.channel METHOD_SHARE"}
+    assert len(answers) == 3
+
+
+def test_a_constant_that_is_none_of_the_study_is_refused():
+    outcome = CliRunner().invoke(sensitivities, [__file__, "--only", "NOTHING"])
+    assert outcome.exit_code == USAGE
+    assert "NOTHING" in outcome.output
+    assert "METHOD_SHARE" in outcome.output
+
+
 def test_whole_numbers_stay_whole_and_above_zero():
-    assert Constant("drive.explain", "MOST_LOOKS").tried == (1, 4)
-    assert Constant("drive.channel", "STRONGEST").tried == (3, 12)
+    assert Constant("diagnosis.drive.explain", "MOST_LOOKS").tried == (1, 4)
+    assert Constant("diagnosis.drive.channel", "STRONGEST").tried == (3, 12)

@@ -53,7 +53,7 @@ def predicted_circles(
     Args:
         model: with the machine's own sources.
         observations: the recordings.
-        progress: told how many of how many runs are done.
+        progress: called with how many of how many runs are done.
 
     Raises:
         TraceError: a run that is no circle.

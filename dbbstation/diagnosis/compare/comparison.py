@@ -1,7 +1,7 @@
-"""Two sessions side by side: do they differ, where, in what form, by which cause, and what cannot be told apart.
+"""Two sessions side by side: do they differ, where, in what form, by which cause, and what cannot be distinguished.
 
 The readings of A are the simulation of B; the difference B less A is a channel like any other (`dbbstation.inference`). Sets of
-causes are compared by their probability, verdicts are read off, and what is left is tested.
+causes are compared by their probability, verdicts are read off, and the residual is tested.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ CENTRED_SIGMA = 4.0
 """Standard uncertainties by noise within which a centre lies, in every run, where it was removed; or within `CENTRED_MM`."""
 
 CENTRED_SHAPE = 25.0
-"""... if what is left of it is this many times the smallest centre that would have been noticed."""
+"""... if its form about that centre is this many times the smallest centre that would have been noticed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class RunDifference:
         centre_sigma_mm: standard deviation of either by noise and what is stated of balls [mm].
         radial_mm: by how much the mean length changed [mm].
         radial_sigma_mm: standard deviation of that by noise and what is stated of bars, and of balls where the bar is raised [mm].
-        circularity_mm: greatest less least of what is left without mean and centre [mm].
+        circularity_mm: greatest less least of the difference without mean and centre [mm].
     """
 
     pair: Pair
@@ -101,8 +101,8 @@ class Comparison:
         settled: what the comparison of sets of causes came to.
         findings: what is said of each cause, those that are there first.
         runs: in the order of session A.
-        left: tests of what is left.
-        held_out: predictions of left-out tests by what is stated of the set-up alone, and with what was found [mm].
+        left: tests of the residual.
+        held_out: predictions of held-out tests by what is stated of the set-up alone, and with what was found [mm].
         effects: of the causes of the most probable set, largest first, by name.
         noticed_mm: change of one strut's length that would have been found, whichever strut it is [mm].
         lacking: error sources that could not be asked, and why.
@@ -130,7 +130,7 @@ class Comparison:
 
     @property
     def differ(self) -> bool:
-        """Whether the sessions differ: a cause is there for sure, or what is left is not noise."""
+        """Whether the sessions differ: a cause is there for sure, or the residual is not noise."""
         return self.probability >= SURE or not self.left.is_noise
 
     @property
@@ -181,7 +181,7 @@ def compare(
         b: accepted runs of session B.
         sources: named candidates beside the geometry of the machine; those that lack what they need are left out by the caller.
         lacking: error sources that could not be asked, and why.
-        progress: told what is being done.
+        progress: called with what is being done.
 
     Raises:
         TraceError: no run in common; circles of one of them had their centres removed.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.settle import Settled
 
 FOLDS = 5
-"""Groups of tests that are left out in turn."""
+"""Groups of tests that are held out in turn."""
 
 RANK = 1e-9
 """Share of the largest singular value of the kinematic columns below which a direction says nothing."""
@@ -122,12 +122,12 @@ def _kinematic(sides: Sides) -> NDArray[np.float64]:
 
 
 def predicted(sides: Sides, settled: Settled) -> tuple[HeldOut, HeldOut]:
-    """Predictions of left-out tests, without and with what was found."""
+    """Predictions of held-out tests, without and with what was found."""
     bank, members = settled.bank, settled.best.members
     columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
     base = settled.channel.known
     prior = np.concatenate([base.prior, *(member.sd for member in members)])
-    # Amplitudes of causes come from the tests that are kept; only the set-up of a left-out test may settle there.
+    # Amplitudes of causes come from the tests that are kept; only the set-up of a held-out test may settle there.
     known = Columns(prior, prior, np.arange(len(prior)) < len(base.prior))
     tests = list(dict.fromkeys(pair.test for pair in sides.pairs))
     groups = [tests.index(pair.test) % min(FOLDS, len(tests)) for pair in sides.pairs]

@@ -120,10 +120,10 @@ def match(a: Sequence[Observation], b: Sequence[Observation]) -> Matching:
     only_a = tuple(" ".join(key) for key in of_a if key not in of_b)
     only_b = tuple(" ".join(key) for key in of_b if key not in of_a)
     if not common:
-        told = "; ".join(f"test {test}: {what}" for test, what in unlike.items())
+        reasons = "; ".join(f"test {test}: {what}" for test, what in unlike.items())
         names = [", ".join(sorted({test for test, _ in runs})) for runs in (of_a, of_b)]
         raise TraceError(
-            "the sessions have no run in common" + (f" ({told})" if told else ""),
+            "the sessions have no run in common" + (f" ({reasons})" if reasons else ""),
             remedy=f"compare sessions of one plan: A has accepted runs of the tests {names[0]}, B of {names[1]}",
         )
     sectors = common_sectors([o.raw for key in common for o in of_a[key] + of_b[key]])
@@ -216,9 +216,9 @@ def _unlike(runs: Sequence[Observation]) -> str:
         ]
         for name, unit, one, other, tolerance in pairs:
             if any(abs(x - y) > tolerance for x, y in zip_longest(one, other, fillvalue=np.inf)):
-                return f"{name} {_told(one)} {unit} in A, {_told(other)} in B"
+                return f"{name} {_text_of(one)} {unit} in A, {_text_of(other)} in B"
     return ""
 
 
-def _told(values: Sequence[float]) -> str:
+def _text_of(values: Sequence[float]) -> str:
     return " ".join(f"{value:.10g}" for value in values)

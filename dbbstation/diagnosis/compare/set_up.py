@@ -101,13 +101,13 @@ def _sd(source: ErrorSource, motion: Motion) -> NDArray[np.float64]:
 def set_up_laws(sides: Sides) -> list[Law]:
     """Balls and bars that sit further off than stated: one of them, or each of them."""
     found: list[Law] = []
-    told: set[tuple[str, ...]] = set()
+    named: set[tuple[str, ...]] = set()
     for source in sources_named(SET_UP):
         sets = _stated(sides, source)
         names = tuple(name for name, _, _ in sets)
         # A ball that was put up once only is no other matter than its mounting.
-        once = source.name == "ball-coordinate" and names in told
-        told.add(names)
+        once = source.name == "ball-coordinate" and names in named
+        named.add(names)
         if not once and all(sd.max(initial=0.0) < ANYWHERE_MM for _, _, sd in sets):
             found += _outsize(source, [p.name for p in source.parameters(sides.machine)], sets)
     return found

@@ -52,7 +52,7 @@ def comparison_summary(found: Comparison, notes: Sequence[str]) -> dict[str, Any
         "left": {
             "beyond_noise": not found.left.is_noise,
             "probability": found.left.probability,
-            "text": _left_text(found.left),
+            "text": _residual_text(found.left),
         },
         "only_in_a": list(pairs.only_a),
         "only_in_b": list(pairs.only_b),
@@ -71,7 +71,7 @@ def by_angle_um(run: RunDifference) -> NDArray[np.float64]:
     )
 
 
-def told(finding: Finding) -> str:
+def label_of(finding: Finding) -> str:
     """Name of a cause with its form: which strut, which test, in which session."""
     return f"{finding.name}, {finding.label}" if finding.label else finding.name
 
@@ -85,11 +85,11 @@ def _verdict(found: Comparison) -> str:
             f"and bars (probability {found.probability:.3f})."
         )
     if found.differ:
-        return "The sessions differ, and nothing that was looked at says how: what is left is not noise."
+        return "The sessions differ, and no form that was tried describes how: the residual is not noise."
     if found.there:
         return (
             f"These runs do not decide whether the sessions differ (probability {found.probability:.2f}); if they do, it is "
-            f"{', '.join(told(finding) for finding in found.there)}."
+            f"{', '.join(label_of(finding) for finding in found.there)}."
         )
     centre = 1e3 * float(np.median([run.centre_sigma_mm for run in found.runs]))
     radial = 1e3 * float(np.median([run.radial_sigma_mm for run in found.runs]))
@@ -110,7 +110,9 @@ def _organised_text(found: Comparison) -> str:
             f"{name} {value.value:.4g} ± {value.uncertainty:.2g} {value.unit}".strip()
             for name, value in finding.values.items()
         )
-        parts.append(f"{told(finding)}, {100 * effect.share:.0f} %" + (f" ({sizes})" if 0 < len(sizes) < LONG else ""))
+        parts.append(
+            f"{label_of(finding)}, {100 * effect.share:.0f} %" + (f" ({sizes})" if 0 < len(sizes) < LONG else "")
+        )
     return " + ".join(parts)
 
 
@@ -118,12 +120,12 @@ LONG = 160
 """Characters of values that a line holds; there is more with `--json`."""
 
 
-def _left_text(left: LeftOver) -> str:
+def _residual_text(left: LeftOver) -> str:
     if left.is_noise:
-        return "Nothing is left beyond noise."
+        return "The residual is noise."
     worst = left.worst
     where = f", {worst.where}" if worst.where else ""
-    return f"Something is left beyond noise, by {worst.name}: {1e3 * worst.rms:.2g} µm rms{where}."
+    return f"The residual is not noise: {worst.name}, {1e3 * worst.rms:.2g} µm rms{where}."
 
 
 def _cause(found: Comparison, finding: Finding) -> dict[str, Any]:

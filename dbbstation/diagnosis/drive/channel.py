@@ -33,9 +33,6 @@ METHOD_SHARE = 0.002
 """Of the force's root mean square: low-pass and differences leave so much of a simulated drive that follows its model exactly, most
 of it beside stops. It is noise that every recording has."""
 
-NEAREST_SHARE = 1e-4
-"""Travel since a reversal, of the whole travel, below which it is all one."""
-
 PERIODS_IN_TRAVEL = 3.0
 """Longest wave that is looked for, as a share of the travel: what repeats less often is a curve."""
 
@@ -200,7 +197,9 @@ def _curves(recordings: Recordings) -> Iterator[Pattern]:
     """Forces without a name: any smooth curve over a variable, and the same by direction of travel."""
     scale = recordings.scale
     starts = dict(zip((id(s) for s in recordings.signals), _starts(recordings), strict=True))
-    nearest = NEAREST_SHARE * scale.travel_m
+    travels = recordings.at(lambda s: s.since_reversal_m)
+    # Nearer to a reversal than any sample that is compared, a curve goes on as at its end.
+    nearest = float(np.min(travels, initial=scale.travel_m, where=travels > 0.0))
 
     def time(signals: Signals) -> NDArray[np.float64]:
         return signals.t_s + starts[id(signals)]

@@ -11,7 +11,7 @@ from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS, METHOD_SHARE, V
 from dbbstation.diagnosis.drive.explain import explain
 from dbbstation.diagnosis.drive.findings import Curve, DriveDiagnosis, DriveFinding, Number, Rest, Step
 from dbbstation.diagnosis.drive.fit import DriveFit, base_values, fit
-from dbbstation.diagnosis.drive.limits import VAGUE, Limits, limits_of, mass_is_known, told
+from dbbstation.diagnosis.drive.limits import VAGUE, Limits, limits_of, mass_is_known, sentences
 from dbbstation.diagnosis.drive.locate import locate
 from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.verdicts import Verdicts
@@ -52,7 +52,7 @@ def identify(
         recordings: of one drive, raw.
         sources: causes to look for.
         cutoff_hz: of the band in which force and model are compared; chosen from the data if None.
-        progress: told what is being done.
+        progress: called with what is being done.
 
     Raises:
         CalibrationError: the recordings cannot carry an identification at all.
@@ -106,7 +106,7 @@ def identify(
         rest_locations=locate(put_together, put_together.force_n - model, noise)
         if rest.probability < SIGNIFICANT
         else (),
-        cannot_tell=told(limits, explained, known),
+        cannot_tell=sentences(limits, explained, known),
         curve=_curve(explained),
     )
 

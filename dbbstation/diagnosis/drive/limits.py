@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.verdict import Value
 
 ACCELERATES = 5.0
-"""Root mean square of the acceleration, over its noise, from which the mass can be told."""
+"""Root mean square of the acceleration, over its noise, from which the mass can be determined."""
 
 VAGUE = 0.3
 """Relative standard uncertainty above which a value is not known."""
@@ -24,11 +24,11 @@ VAGUE = 0.3
 
 @dataclass(frozen=True)
 class Limits:
-    """What cannot be told apart.
+    """What cannot be distinguished.
 
     Attributes:
         accelerates: beyond the noise of the acceleration.
-        several_speeds: so that Coulomb friction would be told from viscous friction at its usual size.
+        several_speeds: so that Coulomb friction of its usual size would be distinguished from viscous friction.
         reverses: so that friction and constant load look different.
     """
 
@@ -40,7 +40,7 @@ class Limits:
 def limits_of(explained: Explained) -> Limits:
     """Look at what the drive did.
 
-    Coulomb friction counts as told from viscous friction where it shows beside mass, viscous friction and a delay between
+    Coulomb friction counts as distinguished from viscous friction where it shows beside mass, viscous friction and a delay between
     the channels: in ramps alone a delay of a sample looks like either.
     """
     recordings, bank = explained.drive.recordings, explained.settled.bank
@@ -65,12 +65,12 @@ def mass_is_known(limits: Limits, mass: Value | None) -> bool:
     return mass is not None and limits.accelerates and mass.uncertainty < VAGUE * mass.value
 
 
-def told(limits: Limits, explained: Explained, known: dict[str, bool]) -> tuple[str, ...]:
-    """Sentences for people: what cannot be told, what can be said still, and what to record."""
+def sentences(limits: Limits, explained: Explained, known: dict[str, bool]) -> tuple[str, ...]:
+    """Sentences for people: what cannot be determined, what can be said still, and what to record."""
     sentences = list(explained.dropped.values())
     if not known[MASS] and MASS not in explained.dropped:
         sentences.append(
-            "The mass cannot be told: the drive hardly accelerates here, or the force does not answer to it. Record "
+            "The mass cannot be determined: the drive hardly accelerates here, or the force does not answer to it. Record "
             "starts, stops and reversals."
         )
     if not limits.several_speeds:
@@ -78,17 +78,17 @@ def told(limits: Limits, explained: Explained, known: dict[str, bool]) -> tuple[
         speed = float(np.median(np.abs(explained.drive.recordings.motion[:, 1])))
         force = before.base[VISCOUS]
         sentences.append(
-            "Viscous and Coulomb friction cannot be told apart at one speed. What is known is their sum at "
+            "Viscous and Coulomb friction cannot be distinguished at one speed. What is known is their sum at "
             f"{1e3 * speed:.4g} mm/s, {force.value * speed:.4g} ± {force.uncertainty * speed:.2g} N. Record at several speeds."
         )
     elif not known[VISCOUS] and VISCOUS not in explained.dropped:
         sentences.append(
-            "The viscous friction cannot be told well here: what friction does at these speeds has several explanations, or it is "
+            "The viscous friction cannot be determined well here: what friction does at these speeds has several explanations, or it is "
             "small. Record at more speeds, and faster ones."
         )
     if not limits.reverses:
         sentences.append(
-            "Coulomb friction and a constant load cannot be told apart, nor friction of the two directions: the drive "
+            "Coulomb friction and a constant load cannot be distinguished, nor friction of the two directions: the drive "
             "never reverses. What is known is their sum in this direction. Record to and fro."
         )
     return tuple(sentences)

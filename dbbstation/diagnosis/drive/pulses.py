@@ -34,7 +34,7 @@ class Edges:
     Attributes:
         count: of beginnings and ends within the recordings.
         at_turns: how many of them lie where the drive starts, stops or reverses.
-        share: of the time in which it does so.
+        share: of the time in which it does so, more than none and less than all.
     """
 
     count: int
@@ -49,16 +49,10 @@ class Edges:
         before, the latter has the odds of any cause, one in twenty.
         """
         turns, others = self.at_turns + 1.0, self.count - self.at_turns + 1.0
-        share = float(np.clip(self.share, EDGE, 1.0 - EDGE))
-        anywhere = self.at_turns * np.log(share) + (self.count - self.at_turns) * np.log1p(-share)
-        more_often = (
-            betaln(turns, others) + np.log(max(float(betaincc(turns, others, share)), 1e-300)) - np.log1p(-share)
-        )
+        anywhere = self.at_turns * np.log(self.share) + (self.count - self.at_turns) * np.log1p(-self.share)
+        above = max(float(betaincc(turns, others, self.share)), 1e-300)
+        more_often = betaln(turns, others) + np.log(above) - np.log1p(-self.share)
         return float(expit(anywhere - more_often - NAMED_ODDS))
-
-
-EDGE = 1e-6
-"""Share of turns that is none, or all of the time."""
 
 
 def edges_of(recordings: Recordings, parts: Sequence[Part]) -> Edges:
@@ -71,7 +65,9 @@ def edges_of(recordings: Recordings, parts: Sequence[Part]) -> Edges:
     times = np.array([edge for part in parts for edge in part.t_s or ()])
     times = times[(times > recordings.time_s[0]) & (times < recordings.time_s[-1])]
     every = np.concatenate([one.turns[one.kept[0] : one.kept[-1]] for one in recordings.signals])
-    return Edges(len(times), int(np.sum(_at_turns(recordings, times))), float(every.mean()))
+    # What no sample shows may still be: the rule of succession [Laplace 1814].
+    share = (float(every.sum()) + 1.0) / (len(every) + 2.0)
+    return Edges(len(times), int(np.sum(_at_turns(recordings, times))), share)
 
 
 def _at_turns(recordings: Recordings, times: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -121,7 +117,7 @@ def pulse_parts(explained: Explained, names: Sequence[str]) -> list[Part]:
     def part(first: float, last: float, less: NDArray[np.float64]) -> Part:
         return Part("", {"force_n": size(less), "duration_s": Value(last - first, apart, "s")}, (first, last))
 
-    edges = _told_apart(np.concatenate([times[[0, -1]], within.ravel()]), apart)
+    edges = _distinct(np.concatenate([times[[0, -1]], within.ravel()]), apart)
     levels: list[tuple[float, float, NDArray[np.float64]]] = []
     for first, last in pairwise(edges):
         middle = 0.5 * (first + last)
@@ -167,7 +163,7 @@ def _peak(
     return first, last, own - around
 
 
-def _told_apart(times: NDArray[np.float64], apart: float) -> list[float]:
+def _distinct(times: NDArray[np.float64], apart: float) -> list[float]:
     """Times, rising, of which those that are closer together than the band tells apart are one, at their mean."""
     rising = np.sort(times)
     return [float(part.mean()) for part in np.split(rising, np.flatnonzero(np.diff(rising) > apart) + 1)]

@@ -55,7 +55,8 @@ ACCELERATING_SHARE = 0.1
 """Acceleration, of the greatest, above which the drive counts as accelerating."""
 
 REACH = 2
-"""Samples of the comparison beside a standstill that are left out: the main lobe of the filters."""
+"""Samples of the comparison beside a standstill that are left out: there a step of the force, such as friction that turns over,
+has come within 2 % of its end in the band; one sample earlier it is off by 6 %."""
 
 SLOW_HZ = 5.0
 """Band that strokes of a second need, for friction if not for the mass: slow recordings get up to it."""
@@ -182,8 +183,8 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     # A standing drive spoils samples as far as the filter of the comparison reaches, a stuck force, whose error knows no
     # bounds, as far as it rings.
     standing = np.abs(speed) <= MOVING_SHARE * np.abs(speed).max()
-    stuck, told = stuck_samples(even.force_n, even.t_s, ~standing, recording.name)
-    notes += [*told, *_rests(standing, even.force_n, rate, step)]
+    stuck, stuck_notes = stuck_samples(even.force_n, even.t_s, ~standing, recording.name)
+    notes += [*stuck_notes, *_rests(standing, even.force_n, rate, step)]
     standing[1:] |= speed[1:] * speed[:-1] < 0.0  # a quick reversal passes through standstill between two samples
     usable = ~(_widened(standing, REACH * step) | _widened(stuck, edge))
     kept = np.arange(edge, len(position) - edge, step)

@@ -148,7 +148,7 @@ def find_mismatch(
         sources: physics of the user's own that the table has the columns for.
         hold_out: repeat everything for each held-out part; takes most of the time.
         lacking: physics that could not be asked, and why.
-        progress: told what is being done, and how much of how much where that can be counted.
+        progress: called with what is being done, and how much of how much where that can be counted.
     """
     channel = table.channel(sources)
     channel = replace(channel, static=static_patterns(channel))

@@ -55,7 +55,7 @@ def test_one_constant_speed_gives_one_force_and_no_mass():
     assert not summary["parameters"]["viscous_n_s_m"]["identifiable"]
     assert verdicts(summary)["coulomb-friction"] == "not-testable"
     text = " ".join(summary["cannot_tell"])
-    assert "The mass cannot be told" in text
+    assert "The mass cannot be determined" in text
     # 20 N and 200 N·s/m at 20 mm/s.
     force = float(re.search(r"their sum at 20 mm/s, ([\d.]+) ±", text)[1])
     assert force == pytest.approx(24.0, abs=0.05)

@@ -82,7 +82,7 @@ def test_a_motor_that_is_off_before_and_after_is_no_dead_channel(recorded):
     assert not summary["parameters"]["viscous_n_s_m"]["identifiable"]
     text = " ".join(summary["cannot_tell"])
     # 9.1 N and 231 N·s/m at 6.67 mm/s.
-    assert "cannot be told apart at one speed" in text
+    assert "cannot be distinguished at one speed" in text
     assert float(text.split("mm/s, ")[1].split(" ")[0]) == pytest.approx(9.1 + 231.0 * 0.00667, abs=1.0)
 
 

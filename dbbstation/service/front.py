@@ -239,7 +239,7 @@ class Front:
     def open(self, choice: Choice, prepared: Prepared) -> Opened:
         """Switch on what is virtual, remember the choice, and return what runs the sequence.
 
-        A session that goes on gets the temperature of now as a note.
+        A session that goes on gets the present temperature as a note.
 
         Raises:
             StationError: the virtual machine refuses, or another process writes into the session.

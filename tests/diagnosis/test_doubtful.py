@@ -6,7 +6,8 @@ from dbbstation.diagnosis.diagnose import doubtful, judged
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.thinned import thinned
-from dbbstation.diagnosis.verdicts import EVEN, judge
+from dbbstation.diagnosis.verdicts import judge
+from dbbstation.inference.alternatives import EVEN
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
 from tests.plant.mechanisms.gravity import Gravity

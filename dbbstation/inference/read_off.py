@@ -66,6 +66,7 @@ class Finding:
         confounded: share of that which the base parameters can take up, R².
         values: amplitudes and nonlinear parameters, by name.
         spans: of variables, where it is at least half as large as at its largest.
+        rows_there: number of rows where it is so; 0 where that is not asked.
         rows: first and last row of each stretch of time, where it is one in time; empty otherwise.
         blocks: root mean square of it in each block.
         equivalent: causes that nothing measured here tells from it, itself first; empty where there are none.
@@ -88,6 +89,7 @@ class Finding:
     spans: tuple[Span, ...]
     rows: tuple[tuple[int, int], ...]
     blocks: tuple[float, ...]
+    rows_there: int = 0
     equivalent: tuple[str, ...] = ()
     ambiguous_with: tuple[str, ...] = ()
     text: str = ""
@@ -156,6 +158,7 @@ class _Judge:
         verdict, others, text = self._verdict(cause, member, probability, sigmas)
         variables = pattern.variables if pattern else ()
         there = verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS} and member is not None
+        largest = _at_half(effect) if there else np.zeros(0, dtype=bool)
         channel = self._settled.channel
         return Finding(
             name=cause.name,
@@ -170,7 +173,8 @@ class _Judge:
             whole_rms=whole,
             confounded=confounded,
             values=self._named_values(shown, values, covariance),
-            spans=tuple(_span(effect, v.values, v.name, v.unit) for v in variables) if there else (),
+            spans=tuple(_span(v.values[largest], v.name, v.unit) for v in variables) if there else (),
+            rows_there=int(largest.sum()),
             rows=_stretches(effect) if there and pattern is not None and pattern.family == "pulses" else (),
             blocks=tuple(_rms(effect[rows] - effect.mean()) for rows in channel.blocks) if there else (),
             equivalent=equal if len(equal) > 1 else (),
@@ -301,11 +305,15 @@ def _unit(unit: str, per: str) -> str:
     return f"{unit}{per}" if per == "" or per.startswith(("/", " per")) else per
 
 
-def _span(effect: NDArray[np.float64], values: NDArray[np.float64], name: str, unit: str) -> Span:
-    """Range of a variable over which an effect, about its median, is at least half as large as anywhere."""
+def _at_half(effect: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Rows where an effect, about its median, is at least half as large as anywhere."""
     away = np.abs(effect - np.median(effect))
-    there = values[away >= HALF * away.max()]
-    return Span(name, float(there.min()), float(there.max()), unit)
+    return np.asarray(away >= HALF * away.max())
+
+
+def _span(values: NDArray[np.float64], name: str, unit: str) -> Span:
+    """Range of a variable where an effect is."""
+    return Span(name, float(values.min()), float(values.max()), unit)
 
 
 def _stretches(effect: NDArray[np.float64]) -> tuple[tuple[int, int], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,6 +74,18 @@ def test_nothing_is_claimed_of_noise_whose_neighbours_resemble_each_other(seed: 
     assert not there(read_off(settled))
     # A first-order process of 0.9 counts as one independent row in 19 [(1 + 0.9) / (1 - 0.9)].
     assert settled.noise.correlation_samples == pytest.approx(19.0, rel=0.5)
+
+
+def test_a_bell_over_one_place_is_found_there_with_its_rows() -> None:
+    data = table(3)
+    bell = 0.6 * np.exp(-0.5 * ((data.q - 40.0) / 6.0) ** 2)
+    found = there(read_off(settle(channel(replace(data, residual=data.residual + bell)))))
+    ((name, finding),) = found.items()
+    assert name.startswith("bump over q")
+    (span,) = finding.spans
+    # A bell of 6 mm is half as high 7.1 mm away; the form that is laid over it is a quarter wider or narrower at the most.
+    assert (span.low, span.high) == pytest.approx((40.0 - 7.1, 40.0 + 7.1), abs=2.0)
+    assert finding.rows_there == int(((data.q >= span.low) & (data.q <= span.high)).sum())
 
 
 def test_whitening_makes_noise_white_that_is_as_it_says() -> None:

@@ -93,6 +93,7 @@ def _finding(found: Mismatch, finding: Finding) -> dict[str, Any]:
         "confounded": finding.confounded,
         "values": {name: _value(value) for name, value in finding.values.items()},
         "spans": [{"variable": s.variable, "low": s.low, "high": s.high, "unit": s.unit} for s in finding.spans],
+        "rows_there": finding.rows_there,
         "rows": [list(rows) for rows in finding.rows],
         "blocks": dict(zip(found.table.names, finding.blocks, strict=True)) if finding.blocks else {},
         "equivalent": list(finding.equivalent),

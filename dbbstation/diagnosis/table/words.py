@@ -72,7 +72,7 @@ def _where(found: Mismatch, finding: Finding) -> str:
     if finding.rows:
         return "It is there " + "; ".join(_stretch(found, first, last) for first, last in finding.rows) + "."
     spans = [f"{span.variable} {span.low:.4g} to {span.high:.4g} {span.unit}".strip() for span in finding.spans]
-    text = f"Largest at {', '.join(spans)}." if spans else ""
+    text = f"Largest at {', '.join(spans)}, in {finding.rows_there} of {len(table)} rows." if spans else ""
     if len(finding.blocks) > 1:
         worst = int(np.argmax(finding.blocks))
         if finding.blocks[worst] > 2.0 * float(np.median(finding.blocks)):

@@ -85,9 +85,9 @@ def test_saturated_samples_are_left_out_and_told():
     assert any("saturated: it stands at its extreme, 60 N" in note for note in summary["notes"])
     mass = summary["parameters"]["mass_kg"]
     assert abs(mass["value"] - 80.0) < 3.0 * mass["uncertainty"]
-    # The accelerations are gone with the saturated samples: the mass is known worse by far.
+    # Most of the accelerations are gone with the saturated samples; what moves beside them is compared still.
     good_mass = answered(t, position, force)["parameters"]["mass_kg"]
-    assert mass["uncertainty"] > 10.0 * good_mass["uncertainty"]
+    assert mass["uncertainty"] > 2.0 * good_mass["uncertainty"]
     with pytest.raises(CalibrationError, match=r"stuck in .* % of the samples"):
         answered(t, position, np.clip(force, -20.0, 20.0))
 

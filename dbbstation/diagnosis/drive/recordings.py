@@ -11,7 +11,7 @@ import numpy as np
 
 from dbbstation.diagnosis.drive.contract import Scale
 from dbbstation.diagnosis.drive.moving import impulse_response
-from dbbstation.diagnosis.drive.signals import derivatives, signals_of
+from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, signals_of
 from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
@@ -71,6 +71,16 @@ class Recordings:
         Of the position as measured: these columns are linear in it and have not passed its filter yet.
         """
         return self.compared(lambda s: np.column_stack(derivatives(s.measured_m, s.rate_hz)[::-1]))
+
+    @cached_property
+    def lost_share(self) -> float:
+        """Share of the acceleration that its differences over one sample lose, from what they lose over two.
+
+        With h the time of a sample and w the angular frequency, they lose (w h)²/12 and (2 w h)²/12.
+        """
+        over_one = self.motion[:, 0]
+        over_two = self.compared(lambda s: acceleration_over_two(s.measured_m, s.rate_hz))
+        return max(float(over_one @ (over_one - over_two)) / 3.0 / max(float(over_one @ over_one), 1e-300), 0.0)
 
     @cached_property
     def edge_noise_n(self) -> NDArray[np.float64]:

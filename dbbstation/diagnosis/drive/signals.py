@@ -268,6 +268,13 @@ def derivatives(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArra
     return np.gradient(position_m, 1.0 / rate_hz), acceleration
 
 
+def acceleration_over_two(position_m: NDArray[np.float64], rate_hz: float) -> NDArray[np.float64]:
+    """Acceleration [m/s²] by central differences over two samples to either side, shape (n,); zero at both ends."""
+    found = np.zeros_like(position_m)
+    found[2:-2] = (position_m[4:] - 2.0 * position_m[2:-2] + position_m[:-4]) * (0.5 * rate_hz) ** 2
+    return found
+
+
 def _noise_floor(position_m: NDArray[np.float64], rate_hz: float) -> float:
     """Power of the position's noise per hertz [m²/Hz], from the upper quarter of its spectrum."""
     frequency, power = _spectrum(position_m, rate_hz)

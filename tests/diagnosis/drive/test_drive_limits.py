@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.drive.identify import identify
+from dbbstation.diagnosis.drive.recordings import recordings_of
 from dbbstation.diagnosis.drive.sampling import evenly_sampled
 from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.diagnosis.drive.sources.registry import drive_sources_named, known_drive_sources
@@ -153,6 +154,15 @@ def test_speed_and_acceleration_follow_a_closed_form():
     assert t[signals.reversals] == pytest.approx(0.5 + np.arange(20), abs=2e-3)
     travelled = signals.since_reversal_m[1000]
     assert travelled == pytest.approx(0.1, abs=1e-3)
+
+
+def test_differences_lose_what_a_closed_form_says():
+    """Of a sine of 5 Hz at 100 samples a second: 1 - sinc²(w h / 2) of its acceleration."""
+    t = np.arange(3000) / 100.0
+    w = 2 * np.pi * 5.0
+    one = recordings_of([DriveRecording("sine", t, np.sin(w * t), np.cos(w * t))], 15.0)
+    exact = 1.0 - (np.sin(w / 200.0) / (w / 200.0)) ** 2
+    assert one.lost_share == pytest.approx(exact, rel=0.06)
 
 
 def test_an_unknown_cause_is_refused_with_its_nearest_name():

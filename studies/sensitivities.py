@@ -54,7 +54,7 @@ class Constant:
 
 
 ENGINE = (
-    Constant("inference.read_off", "EQUIVALENT", (0.998, 0.9995)),
+    Constant("inference.alternatives", "EQUIVALENT", (0.998, 0.9995)),
     Constant("inference.bank", "LEAST_LEFT"),
     Constant("inference.settle", "BETTER"),
 )

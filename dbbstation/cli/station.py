@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.service.choice import Choice, Limits
+    from dbbstation.service.held_line import HeldLine
     from dbbstation.service.memory import Line
     from dbbstation.service.runner import Opener
     from dbbstation.station.assembly import Job
@@ -116,6 +117,7 @@ def station(
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.shipped import shipped_folder
+    from dbbstation.service.held_line import HeldLine
     from dbbstation.service.opening import opener
     from dbbstation.station.assembly import Job
     from dbbstation.station.programs import load_programs
@@ -164,8 +166,9 @@ def station(
         say_sampling(plan.to_domain(), protocol, baud)
         log = stack.enter_context(spying(spy, protocol, str(port)))
         observers: list[Observer] = [Log(), *([] if helper is None else [helper])]
-        opened = opener(job, protocol, str(port), baud=baud, observers=observers, time_scale=time_scale, log=log)
-        return _run(job, opened)
+        line = HeldLine(protocol, str(port), baud, clock=job.clock, time_scale=time_scale, log=log)
+        stack.callback(line.close)
+        return _run(job, opener(job, line, observers=observers), line)
 
 
 def _check_options(
@@ -196,7 +199,7 @@ def _check_terminal() -> None:
         raise click.UsageError("the screen needs a terminal; `dbbstation measure` does the same without one")
 
 
-def _run(job: Job, open_station: Opener) -> int:
+def _run(job: Job, open_station: Opener, line: HeldLine) -> int:
     """Show the screen until it is closed; return the exit code.
 
     Raises:
@@ -207,7 +210,7 @@ def _run(job: Job, open_station: Opener) -> int:
     from dbbstation.tui.app import StationApp
     from dbbstation.tui.shown import Shown
 
-    runner = Runner(open_station)
+    runner = Runner(open_station, line)
     shown = Shown(job.plan.plan.name, job.plan.jig.bores, tests=job.plan.to_domain().tests)
     return _shown(StationApp(shown, runner))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.stray_balls import beside
-from dbbstation.diagnosis.explain import SURE, explain, without
+from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained, Verdict
 from dbbstation.diagnosis.left_out import found_again, predicted
 from dbbstation.diagnosis.locate import locations_of
@@ -18,9 +18,10 @@ from dbbstation.diagnosis.shifts import shifts_between
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.unexplained_curve import curve_of
 from dbbstation.diagnosis.unexplained_model import with_exact_wave
-from dbbstation.diagnosis.verdicts import EVEN, judge
+from dbbstation.diagnosis.verdicts import judge
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
+from dbbstation.inference.alternatives import EVEN, SURE
 from dbbstation.sources.laws.by_temperature import not_given
 
 if TYPE_CHECKING:

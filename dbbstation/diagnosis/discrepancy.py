@@ -16,7 +16,6 @@ from dbbstation.diagnosis.shapes import variables
 from dbbstation.inference.model_form import modulated
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.travel import middle
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Owner
@@ -143,9 +142,9 @@ that is another at speed."""
 
 def _swing_rad(motion: Motion, machine: Machine) -> NDArray[np.float64]:
     """Angles of the platform joints away from the middle of the travel, shape (n, 6) [rad]."""
-    frames, rest = Frames.from_poses(motion.poses, machine.hexapod.rotation), middle(machine)
-    unit, at_rest = (inverse(machine.hexapod, one).unit for one in (frames, rest))
-    in_platform = np.einsum("nji,nkj->nki", frames.rotation, unit)
+    rest = middle(machine)
+    unit, at_rest = motion.struts(machine).unit, inverse(machine.hexapod, rest).unit
+    in_platform = np.einsum("nji,nkj->nki", motion.frames(machine).rotation, unit)
     cosine = np.einsum("nki,ki->nk", in_platform, np.einsum("ji,kj->ki", rest.rotation[0], at_rest[0]))
     return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)), dtype=np.float64)
 

@@ -18,8 +18,10 @@ from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import Channel
 from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
+from dbbstation.inference.alternatives import SURE, in_place_of
 from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
 from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.settle import impossibly_negative
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -37,14 +39,8 @@ if TYPE_CHECKING:
 MOST_ROUNDS = 10
 """Times that hypotheses and joint fit may settle against each other."""
 
-SURE = 0.95
-"""Probability from which on something is said to be there."""
-
 SEEDS = 3
 """Most probable hypotheses that are looked at again after each change."""
-
-RIVALS = 3
-"""Causes in the place of each member that are laid out at their own best values before they are compared."""
 
 GRID = 0.3
 """Share to which nonlinear parameters are known from the grid of the comparison, about its spacing, in a second try."""
@@ -188,16 +184,16 @@ def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
         beside = channel.beside_base(noise_mm, scatter)
         comparison = beside.comparison(target)
         causes = (*(c for c in channel.named if c.name not in refused), *channel.set_up, *unmodelled.causes)
+        named_causes = [cause for cause in causes if cause.named]
         posterior = search(comparison, causes, seeds.values())
         best = _steady(posterior, fitted)
         seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
         settled = Settled(fit, posterior, best, comparison, causes, unmodelled, noise, misfit_of(fit, noise), refused)
         usual = _usual_scatter(fit) if any(m.cause.setup for m in best.members) else scatter
-        rough = [
-            (m, r)
-            for m, r in [*((m, m) for m in best.members if m.cause.named), *_rivals(comparison, causes, best)]
-            if (r.cause.name, r.variant.law) not in laid_out
-        ]
+        named_members = [m for m in best.members if m.cause.named]
+        pairs = [(m, m) for m in named_members]
+        pairs += [(m, r) for m in named_members for r in in_place_of(m.cause.name, comparison, named_causes, best)]
+        rough = [(m, r) for m, r in pairs if (r.cause.name, r.variant.law) not in laid_out]
         for member, rival in rough:
             laid_out.add((rival.cause.name, rival.variant.law))
             _lay_out(channel, beside, best, member, rival, fit, target)
@@ -239,16 +235,10 @@ def _negative(fit: Calibration, channel: Channel) -> dict[str, str]:
             column = term.columns.start + k
             value, variance = float(fit.x[column]), float(fit.solution.covariance[column, column])
             sigma = float(np.sqrt(max(variance, 0.0) + (term.source.form_uncertainty * value) ** 2))
-            if parameter.positive and value < -NEGATIVE_SIGMA * sigma:
-                found[term.source.name] = (
-                    f"It would have to be negative, {parameter.name} {value:.3g} ± {sigma:.2g} {parameter.unit}, which it "
-                    "cannot be: something else that does the opposite is at work."
-                )
+            why = impossibly_negative(parameter.name, value, sigma, parameter.unit) if parameter.positive else ""
+            if why:
+                found[term.source.name] = why
     return found
-
-
-NEGATIVE_SIGMA = 3.0
-"""Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
 
 
 def _fitted_as_named(channel: Channel, settled: Settled) -> Settled:
@@ -346,20 +336,6 @@ def _estimated(
 def _values_in(fit: Calibration, name: str) -> dict[str, NDArray[np.float64]]:
     """Values of all parameters of a cause in a fit, by set."""
     return {term.shared: fit.x[term.columns] for term in fit.layout.terms if term.source.name == name}
-
-
-def _rivals(comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[tuple[Member, Member]]:
-    """Named causes that do best in the place of each named member, with that member."""
-    found = []
-    for member in best.members:
-        if not member.cause.named:
-            continue
-        others = best.without(member.cause.name)
-        scan = comparison.scan(others, [c for c in causes if c.named and c.name not in best.names])
-        order = np.argsort(-scan.log_factor)[:RIVALS]
-        enough = 0.5 * best.log_factor(member.cause.name)
-        found += [(member, scan.best[k]) for k in order if scan.log_factor[k] > enough]
-    return found
 
 
 def _lay_out(

@@ -14,8 +14,6 @@ from scipy.interpolate import CubicSpline
 
 from dbbstation.inference.forms import Form, Hats, Lobes, Plane, Proportional, Sign, Spring, Wave
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import Load, platform_weight, strut_tensions
 from dbbstation.sources.contract import Effect
 from dbbstation.sources.laws.by_temperature import FOLLOWED_K, known_thermometers, logged_degc
@@ -27,6 +25,7 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.machine.kinematics import Struts
+    from dbbstation.machine.rotation import Frames
     from dbbstation.model.machine_model import BarReading
     from dbbstation.sources.contract import Motion
 
@@ -209,13 +208,12 @@ class Ranges:
 
 def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]]:
     """Return what errors may follow, by name, of all rows: shape (n, 6) of struts, else (n,) or (n, c)."""
-    struts = _struts(motion, machine)
+    struts = motion.struts(machine)
     found = {"strut-length": struts.length_mm}
     if motion.is_path:
         found["strut-speed-sign"] = np.sign(np.gradient(struts.length_mm, axis=0))
     if machine.masses is not None:
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        found["strut-force"] = strut_tensions(struts, platform_weight(frames, machine.masses))
+        found["strut-force"] = strut_tensions(struts, platform_weight(motion.frames(machine), machine.masses))
     if motion.time_s is not None:
         found["time"] = motion.time_s
         if motion.is_path and np.all(np.diff(motion.time_s) > 0.0):
@@ -225,8 +223,7 @@ def variables(motion: Motion, machine: Machine) -> dict[str, NDArray[np.float64]
     found |= _temperatures(motion)
     found["position of the platform"] = motion.poses[:, :2]
     found["tilt of the platform"] = motion.poses[:, 3:5]
-    frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-    found["position of the platform towards a place"] = np.linalg.norm(_hoses(frames, machine), axis=2)
+    found["position of the platform towards a place"] = np.linalg.norm(_hoses(motion.frames(machine), machine), axis=2)
     if motion.setup is not None:
         away = motion.poses[:, :2] - motion.setup.fixed_ball_mm[:2]
         angle = np.unwrap(np.arctan2(away[:, 1], away[:, 0]))
@@ -262,7 +259,7 @@ def samples_of(
         READING: np.ones((len(reading.length_mm), 1)),
         BALL: reading.by_parameters(Effect(fixed_ball_mm=np.eye(3))),
         TOOL: reading.by_parameters(Effect(tool_tip_mm=np.eye(3))),
-        PULL: reading.by_parameters(Effect(strut_mm=_pulled(_struts(motion, machine)))),
+        PULL: reading.by_parameters(Effect(strut_mm=_pulled(motion.struts(machine)))),
         TOWARDS: reading.by_parameters(Effect(strut_mm=_pulled_towards(motion, machine))),
     }
     if motion.is_path:
@@ -272,10 +269,6 @@ def samples_of(
         turns = np.cross(np.eye(3), (motion.setup.fixed_ball_mm - pivot_mm) / LEVER_MM).T
         gain[TABLE] = np.hstack([gain[BALL], gain[BALL] @ turns])
     return Samples(known, gain)
-
-
-def _struts(motion: Motion, machine: Machine) -> Struts:
-    return inverse(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
 
 
 def _pulled(struts: Struts) -> NDArray[np.float64]:
@@ -303,7 +296,7 @@ def _pulled_towards(motion: Motion, machine: Machine) -> NDArray[np.float64]:
     The pull on the middle of the platform's joints; what it does as a moment where it holds the platform elsewhere, at
     `LEVER_MM` along each of the platform's axes; and a force down, since the place may be higher or lower.
     """
-    struts, frames = _struts(motion, machine), Frames.from_poses(motion.poses, machine.hexapod.rotation)
+    struts, frames = motion.struts(machine), motion.frames(machine)
     count = len(motion)
     hoses, still = _hoses(frames, machine), np.zeros((count, 3))
     arm = frames.rotation @ machine.hexapod.platform_joints_mm.mean(axis=0)

@@ -9,12 +9,11 @@ import numpy as np
 from scipy.special import expit
 
 from dbbstation.diagnosis.channel import NAMED_ODDS
-from dbbstation.diagnosis.explain import SURE
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties
+from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.model_comparison import SCALES
-from dbbstation.inference.read_off import EQUIVALENT
 from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
@@ -31,15 +30,8 @@ TESTABLE_SIGMA = 5.0
 TESTABLE_SHARE = 0.5
 """Share of the combinations of a cause's amplitudes that must be seen for the cause to be ruled out."""
 
-EVEN = 0.5
-"""Probability from which on a cause that is not certain is rather there than not."""
-
 PRIOR = float(expit(NAMED_ODDS))
 """Probability that a cause has before anything is measured: what is more probable afterwards is not ruled out."""
-
-MOST_ALTERNATIVES = 6
-"""Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
-
 
 OPEN = "These tests leave it open: they neither show nor exclude it."
 
@@ -55,9 +47,17 @@ class _Judge:
         self._settled: Settled = explained.settled
         self._best = explained.settled.best
         self._named = {cause.name: cause for cause in explained.settled.causes if cause.named}
-        self._classes = {m.cause.name: self._class(m) for m in self._settled.members}
+        self._alternatives = Alternatives(
+            self._settled.comparison,
+            self._settled.causes,
+            self._settled.posterior,
+            self._best,
+            self._form_uncertainty,
+            self._settled.members,
+        )
+        self._classes, self._probability = self._alternatives.classes, self._alternatives.probability
         self._ambiguities = {
-            name: self._ambiguity(name) for name, equal in self._classes.items() if self._probability(equal) < SURE
+            name: self._in_words(name, *others) for name, others in self._alternatives.ambiguities.items()
         }
         self._rivals = {name: self._beside(c) for name, c in self._named.items() if name not in self._classes}
         self._effects = {name: self._effect(name) for name in self._named}
@@ -77,7 +77,7 @@ class _Judge:
         name = cause.name
         member = next((m for m in self._settled.members if m.cause.name == name), None)
         verdict, alike, equal, text = self._verdict(name)
-        probability = self._probability(self._class_with(name))
+        probability = self._probability(self._alternatives.class_with(name))
         source = self._channel.sources[name, member.variant.law if member else cause.variants[0].law]
         if member is None:
             rival = self._rivals[name]
@@ -117,7 +117,7 @@ class _Judge:
                 others = tuple(other for other in ambiguity if other != name)
                 return Verdict.AMBIGUOUS, others, (), _either(others)
         if self._probability((name,)) >= EVEN:
-            others = tuple(other for other in self._ambiguity(name) if other != name)
+            others = self._in_words(*self._alternatives.ambiguity(name))
             if others:
                 return Verdict.AMBIGUOUS, others, (), _either(others)
         return self._verdict_of_absent(name)
@@ -142,58 +142,18 @@ class _Judge:
             return Verdict.NOT_TESTABLE, (), (), OPEN
         return Verdict.AMBIGUOUS, others, shown, _either(others)
 
-    def _class_with(self, name: str) -> tuple[str, ...]:
-        """Class that a cause belongs to; itself alone where there is none."""
-        return next((equal for equal in self._classes.values() if name in equal), (name,))
-
     def _with_a_name(self, names: Iterable[str]) -> tuple[str, ...]:
         return tuple(name for name in names if name in self._named)
 
-    def _probability(self, names: Iterable[str]) -> float:
-        return self._settled.posterior.probability(names)
+    def _in_words(self, *names: str) -> tuple[str, ...]:
+        """Names of causes; of an unmodelled effect the variable that it follows."""
+        shapes = self._settled.unmodelled.shapes
+        return tuple(f"an unmodelled effect over {shapes[n].follows}" if n in shapes else n for n in names)
 
-    def _ambiguity(self, name: str) -> tuple[str, ...]:
-        """Causes of which one is there for sure, if not this one; itself alone where there are none such."""
-        posterior, probable = self._settled.posterior, self._probability((name,))
-        chosen = list(self._class_with(name))
-        alone: dict[str, float] = {}
-        for other in (cause.name for cause in self._settled.causes if cause.name not in chosen):
-            both = posterior.probability_of(lambda key, pair={name, other}: pair <= key)  # type: ignore[misc]
-            # What is there beside it anyway is no alternative to it.
-            if both < EVEN * probable:
-                alone[other] = self._probability((other,)) - both
-        for other in sorted(alone, key=lambda n: -alone[n]):
-            if self._probability(chosen) >= SURE or len(chosen) > MOST_ALTERNATIVES:
-                break
-            chosen.append(other)
-        if self._probability(chosen) < SURE:
-            return (name,)
-        return tuple(self._in_words(one) for one in chosen)
-
-    def _in_words(self, name: str) -> str:
-        """Name of a cause; of an unmodelled effect the variable that it follows."""
-        shape = self._settled.unmodelled.shapes.get(name)
-        return name if shape is None else f"an unmodelled effect over {shape.follows}"
-
-    def _class(self, member: Member) -> tuple[str, ...]:
-        """Causes whose effects no test of these tells from those of a member, itself first; also those without a name."""
-        others = self._best.without(member.cause.name)
-        scan = self._settled.comparison.scan(
-            others, [c for c in self._settled.causes if c.name not in self._best.names and not c.setup]
-        )
-        size = len(member.variant.columns)
-        rivals = [r for r in scan.best if len(r.variant.columns) == size and self._same(member, r, others)]
-        return (member.cause.name, *(rival.cause.name for rival in rivals))
-
-    def _same(self, one: Member, other: Member, others: tuple[Member, ...]) -> bool:
-        """Whether two causes of as many amplitudes span the same effects beside base and others."""
-        columns = np.concatenate([one.variant.columns, other.variant.columns])
-        products = self._settled.comparison.beside(others, columns)
-        size = len(one.variant.columns)
-        a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
-        half_a, half_b = _inverse_root(a), _inverse_root(b)
-        cosines = np.linalg.svd(half_a @ across @ half_b, compute_uv=False)
-        return bool(cosines.min(initial=1.0) > EQUIVALENT)
+    def _form_uncertainty(self, member: Member) -> float:
+        """By how much the formula of a cause may be off, as a share of its effect; one without a name has none."""
+        source = self._channel.sources.get((member.cause.name, member.variant.law))
+        return 0.0 if source is None else source.form_uncertainty
 
     def _testable(self, name: str) -> bool:
         """Whether plausible amplitudes would be seen beside base and causes; half of their combinations at least."""
@@ -202,9 +162,7 @@ class _Judge:
 
     def _sigmas(self, variant: Variant, others: tuple[Member, ...]) -> NDArray[np.float64]:
         """By how many standard deviations combinations of plausible amplitudes stand out beside base and others, least first."""
-        products = self._settled.comparison.beside(others, variant.columns)
-        scaled = variant.plausible[:, None] * products * variant.plausible
-        return np.sqrt(np.maximum(np.linalg.eigvalsh(scaled), 0.0))
+        return standing_out(self._settled.comparison.beside(others, variant.columns), variant.plausible)
 
     def _why_not_testable(self, name: str) -> str:
         for member in self._settled.members:
@@ -276,14 +234,3 @@ def _either(others: Sequence[str]) -> str:
 def _refused(name: str, why: str) -> SourceFinding:
     """Finding of a cause that cannot be what the recordings show."""
     return SourceFinding(name, Verdict.RULED_OUT, (), 0.0, 0.0, 0.0, 0.0, {}, why, probability=0.0)
-
-
-def _inverse_root(products: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inverse square root of products of columns; directions that are nothing are left out."""
-    value, axes = np.linalg.eigh(products)
-    usable = value > RANK * max(float(value[-1]), 1e-300)
-    return np.asarray((axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T, dtype=np.float64)
-
-
-RANK = 1e-9
-"""Rank tolerance: share of the largest eigenvalue below which a direction says nothing."""

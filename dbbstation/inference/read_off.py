@@ -8,39 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import expit
 
+from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.settle import impossible, moved
 from dbbstation.inference.verdict import Value, Verdict
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import NDArray
 
-    from dbbstation.inference.hypotheses import Posterior
     from dbbstation.inference.model_comparison import Cause, Member
     from dbbstation.inference.patterns import Family
     from dbbstation.inference.settle import Settled
-
-SURE = 0.95
-"""Probability from which on something is said to be there."""
 
 OUT = 5.0
 """Standard deviations by which the norm of an effect must be out to be said to be there, or would have to be to be ruled out."""
 
 ABSENT = 0.01
 """Probability up to which something that would have been seen is ruled out, or its prior probability if that is less."""
-
-EVEN = 0.5
-"""Probability from which on a cause that is not certain is rather there than not."""
-
-EQUIVALENT = 0.999
-"""Cosine between the effects of two causes, beside base and other causes, from which on nothing measured here tells one from the
-other, unless it is so large that even this decides: what is left of one beside the other is 4.5 % of it."""
-
-MOST_ALTERNATIVES = 6
-"""Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
 
 HALF = 0.5
 """Share of its largest value from which on an effect counts as being there, for the spans over which it is."""
@@ -119,12 +104,18 @@ def read_off(settled: Settled) -> tuple[Finding, ...]:
 
 class _Judge:
     def __init__(self, settled: Settled) -> None:
-        self._settled, self._best = settled, settled.best
+        self._settled, self._best, laws = settled, settled.best, settled.bank.laws
         self._members = {member.cause.name: member for member in self._best.members}
         self._without = settled.bank.base_values(np.zeros(len(settled.channel.residual)))
-        self._inside, self._weights, self._place = _inclusions(settled.posterior)
-        self._classes = {name: self._class(member) for name, member in self._members.items()}
-        self._unsure = {n: self._ambiguity(n) for n, equal in self._classes.items() if self._probability(equal) < SURE}
+        self._alternatives = Alternatives(
+            settled.comparison,
+            settled.causes,
+            settled.posterior,
+            self._best,
+            lambda member: laws[member.cause.name].form_uncertainty if member.cause.name in laws else 0.0,
+            self._best.members,
+        )
+        self._classes = self._alternatives.classes
         estimates = settled.comparison.estimates(self._best.members) if self._members else None
         self._values: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
         first = 0
@@ -149,7 +140,7 @@ class _Judge:
         pattern = self._settled.bank.patterns.get(cause.name)
         member = self._members.get(cause.name)
         equal = self._classes.get(cause.name, (cause.name,))
-        probability = self._probability(equal)
+        probability = self._alternatives.probability(equal)
         gain, shown = self._beside[cause.name] if member is None else (self._best.log_factor(cause.name), member)
         if member is None:
             # The prior must not say how much could hide.
@@ -199,10 +190,10 @@ class _Judge:
         if alike := [name for name, equal in self._classes.items() if cause.name in equal and name != cause.name]:
             return Verdict.AMBIGUOUS, (alike[0],), f"Nothing measured here tells it from {alike[0]}."
         if probability >= EVEN or member is not None:
-            others = self._ambiguity(cause.name)
+            others = self._alternatives.ambiguity(cause.name)
             text = f"These rows cannot tell it from {', '.join(others)}." if others else "These rows do not decide it."
             return Verdict.AMBIGUOUS, others, text
-        if unsure := [name for name, others in self._unsure.items() if cause.name in others]:
+        if unsure := [name for name, others in self._alternatives.ambiguities.items() if cause.name in others]:
             return Verdict.AMBIGUOUS, (unsure[0],), f"These rows cannot tell it from {unsure[0]}."
         return self._absent(cause, probability)
 
@@ -240,8 +231,7 @@ class _Judge:
         else:
             samples = self._settled.bank.fitted(variant.columns) / self._settled.noise.innovation
             products = samples.T @ samples
-        scaled = variant.plausible[:, None] * products * variant.plausible
-        return float(np.median(np.sqrt(np.maximum(np.linalg.eigvalsh(scaled), 0.0))))
+        return float(np.median(standing_out(products, variant.plausible)))
 
     def _sigmas(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
         """By how many standard deviations the norm of an effect beside the base is out."""
@@ -293,80 +283,6 @@ class _Judge:
             for k, name in enumerate(names)
         }
 
-    def _probability(self, names: Iterable[str]) -> float:
-        """Probability that at least one of these causes is there."""
-        columns = [self._place[name] for name in names if name in self._place]
-        return float(self._weights @ self._inside[:, columns].any(axis=1)) if columns else 0.0
-
-    def _ambiguity(self, name: str) -> tuple[str, ...]:
-        """Causes of which one is there for sure, if not this one; none where there are none such."""
-        chosen = list(self._classes.get(name, (name,)))
-        own = self._inside[:, self._place[name]] if name in self._place else np.zeros(len(self._weights), dtype=bool)
-        both = (self._weights * own) @ self._inside
-        every = self._weights @ self._inside
-        # What is there beside it anyway is no alternative to it.
-        alone = {
-            other: float(every[k] - both[k])
-            for other, k in self._place.items()
-            if other not in chosen and both[k] < EVEN * self._probability((name,))
-        }
-        for other in sorted(alone, key=lambda n: -alone[n]):
-            if self._probability(chosen) >= SURE or len(chosen) > MOST_ALTERNATIVES:
-                break
-            chosen.append(other)
-        if self._probability(chosen) < SURE:
-            return ()
-        return tuple(other for other in chosen if other != name)
-
-    def _class(self, member: Member) -> tuple[str, ...]:
-        """Causes whose effects nothing measured here tells from those of a member, itself first."""
-        others = self._best.without(member.cause.name)
-        rivals = [c for c in self._settled.causes if c.name not in self._members and not c.setup]
-        size = len(member.variant.columns)
-        found = [member.cause.name]
-        for cause in rivals:
-            same = [v for v in cause.variants if len(v.columns) == size]
-            cosine = max((self._cosine(member.variant.columns, v.columns, others) for v in same), default=0.0)
-            if cosine > EQUIVALENT and not self._is_decided(member, cause, others, cosine):
-                found.append(cause.name)
-        return tuple(found)
-
-    def _is_decided(self, member: Member, rival: Cause, others: tuple[Member, ...], cosine: float) -> bool:
-        """Whether the rows decide between a member and a cause in its place: a thousandth of a very large effect is seen, too.
-
-        They decide nothing by what the formulas themselves may be off by.
-        """
-        laws = self._settled.bank.laws
-        own, other = (laws[n].form_uncertainty if n in laws else 0.0 for n in (member.cause.name, rival.name))
-        if np.sqrt(1.0 - cosine**2) <= np.hypot(own, other):
-            return False
-        in_place = self._settled.comparison.scan(others, [rival])
-        return self._best.log_factor(member.cause.name) - float(in_place.log_factor.max(initial=-np.inf)) > NEGLIGIBLE
-
-    def _cosine(self, one: NDArray[np.int64], other: NDArray[np.int64], others: tuple[Member, ...]) -> float:
-        """Least cosine between what two causes of as many amplitudes span beside base and others; 1: the same effects."""
-        products = self._settled.comparison.beside(others, np.concatenate([one, other]))
-        size = len(one)
-        a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
-        cosines = np.linalg.svd(_inverse_root(a) @ across @ _inverse_root(b), compute_uv=False)
-        return float(min(cosines.min(), 1.0)) if len(cosines) else 0.0
-
-
-NEGLIGIBLE = 30.0
-"""Log odds against the best set of causes from which on a set counts for nothing, however many there are of them."""
-
-
-def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.float64], dict[str, int]]:
-    """Sets of causes that count, shape (s, c): which cause is in which; their probabilities, shape (s,); places of causes."""
-    top = max(posterior.weights.values())
-    sets = [(key, weight) for key, weight in posterior.weights.items() if weight > top - NEGLIGIBLE]
-    place = {name: k for k, name in enumerate(sorted(set().union(*(key for key, _ in sets))))}
-    inside = np.zeros((len(sets), len(place)), dtype=bool)
-    for row, (key, _) in enumerate(sets):
-        inside[row, [place[name] for name in key]] = True
-    weights = np.exp(np.array([weight for _, weight in sets]) - top)
-    return inside, weights / weights.sum(), place
-
 
 _NAMES = {
     "once per turn": ("cosine", "sine"),
@@ -401,14 +317,3 @@ def _stretches(effect: NDArray[np.float64]) -> tuple[tuple[int, int], ...]:
 
 def _rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _inverse_root(products: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inverse square root of products of columns; directions that are nothing are left out."""
-    value, axes = np.linalg.eigh(products)
-    usable = value > RANK * max(float(value[-1]), 1e-300)
-    return np.asarray((axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T, dtype=np.float64)
-
-
-RANK = 1e-9
-"""Rank tolerance: share of the largest eigenvalue below which a direction says nothing."""

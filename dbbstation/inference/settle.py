@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import Bank, alike, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
 from dbbstation.inference.patterns import patterns
@@ -41,9 +42,6 @@ SEEDS = 3
 
 MOST_GROWN = 40
 """Causes that are taken in one after the other before the search begins, at the most."""
-
-RIVALS = 3
-"""Laws in the place of each member that are laid out at their own best values before they are compared."""
 
 NEGATIVE_SIGMA = 3.0
 """Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
@@ -345,14 +343,9 @@ def _laws_of(settled: Settled) -> list[Member]:
     """Laws of the best hypothesis, and those that do best in the place of each member."""
     best, laws = settled.best, settled.bank.laws
     found = [m for m in best.members if m.cause.name in laws]
+    rivals = [cause for cause in settled.causes if cause.name in laws]
     for member in best.members:
-        others = best.without(member.cause.name)
-        scan = settled.comparison.scan(
-            others, [c for c in settled.causes if c.name in laws and c.name not in best.names]
-        )
-        order = np.argsort(-scan.log_factor)[:RIVALS]
-        enough = 0.5 * best.log_factor(member.cause.name)
-        found += [scan.best[k] for k in order if scan.log_factor[k] > max(enough, 0.0)]
+        found += in_place_of(member.cause.name, settled.comparison, rivals, best)
     return list({m.cause.name: m for m in found}.values())
 
 
@@ -420,9 +413,23 @@ def impossible(law: Law, values: NDArray[np.float64], variances: NDArray[np.floa
     for k, positive in enumerate(law.positive):
         value = float(values[k])
         sigma = float(np.hypot(np.sqrt(variances[k]), law.form_uncertainty * value))
-        if positive and value < -NEGATIVE_SIGMA * sigma:
-            return (
-                f"It would have to be negative, {law.parameters[k]} {value:.3g} ± {sigma:.2g} {law.units[k]}, which it "
-                "cannot be: something else that does the opposite is at work."
-            )
+        if positive and (why := impossibly_negative(law.parameters[k], value, sigma, law.units[k])):
+            return why
     return ""
+
+
+def impossibly_negative(name: str, value: float, sigma: float, unit: str) -> str:
+    """Why a value that cannot be negative is none that can be: it is so beyond its uncertainty; empty where it is not.
+
+    Args:
+        name: of the parameter.
+        value: of it.
+        sigma: standard uncertainty of that.
+        unit: of both.
+    """
+    if value >= -NEGATIVE_SIGMA * sigma:
+        return ""
+    return (
+        f"It would have to be negative, {name} {value:.3g} ± {sigma:.2g} {unit}, which it "
+        "cannot be: something else that does the opposite is at work."
+    )

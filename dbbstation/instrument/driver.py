@@ -91,6 +91,11 @@ class Instrument:
         """Name of the port."""
         return self._port if isinstance(self._port, str) else str(getattr(self._port, "name", None) or "open port")
 
+    @property
+    def reading(self) -> bool:
+        """Whether the line is being read; false before `start`, and once it has failed."""
+        return self._thread is not None and self._thread.is_alive() and self._failure is None
+
     def start(self) -> None:
         """Open the line, send the start sequence, begin to read.
 

@@ -110,7 +110,7 @@ class MachineModel:
             KinematicsError: names the first pose that the actual machine cannot take, or that its weights let it leave.
             ModelError: a source needs what the motion does not give.
         """
-        commanded = Frames.from_poses(motion.poses, self.machine.hexapod.rotation)
+        commanded = motion.frames(self.machine)
         driven = self.driven_mm(commanded)
         acting = self.acting(motion)
         weights = tuple(f for f in acting if f.source.weighs)

@@ -11,16 +11,15 @@ from pydantic import ValidationError
 
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.formats.bar import write_bar
-from dbbstation.instrument.driver import Instrument
 from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
 from dbbstation.service.bar_reading import DRIFT, bar_file, read_on_calibrator
-from dbbstation.service.patience import driver_patience
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.reading import Reading
+    from dbbstation.service.held_line import HeldLine
 
 _TICK_S = 0.05
 
@@ -66,12 +65,10 @@ class Calibrated:
 
 
 class BarCalibration:
-    """Owns the instrument while the bar is on its calibrator; close it whatever happens.
+    """Borrows the instrument while the bar is on its calibrator; close it whatever happens.
 
     Args:
-        protocol: of the instrument.
-        port: where it is.
-        baud: where it is not set to the usual rate.
+        line: the instrument.
         count: good readings that are averaged.
 
     Attributes:
@@ -82,8 +79,8 @@ class BarCalibration:
         count: as given.
     """
 
-    def __init__(self, protocol: Protocol, port: str, baud: int | None = None, count: int = USUAL_READINGS) -> None:
-        self._protocol, self._port, self._baud = protocol, port, baud
+    def __init__(self, line: HeldLine, count: int = USUAL_READINGS) -> None:
+        self._line = line
         self.count = count
         self.latest: Reading | None = None
         self.failure: StationError | None = None
@@ -120,7 +117,7 @@ class BarCalibration:
 
     def _run(self) -> None:
         try:
-            with Instrument(self._protocol, self._port, baud=self._baud, **driver_patience(1.0)) as source:
+            with self._line.lent() as source:
                 while not self._stop.wait(_TICK_S):
                     readings = source.drain()
                     self.latest = readings[-1] if readings else self.latest
@@ -149,7 +146,7 @@ class BarCalibration:
                     "uncertainty_um": stated.calibrator_u_um,
                     "certified": stated.certified,
                 },
-                self._protocol.name,
+                self._line.protocol.name,
                 datetime.now(UTC),
             )
         except ValidationError as error:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
-    from dbbstation.plan.circle import Direction
+    from dbbstation.plan.circle import Circle, Direction
     from dbbstation.station.programs import RunProgram
 
 PROGRAMS = "programs"
@@ -132,6 +132,7 @@ class Prepared:
         runs: that are left to be measured; of a new session all of the plan.
         circles_s: time that their circles take at their planned feeds [s].
         mountings: how often a ball is put up for them.
+        first: the circle that comes first; None where nothing is left.
         height_and_drift: how far the height of the plan's tests follows a steady drift, from 0 (not at all) to 1.
     """
 
@@ -141,6 +142,7 @@ class Prepared:
     runs: int
     circles_s: float
     mountings: int
+    first: Circle | None
     height_and_drift: float
 
     @property
@@ -192,14 +194,16 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
         check_bar_known(bar, domain, datetime.now(UTC), limits.largest_bar_age_h)
     recorded = read_session(choice.folder).runs if choice.goes_on else ()
     left = Schedule(domain, lambda _test, _direction: 1, recorded).open
+    circles = [domain.tests[task.test].run(task.direction) for task in left]
     names = (*domain.tests, *domain.repeat_at_end)
     return Prepared(
         job,
         protocol,
         choice.line,
         len(left),
-        circles_s(domain.tests[task.test].run(task.direction) for task in left),
+        circles_s(circles),
         mountings(domain, [task.test for task in left]),
+        circles[0] if circles else None,
         height_and_drift([domain.tests[name].circle.centre_mm[2] for name in names], degree=1),
     )
 

@@ -15,6 +15,7 @@ from dbbstation.service.after import JOINT, KINEMATIC, After
 from dbbstation.service.bar_calibration import BarCalibration, Stated
 from dbbstation.service.candidates import Kind, candidates
 from dbbstation.service.choice import Choice, Limits, Part, Prepared, prepare
+from dbbstation.service.held_line import HeldLine, HeldOpen
 from dbbstation.service.memory import VIRTUAL, Line, Memory
 from dbbstation.service.opening import opener
 from dbbstation.service.port_probe import Answer, ports, probe
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from dbbstation.instrument.protocol import Protocol
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.service.session_list import SessionLine
     from dbbstation.station.events import Observer
@@ -74,6 +76,7 @@ class Front:
     given: Choice = field(default_factory=Choice)
     settings: Path | None = None
     _open: ExitStack = field(default_factory=ExitStack)
+    _held: HeldOpen = field(default_factory=HeldOpen)
 
     def sessions(self) -> tuple[SessionLine, ...]:
         """Return sessions under the working folder and those that were open lately, the last first."""
@@ -139,7 +142,21 @@ class Front:
             protocol = with_zero(protocol, (line.zero_mm or 0.0) if protocol.length.relative else None)
         except StationError as error:
             return Answer(line.port, answers=False, text=str(error))
+        self.release()  # only one can open a port
         return probe(protocol, line.port, line.baud)
+
+    def hold(self, protocol: Protocol, line: Line) -> HeldLine | None:
+        """Return the instrument, which stays open from now on until another one is asked for; None of a virtual one.
+
+        Args:
+            protocol: of the instrument.
+            line: where it is.
+        """
+        return None if line.virtual else self._held.line(protocol, line.port, line.baud)
+
+    def release(self) -> None:
+        """Close the instrument that is held open, where one is."""
+        self._held.release()
 
     def prepare(self, choice: Choice) -> Prepared:
         """Read and check what was chosen; raises as `choice.prepare`."""
@@ -194,7 +211,7 @@ class Front:
         if protocol.length.relative and zero_mm is None:
             zero_mm = _number(values, "calibrator_mm")
         protocol = with_zero(protocol, zero_mm if protocol.length.relative else None)
-        return BarCalibration(protocol, line.port, line.baud)
+        return BarCalibration(self._held.line(protocol, line.port, line.baud))
 
     def stated_bar(self, values: Mapping[str, str]) -> Stated:
         """Return what is stated of bar and calibrator.
@@ -222,15 +239,16 @@ class Front:
     def open(self, choice: Choice, prepared: Prepared) -> Opened:
         """Switch on what is virtual, remember the choice, and return what runs the sequence.
 
-        A session that goes on gets the temperature of now as a note.
+        A session that goes on gets the present temperature as a note.
 
         Raises:
             StationError: the virtual machine refuses, or another process writes into the session.
         """
-        self.close()
+        self._open.close()
         job, line = prepared.job, prepared.line
-        port, observers = line.port, [*self.observers]
-        if line.virtual:
+        observers = [*self.observers]
+        held = self.hold(prepared.protocol, line)
+        if held is None:
             place = self._open.enter_context(
                 virtual_place(
                     job.machine,
@@ -242,18 +260,20 @@ class Front:
                 )
             )
             job = replace(job, clock=place.clock, time_scale=line.time_scale)
-            port, observers = place.port, [*observers, place.helper]
+            observers.append(place.helper)
+            held = HeldLine(prepared.protocol, place.port, clock=place.clock, time_scale=line.time_scale)
+            self._open.callback(held.close)
         self._remember(choice)
         if choice.goes_on and choice.folder is not None and choice.ambient_temp_c is not None:
             note_temperature(choice.folder, choice.ambient_temp_c)
-        opened = opener(job, prepared.protocol, port, baud=line.baud, observers=observers, time_scale=line.time_scale)
-        runner = Runner(opened)
+        runner = Runner(opener(job, held, observers=observers), held)
         self._open.callback(runner.close)
         return Opened(replace(prepared, job=job), runner)
 
     def close(self) -> None:
-        """End the sequence that is open, and switch off what is virtual."""
+        """End the sequence that is open, switch off what is virtual, and close the instrument."""
         self._open.close()
+        self.release()
 
     def after(self, session: Path) -> After:
         """Return what can be done with a session that is measured."""

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, TypeAlias
 from dbbstation.errors import StationError
 from dbbstation.service.board import SequenceOpened
 from dbbstation.station.commands import Quit
-from dbbstation.station.events import Event, Fault
+from dbbstation.station.events import Event, Fault, ReadingsSeen
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
 
+    from dbbstation.service.held_line import HeldLine
     from dbbstation.station.commands import Command
     from dbbstation.station.engine import Station
     from dbbstation.station.judging import JudgedRun
@@ -44,7 +45,7 @@ class OpenStation:
 
 
 Opener: TypeAlias = "Callable[[], AbstractContextManager[OpenStation]]"
-"""Opens instrument and session; called again when a line that failed is connected again."""
+"""Borrows the instrument and opens the session; called again when a line that failed is connected again."""
 
 
 class Runner:
@@ -52,13 +53,15 @@ class Runner:
 
     Args:
         opener: called in the runner's thread.
+        line: the instrument, whose readings go on being shown when no sequence is being run; None: they are not.
 
     Attributes:
         crash: what ended the thread and should not have: a mistake in the program.
     """
 
-    def __init__(self, opener: Opener) -> None:
+    def __init__(self, opener: Opener, line: HeldLine | None = None) -> None:
         self._opener = opener
+        self._line = line
         self._mail: queue.SimpleQueue[Event | SequenceOpened] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
         self._station: Station | None = None
@@ -72,7 +75,7 @@ class Runner:
         return self._thread is not None and self._thread.is_alive()
 
     def start(self) -> None:
-        """Open instrument and session and run; does nothing while a sequence is being run."""
+        """Borrow the instrument, open the session and run; does nothing while a sequence is being run."""
         if self.alive:
             return
         self._told = False
@@ -89,10 +92,14 @@ class Runner:
 
     def mail(self) -> list[Event | SequenceOpened]:
         """Return what has come since the last call."""
-        came = []
+        over = not self.alive  # asked first: what the sequence sent last comes before what is only seen
+        came: list[Event | SequenceOpened] = []
         with suppress(queue.Empty):
             while True:
                 came.append(self._mail.get_nowait())
+        seen = () if self._line is None else self._line.seen()
+        if over and seen:
+            came.append(ReadingsSeen(seen))
         return came
 
     def wait(self) -> None:

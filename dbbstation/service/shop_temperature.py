@@ -26,7 +26,7 @@ def shop_degc(text: str) -> float | None:
 
 
 def note_temperature(folder: Path, degc: float) -> None:
-    """Note the temperature of now; while a sequence runs, it takes a `Note` instead.
+    """Note the present temperature; while a sequence runs, it takes a `Note` instead.
 
     Args:
         folder: of the session.
@@ -37,7 +37,7 @@ def note_temperature(folder: Path, degc: float) -> None:
         OutputError: another process writes into it, or the disk refuses.
     """
     with SessionWriter.open(folder) as writer:
-        # On a virtual machine that runs faster than real time, runs and notes bear times ahead of now.
+        # On a virtual machine that runs faster than real time, runs and notes bear times ahead of the present.
         runs = [run.started for run in writer.runs if run.started is not None]
         notes = [note.made for note in writer.session.notes]
         writer.note(Note(max([datetime.now(UTC), *runs, *notes]), ambient_temp_c=degc))

@@ -12,23 +12,28 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self, TypeVar, cast
 
 import numpy as np
 
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.kinematics import Struts, inverse
+from dbbstation.machine.rotation import Frames
 from dbbstation.texts import Texts as Texts  # noqa: PLC0414, TC001 - part of the contract: sources take it from here
 from dbbstation.trace.columns import WithLogged
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from dbbstation.machine.geometry import Compliance, Machine
+    from dbbstation.machine.geometry import Compliance, Hexapod, Machine
     from dbbstation.plan.plan import Plate
     from dbbstation.trace.columns import Logged
+
+
+_Worked = TypeVar("_Worked", Frames, Struts)
 
 
 class Owner(StrEnum):
@@ -161,9 +166,24 @@ class Motion(WithLogged):
     reading_mm: NDArray[np.float64] | None = None
     reading_is_measured: bool = False
     put_up: Motion | None = None
+    _known: dict[str, tuple[Hexapod, Frames | Struts]] = field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.poses)
+
+    def frames(self, machine: Machine) -> Frames:
+        """Commanded poses as frames of the platform; worked out once, whatever number of sources asks."""
+        return self._once("frames", machine, lambda: Frames.from_poses(self.poses, machine.hexapod.rotation))
+
+    def struts(self, machine: Machine) -> Struts:
+        """Struts of the machine at the commanded poses; worked out once, whatever number of sources asks."""
+        return self._once("struts", machine, lambda: inverse(machine.hexapod, self.frames(machine)))
+
+    def _once(self, what: str, machine: Machine, work: Callable[[], _Worked]) -> _Worked:
+        known = self._known.get(what)
+        if known is None or known[0] is not machine.hexapod:
+            known = self._known[what] = machine.hexapod, work()
+        return cast("_Worked", known[1])
 
     @property
     def provides(self) -> frozenset[Need]:

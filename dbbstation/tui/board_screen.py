@@ -74,7 +74,7 @@ class BoardScreen(ExplainedScreen):
 
 
 class RunScreen(BoardScreen):
-    """A screen in front of the machine: its keys send what is told to the run of now.
+    """A screen in front of the machine: its keys send commands to the present run.
 
     Args:
         desk: has the board, and takes commands.

@@ -16,7 +16,7 @@ _STYLES = {Weight.NOTE: "", Weight.WARNING: "$text-warning", Weight.FAULT: "bold
 
 
 class MessageLines(Panel):
-    """As many as fit, each in one line; what needs all its words stands above in the sentence of now."""
+    """As many as fit, each in one line; what needs all its words stands above, in the present sentence."""
 
     def text(self, board: Board) -> Content:
         """Return the last messages."""

@@ -29,7 +29,7 @@ _VERDICT_BEFORE = {"take_back": Verdict.ACCEPTED, "accept_again": Verdict.REJECT
 
 
 class OverviewScreen(BoardScreen):
-    """Pushed over the screen of now, and popped.
+    """Pushed over the present screen, and popped.
 
     Args:
         desk: has the board, and takes commands.

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.content import Content
 
+from dbbstation.service.held_line import AGAIN_S
+from dbbstation.service.seated import seat
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.tui import texts
 from dbbstation.tui.asking import ChooseQuestion
 from dbbstation.tui.durations import duration
 from dbbstation.tui.panel import lines
+from dbbstation.tui.reading_panel import seat_words
 from dbbstation.tui.row_screen import RowScreen
 from dbbstation.tui.temperature_question import TemperatureQuestion
 
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front
+    from dbbstation.service.held_line import HeldLine
     from dbbstation.tui.reception import Reception
 
 _GOOD, _OPEN, _NOTE = "✓", "!", "·"
@@ -65,10 +69,18 @@ class PrepareScreen(RowScreen):
         self._goes_on = choice.goes_on
         self._confirmed: set[str] = set()
         self._wrote = ""
+        self._line: HeldLine | None = None
+        self._told: tuple[tuple[str, str], ...] = ()
 
     def on_mount(self) -> None:
-        """Show the list."""
+        """Open the instrument, and show the list."""
+        self._line = self._front.hold(self._prepared.protocol, self._prepared.line)
         self._show()
+
+    def look(self) -> None:
+        """Show what the instrument reads."""
+        if self._line is not None:
+            self._tell()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """A session that goes on has its programs, where there are any."""
@@ -133,13 +145,22 @@ class PrepareScreen(RowScreen):
             done = name in self._confirmed
             rows.append(Content.assemble(("[x] " if done else "[ ] ", "bold"), (text, "" if done else "$text-warning")))
         self.put(rows)
-        self.about(lines(*(Content(f"{sign} {text}") for sign, text in self._checked())))
+        self._tell()
         left = len(self._list) - len(self._confirmed)
         self.say(texts.CHECK_OPEN.format(count=left, all=len(self._list)) if left else texts.CHECK_READY)
+
+    def _tell(self) -> None:
+        """Show what the program knows."""
+        told = tuple(self._checked())
+        if told != self._told:
+            self._told = told
+            self.about(lines(*(Content(f"{sign} {text}") for sign, text in told)))
 
     def _checked(self) -> Iterator[tuple[str, str]]:
         """Yield sign and sentence of what the program knows."""
         prepared = self._prepared
+        if self._line is not None:
+            yield self._reading(self._line)
         yield _GOOD, texts.CHECK_TRAVEL
         form = texts.CHECK_LEFT if self._goes_on else texts.CHECK_TIME
         time = duration(prepared.circles_s)
@@ -155,6 +176,21 @@ class PrepareScreen(RowScreen):
         if prepared.line.virtual:
             yield _NOTE, texts.CHECK_VIRTUAL
         yield from self._shop()
+
+    def _reading(self, line: HeldLine) -> tuple[str, str]:
+        """What the instrument reads, and how the bar stands for the first circle."""
+        latest, first = line.latest, self._prepared.first
+        if line.failure is not None:
+            return _OPEN, texts.CHECK_SILENT.format(why=line.failure, again_s=AGAIN_S)
+        if latest is None:
+            return _NOTE, texts.CHECK_LISTENS
+        rate = "" if line.rate.per_s is None else texts.RATE.format(rate=line.rate.per_s)
+        if latest.length_mm is None:
+            return _GOOD, texts.CHECK_NO_BAR.format(rate=rate, said=latest.said or latest.status)
+        if first is None:
+            return _GOOD, texts.CHECK_READS_ALL.format(length=latest.length_mm, rate=rate)
+        seat_now = seat_words(seat(latest.length_mm, first))
+        return _GOOD, texts.CHECK_READS.format(length=latest.length_mm, rate=rate, seat=seat_now)
 
     def _programs(self) -> str:
         """What is known of the programs that command the runs."""

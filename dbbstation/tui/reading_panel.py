@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from dbbstation.plan.circle import Circle
     from dbbstation.service.board import Board
+    from dbbstation.service.seated import Seat
     from dbbstation.station.events import Sample
 
 _STALE_S = 1.5
@@ -75,6 +76,14 @@ class ReadingPanel(Panel):
         )
 
 
+def seat_words(found: Seat) -> str:
+    """Say how the bar stands at the feed-in point."""
+    if found.seated:
+        return SEATED
+    form = NOT_SEATED_SHORT if found.long_mm < 0.0 else NOT_SEATED_LONG
+    return form.format(mm=abs(found.long_mm))
+
+
 def _length(sample: Sample, *, stale: bool) -> Content:
     if sample.length_mm is None:
         return Content.styled("  --.----- mm", "bold")
@@ -94,10 +103,7 @@ def _deviation(sample: Sample, board: Board) -> Content:
 
 def _seat(length_mm: float, circle: Circle) -> Content:
     found = seat(length_mm, circle)
-    if found.seated:
-        return Content.styled(SEATED, "bold $text-success")
-    form = NOT_SEATED_SHORT if found.long_mm < 0.0 else NOT_SEATED_LONG
-    return Content.styled(form.format(mm=abs(found.long_mm)), "bold $text-warning")
+    return Content.styled(seat_words(found), "bold $text-success" if found.seated else "bold $text-warning")
 
 
 def _quality(sample: Sample, board: Board, old_s: float | None) -> list[Content]:

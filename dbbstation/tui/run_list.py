@@ -30,7 +30,7 @@ _SHORTEST_NAME = 4
 
 
 class RunList(Panel):
-    """As many tests as fit, the one of now among them."""
+    """As many tests as fit, the present one among them."""
 
     def text(self, board: Board) -> Content:
         """Return a row per test."""

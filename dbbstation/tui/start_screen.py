@@ -76,7 +76,7 @@ class StartScreen(RowScreen):
             return
         choice = self._front.goes_on_with(line.folder)
         if choice.missing():
-            self.app.push_screen(NewScreen(self._reception, self._front, choice))
+            self._enter(NewScreen(self._reception, self._front, choice))
         else:
             self.say(texts.NEW_CHECKS)
             self._reception.do(
@@ -89,17 +89,17 @@ class StartScreen(RowScreen):
 
     def action_new(self) -> None:
         """Choose what is measured into a new session."""
-        self.app.push_screen(NewScreen(self._reception, self._front, self._front.first_choice()))
+        self._enter(NewScreen(self._reception, self._front, self._front.first_choice()))
 
     def action_virtual(self) -> None:
         """Choose nothing: everything is virtual."""
-        self.app.push_screen(NewScreen(self._reception, self._front, self._front.virtual_choice()))
+        self._enter(NewScreen(self._reception, self._front, self._front.virtual_choice()))
 
     def action_line(self) -> None:
         """Choose by what the session is gone on with."""
         if self.chosen is not None:
             choice = self._front.goes_on_with(self.chosen.folder)
-            self.app.push_screen(NewScreen(self._reception, self._front, choice))
+            self._enter(NewScreen(self._reception, self._front, choice))
 
     def action_results(self) -> None:
         """Work on the chosen session."""
@@ -117,7 +117,15 @@ class StartScreen(RowScreen):
         """Show the short checklist, where nobody has gone elsewhere meanwhile."""
         if self.is_current:
             self.say(texts.START_SOME)
-            self.app.push_screen(PrepareScreen(self._reception, self._front, choice, prepared))
+            self._enter(PrepareScreen(self._reception, self._front, choice, prepared))
+
+    def _enter(self, screen: RowScreen) -> None:
+        """Open a screen; who comes back from it has no more need of the instrument."""
+
+        def left(_: None) -> None:
+            self._reception.do(self._front.release, lambda _: None, self._failed)
+
+        self.app.push_screen(screen, left)
 
     def _tell(self) -> None:
         line = self.chosen

@@ -20,6 +20,7 @@ PLAN = shipped_folder("protocols") / "plans" / "table2.yaml"
 MACHINE = FIXTURES / "machines" / "reference.yaml"
 MAPPING = FIXTURES / "mappings" / "every-key.yaml"
 GERMAN = [FIXTURES / "foreign" / f"a_{word}.csv" for word in ("links", "rechts")]
+ANGLE = ("--angle-grows", "ccw", "--angle-zero-deg", "0")
 UNKNOWN = [word for one in ("temperature", "operator", "job", "bar") for word in ("--not-known", one)]
 WHERE = ["--plan", PLAN, "--machine", MACHINE]
 ANGLES = np.arange(360.0)
@@ -35,7 +36,7 @@ def table(path, rows, head="angle_deg,deviation_um", *, end="\n", encoding="utf-
 
 
 def imported(run, file, out, *more):
-    words = ["--out", out, *WHERE, *UNKNOWN, "--angle-grows", "ccw", "--angle-zero-deg", "0", "--zero-mm", "150"]
+    words = ["--out", out, *WHERE, *UNKNOWN, *ANGLE, "--zero-mm", "150"]
     return run("import", file, *words, "--run", f"{file.name}=a-ccw", "--yes", *more)
 
 
@@ -175,19 +176,7 @@ def test_options_say_how_numbers_are_written_before_the_shop_and_not_beside_a_ma
     rows = [f"{a:.1f};{d:.4f}".replace(".", ",") for a, d in zip(ANGLES, ellipse(), strict=True)]
     file, shop = table(tmp_path / "old.csv", rows, "angle_deg;deviation_um"), settings(tmp_path, ".", ",")
     known = ["--settings", shop]
-    words = [
-        "--out",
-        tmp_path / "s",
-        *WHERE,
-        *UNKNOWN,
-        "--angle-grows",
-        "ccw",
-        "--angle-zero-deg",
-        "0",
-        "--zero-mm",
-        "150",
-    ]
-    words += ["--run", "old.csv=a-ccw", "--yes"]
+    words = ["--out", tmp_path / "s", *WHERE, *UNKNOWN, *ANGLE, "--zero-mm", "150", "--run", "old.csv=a-ccw", "--yes"]
     refused = run(*known, "import", file, *words)
     assert (refused.code, "--decimal and --separator say otherwise" in refused.err) == (FAILED, True)
     assert run(*known, "import", file, *words, "--decimal", ",").code == DONE
@@ -259,19 +248,7 @@ def test_tables_that_are_no_run_of_the_plan_are_refused_whole(run, tmp_path, row
 def test_other_faults_of_words_are_answered(run, tmp_path):
     rows = _rows(lambda a, d: zip(a, d, strict=True))
     file = table(tmp_path / "old.csv", rows)
-    words = [
-        "import",
-        file,
-        "--out",
-        tmp_path / "s",
-        *WHERE,
-        *UNKNOWN,
-        "--angle-grows",
-        "ccw",
-        "--angle-zero-deg",
-        "0",
-        "--yes",
-    ]
+    words = ["import", file, "--out", tmp_path / "s", *WHERE, *UNKNOWN, *ANGLE, "--yes"]
     assert "no run of the plan" in run(*words, "--zero-mm", "150", "--run", "old.csv=zz-ccw").err
     assert "names 0 of the files" in run(*words, "--zero-mm", "150", "--run", "new.csv=a").err
     assert "nothing says which test" in run(*words, "--zero-mm", "150").err

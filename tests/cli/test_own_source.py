@@ -78,6 +78,7 @@ def test_it_is_simulated_as_the_independent_machine_moves(truth, run, tmp_path):
         assert np.ptp(there - by_angle) < 2e-4
 
 
+@pytest.mark.slow
 def test_the_diagnosis_names_it_and_the_joint_model_is_read_with_its_file(bowed, run, tmp_path):
     session = bowed
     joint = tmp_path / "joint.yaml"

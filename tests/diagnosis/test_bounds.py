@@ -102,22 +102,10 @@ def _still(folder, *mechanisms):
     return folder
 
 
-class _OneInDoubt:
-    """What verdicts ask of a comparison in which one cause has a probability of 0.7 and no other could stand for it."""
-
-    unmodelled = type("Unmodelled", (), {"shapes": {}})()
-    causes = ()
-
-    class posterior:  # noqa: N801 - stands for an attribute
-        @staticmethod
-        def probability(names):
-            return 0.7 if "play" in names else 0.0
-
-
 @pytest.mark.parametrize(("group", "verdict"), [((), Verdict.NOT_TESTABLE), (("backlash",), Verdict.AMBIGUOUS)])
 def test_only_a_group_of_which_one_is_there_is_ambiguous(group, verdict):
     judge = object.__new__(_Judge)
-    judge._settled = _OneInDoubt()
+    judge._probability = lambda names: 0.7 if "play" in names else 0.0
     judge._named = {"play": None, "backlash": None}
     judge._classes, judge._ambiguities = {"play": ("play",)}, {"play": ("play", *group)}
     found, others, _, text = judge._verdict_of_member("play")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
+
 from dbbstation.diagnosis.diagnose import doubtful, judged
 from dbbstation.diagnosis.explain import explain
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.thinned import thinned
-from dbbstation.diagnosis.verdicts import EVEN, judge
+from dbbstation.diagnosis.verdicts import judge
+from dbbstation.inference.alternatives import EVEN
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
 from tests.plant.mechanisms.gravity import Gravity
@@ -18,6 +21,7 @@ from tests.plant.session import record
 NAMES = ("gravity", "thermal-frame", "thermal-struts", "bar-drift")
 
 
+@pytest.mark.slow
 def test_a_drift_of_nobody_knows_what_is_named_by_nobody_and_not_modelled(tmp_path):
     """A frame that warms by a hundredth of a kelvin: three causes share the probability, and none of them has half of it."""
     kinematics = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)

@@ -39,6 +39,7 @@ def test_one_strut_that_is_late_is_named_though_circles_see_no_common_lag(tmp_pa
     assert values[3] - others == pytest.approx(late_ms, abs=0.004)
 
 
+@pytest.mark.slow
 def test_a_backlash_that_all_struts_share_is_named_where_no_single_one_would_be(tmp_path):
     play_um = 0.15
     found = identified(diagnosed(tmp_path / "s", 52, Backlash((play_um,) * 6)))

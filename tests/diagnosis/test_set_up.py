@@ -42,6 +42,7 @@ def named(diagnosis):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset_um", [6.0, pytest.param(-9.0, marks=pytest.mark.nightly)])
 def test_a_bar_that_was_set_wrongly_is_no_warm_plate(tmp_path, offset_um):
     diagnosis = diagnosed(tmp_path / "s", 41, BarOffset(offset_um))
@@ -58,6 +59,7 @@ def test_a_bar_that_was_set_wrongly_is_no_warm_plate(tmp_path, offset_um):
     assert value["value"] == found.size_um
 
 
+@pytest.mark.slow
 def test_a_warm_plate_is_no_ball_off_the_tool_tip(tmp_path):
     """Places of balls grow away from the jig's origin; a ball off the tool tip does nearly the same to level circles."""
     diagnosis = diagnosed(tmp_path / "s", 43, JigThermal(rise_k=2.7))

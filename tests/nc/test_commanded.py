@@ -36,6 +36,7 @@ def test_a_nominal_program_commands_the_nominal_circle(linuxcnc, all_runs):
         np.testing.assert_array_equal(off[:, 3:], 0.0)
 
 
+@pytest.mark.slow
 def test_a_compensated_program_commands_what_takes_the_machine_round_the_nominal_circle(
     linuxcnc, table2, reference, crooked
 ):

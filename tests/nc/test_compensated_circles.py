@@ -50,6 +50,7 @@ def test_thirty_programs_take_the_machine_to_the_nominal_circles(compensated, ta
     assert worst_deg < 1e-6
 
 
+@pytest.mark.slow
 def test_between_the_points_nothing_is_lost_but_the_chord(compensated, table2, crooked):
     for name in ("a", "g", "o"):
         circle = table2.tests[name].circle

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from dbbstation.files.formats.bar import read_bar
 from dbbstation.instrument.library import load_instrument
 from dbbstation.instrument.protocol import Protocol
 from dbbstation.service.bar_calibration import BarCalibration, Stated
+from dbbstation.service.held_line import HeldLine
 from dbbstation.service.seated import seat
 from dbbstation.station import events
 from dbbstation.tui.reading_panel import ReadingPanel
@@ -42,8 +44,11 @@ def test_what_the_bar_reads_too_long_is_written_into_its_file(protocol: Protocol
     rng = np.random.default_rng(7)
     long_mm = 0.0021
     path = tmp_path / "bar.yaml"
-    with VirtualInstrument(protocol, lambda _t_s: CALIBRATOR_MM + long_mm + rng.normal(0.0, 2e-4)) as wire:
-        calibration = BarCalibration(protocol, wire.port, count=COUNT)
+    with (
+        VirtualInstrument(protocol, lambda _t_s: CALIBRATOR_MM + long_mm + rng.normal(0.0, 2e-4)) as wire,
+        closing(HeldLine(protocol, wire.port)) as line,
+    ):
+        calibration = BarCalibration(line, count=COUNT)
         try:
             until(lambda: calibration.latest is not None)
             calibration.begin(STATED, path)
@@ -65,10 +70,13 @@ def test_no_bar_a_wrong_date_and_a_file_that_exists_are_told(protocol: Protocol,
     there = tmp_path / "there.yaml"
     there.write_text("")
     length_mm: list[float | None] = [None]
-    with VirtualInstrument(
-        protocol, lambda _t_s: None if length_mm[0] is None else length_mm[0] + rng.normal(0.0, 2e-4)
-    ) as wire:
-        calibration = BarCalibration(protocol, wire.port, count=COUNT)
+    with (
+        VirtualInstrument(
+            protocol, lambda _t_s: None if length_mm[0] is None else length_mm[0] + rng.normal(0.0, 2e-4)
+        ) as wire,
+        closing(HeldLine(protocol, wire.port)) as line,
+    ):
+        calibration = BarCalibration(line, count=COUNT)
         try:
             for stated, path, says in (
                 (STATED, tmp_path / "bar.yaml", "are a length"),
@@ -85,8 +93,8 @@ def test_no_bar_a_wrong_date_and_a_file_that_exists_are_told(protocol: Protocol,
 
 
 def test_leaving_gives_the_instrument_back(protocol: Protocol, tmp_path: Path) -> None:
-    with VirtualInstrument(protocol, lambda _t_s: 150.0) as wire:
-        calibration = BarCalibration(protocol, wire.port, count=1_000_000)
+    with VirtualInstrument(protocol, lambda _t_s: 150.0) as wire, closing(HeldLine(protocol, wire.port)) as line:
+        calibration = BarCalibration(line, count=1_000_000)
         calibration.begin(STATED, tmp_path / "bar.yaml")
         until(lambda: calibration.done > 0)
         began_s = time.monotonic()

@@ -70,6 +70,7 @@ def test_a_whole_short_plan_agrees_with_the_truth(plan_file: Path, tmp_path: Pat
     assert "\r" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_finished_session_has_nothing_left_and_another_plan_is_refused(plan_file: Path, tmp_path: Path) -> None:
     out = tmp_path / "session"
     text = plan_file.read_text(encoding="utf-8")
@@ -177,6 +178,7 @@ def test_the_shipped_plans_can_be_measured() -> None:
         check_plan(read_plan(path), read_machine(MACHINE_FILE), file=str(path))
 
 
+@pytest.mark.slow
 def test_balls_under_the_spindle_from_the_plan_to_the_figures(tmp_path: Path) -> None:
     """Two of the fifteen tests of the shipped plan: measured, checked, continued with readings noted, evaluated."""
     text = (shipped_folder("protocols") / "plans" / "conventional.yaml").read_text(encoding="utf-8")

@@ -16,6 +16,7 @@ from studies.blind_reliability import Forecast, reliability
 from studies.blind_score import compare, numbers, score
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
 
 CANDIDATES = ("gravity", "backlash", "thermal-struts", "bar-drift", "play")
@@ -281,7 +282,8 @@ def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("blind")
     answers = []
     for name, hidden in (("0001", []), ("0002", [Gravity()])):
-        truth = record(folder / name, seed=int(name), mechanisms=[RandomKinematics(), *hidden], rate_hz=25.0)
+        plan = subset(table_ii_plan(int(name)), "abhimo")
+        truth = record(folder / name, plan=plan, seed=int(name), mechanisms=[RandomKinematics(), *hidden], rate_hz=25.0)
         effects = [effect("gravity", 90.0, amplitudes={"strut_compliance_um_kn": 9.68})] if hidden else []
         told = answer(name, "single" if hidden else "clean", *effects)
         answers.append(told | {"truth": {k: np.asarray(v).tolist() for k, v in _machine_of(truth).items()}})

@@ -17,6 +17,7 @@ def study(reference):
     return concealed_gravity(reference, jig, conditions, 2, lambda _: None)
 
 
+@pytest.mark.slow
 def test_nine_tenths_are_swallowed_and_a_few_micrometres_remain(study):
     """15.1 µm rms leave 4.5, 91 % of the sum of squares: two independent programs found that for this machine."""
     numbers = study.numbers

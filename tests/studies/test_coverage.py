@@ -10,6 +10,7 @@ from dbbstation.files.shipped import shipped_folder
 from studies.coverage import coverage, wilson
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "level"), [("table2-elevated", False), ("table2", True)])
 def test_intervals_hold_the_truth_as_often_as_they_say(reference, name, level):
     plan = read_plan(shipped_folder("protocols") / "plans" / f"{name}.yaml")

@@ -24,6 +24,8 @@ from studies.gravity import (
 )
 from studies.gravity_figure import gravity_figure, same_place
 
+pytestmark = pytest.mark.slow  # four machines are fitted in four ways
+
 MACHINES = 4
 
 # Median of six random machines, 1 µm of noise, conditions A to I [µm], by two programs that share nothing with this one.

@@ -16,6 +16,7 @@ def numbers(request, reference):
     return table_iii(reference, conventional, jig, range(200, 206), lambda _: None, gravity=request.param).numbers()
 
 
+@pytest.mark.slow
 def test_only_the_jig_method_gets_global_position_right(numbers):
     """ "The center deviation was significantly reduced by the calibration Proposed" [CAL IV]."""
     for figure in ("centre_deviation_um", "flatness_um", "parallelism_um"):

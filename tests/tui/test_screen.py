@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
 import pytest
@@ -19,6 +19,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
+from dbbstation.service.held_line import HeldLine
 from dbbstation.service.opening import opener
 from dbbstation.service.runner import Runner
 from dbbstation.service.virtual_place import VirtualPlace, virtual_place
@@ -90,7 +91,8 @@ class Bench:
         helper: Observer | None = None,
     ) -> None:
         """Open a screen and play on it; the screen is closed whatever happens."""
-        runner = Runner(opener(self.job, ENCODER, self.place.port, observers=[helper or self.place.helper]))
+        line = HeldLine(ENCODER, self.place.port, clock=self.place.clock)
+        runner = Runner(opener(self.job, line, observers=[helper or self.place.helper]), line)
         app = StationApp(
             Shown(self.job.plan.plan.name, self.job.plan.jig.bores, tests=self.job.plan.to_domain().tests), runner
         )
@@ -99,7 +101,8 @@ class Bench:
             async with app.run_test(size=size) as pilot:
                 await play(pilot, app)
 
-        asyncio.run(run())
+        with closing(line):
+            asyncio.run(run())
         assert not runner.alive
         if runner.crash is not None:
             raise runner.crash
@@ -237,6 +240,9 @@ def test_a_fault_of_the_line_is_shown_and_the_line_connected_again(short_plan: I
         assert "low-ccw-1 is kept as far as it came" in said(app)
         assert "fault: " in row(app, "messages")
         bench.place.wire.speak_again()
+        # It is opened again by itself, and read beside the fault; going on is for people to say.
+        await until(pilot, lambda: "no reading" not in row(app, "reading"))
+        assert board.fault is not None
         await press(app, "c")
         await until(pilot, lambda: board.fault is None and board.state is State.ANNOUNCED)
         await until(pilot, lambda: "low-ccw-2" in row(app, "title"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import shutil
+import threading
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from dbbstation.errors import InstrumentError
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.circle import Direction
 from dbbstation.service.after import Step
 from dbbstation.service.choice import Part
@@ -34,6 +36,7 @@ from dbbstation.tui.question import YesQuestion
 from dbbstation.tui.results_screen import ResultsScreen
 from dbbstation.tui.start_screen import StartScreen
 from dbbstation.tui.temperature_question import TemperatureQuestion
+from dbbstation.virtual.wire import VirtualInstrument
 from tests.tui.test_screen import one_circle, press
 
 if TYPE_CHECKING:
@@ -301,6 +304,35 @@ def test_a_port_that_does_not_answer_says_so(front: Front) -> None:
         await until(pilot, lambda: "there is no such port" in now(app))
 
     play(front, keys)
+
+
+def test_the_checklist_shows_what_the_instrument_reads(front: Front) -> None:
+    protocol = load_instrument("streaming-encoder")
+    length_mm: list[float | None] = [None]
+
+    with VirtualInstrument(protocol, lambda _t_s: length_mm[0]) as wire:
+
+        async def keys(pilot: Pilot[None], app: StationApp) -> None:
+            await press(app, "v")
+            await until(pilot, on(app, NewScreen))
+            app.screen._line(instrument="streaming-encoder", port=wire.port)
+            app.screen._take(bar_waiver="a test")
+            await press(app, "b")
+            await until(pilot, on(app, PrepareScreen))
+            await until(pilot, lambda: "no bar" in below(app))
+            length_mm[0] = 149.1
+            await until(pilot, lambda: "reads 149.1000 mm" in below(app) and "2.4 mm short of feed-in" in below(app))
+            length_mm[0] = 151.5
+            await until(pilot, lambda: "for the first circle the bar is seated" in below(app))
+            wire.hang_up()
+            await until(pilot, lambda: "opened again every 2 s" in below(app))
+            await press(app, "escape")
+            await until(pilot, on(app, NewScreen))
+            await press(app, "escape")
+            await until_start(pilot, app)
+            await until(pilot, lambda: not [one for one in threading.enumerate() if one.name == f"hold {wire.port}"])
+
+        play(front, keys)
 
 
 def test_work_can_be_ended_and_leaving_it_asks_first(front: Front) -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -28,6 +29,7 @@ from dbbstation.service.memory import Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order
 from dbbstation.service.session_list import SessionLine
 from dbbstation.service.work import Progress
+from dbbstation.station.events import Sample
 from dbbstation.tui import texts
 from dbbstation.tui.acceptance_screen import AcceptanceScreen
 from dbbstation.tui.app import StationApp
@@ -40,6 +42,9 @@ from tests.tui.test_stills import KEEP, KEPT, drawn
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.service.held_line import HeldLine
 
 SIZES = [(80, 24), (120, 40), (200, 60)]
 SHOP = Path("/shop")
@@ -66,6 +71,17 @@ class StillFront(Front):
 
     def sessions(self) -> tuple[SessionLine, ...]:
         return SESSIONS
+
+    def hold(self, protocol: Protocol, line: Line) -> HeldLine | None:  # noqa: ARG002 - as the front has it
+        return None if line.virtual else StillLine()  # type: ignore[return-value]
+
+
+class StillLine:
+    """A display that reads the bar at the feed-in point."""
+
+    latest = Sample(1.0, 151.4987)
+    failure = None
+    rate = SimpleNamespace(per_s=8.1)
 
 
 class StillCalibration:

@@ -91,7 +91,7 @@ def test_order_job_and_programs_reach_the_session_and_the_start_screen(
     module = importlib.import_module("dbbstation.cli.station")
     seen: list[Any] = []
     monkeypatch.setattr(module, "_check_terminal", lambda: None)
-    monkeypatch.setattr(module, "_run", lambda job, _open: seen.append(job) or 0)
+    monkeypatch.setattr(module, "_run", lambda job, _open, _line: seen.append(job) or 0)
     monkeypatch.setattr(module, "_begin", lambda given, _limits, _model: seen.append(given) or 0)
     shipped = shipped_folder("protocols") / "plans" / "ten-minute-check.yaml"
     machine = shipped_folder("fixtures") / "machines" / "reference.yaml"

@@ -11,8 +11,8 @@ import numpy as np
 
 from dbbstation.diagnosis.discrepancy import Effects, discrepancy_of
 from dbbstation.diagnosis.parts import ALIKE, parts_of
+from dbbstation.inference.alternatives import EQUIVALENT
 from dbbstation.inference.channel import Law
-from dbbstation.inference.read_off import EQUIVALENT
 from dbbstation.sources.contract import Effect, LinearSource, Need
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.recordings import with_waves
+from dbbstation.inference.alternatives import SURE
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.curves import Clock, Spline
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import CURVES, Family, Pattern
-from dbbstation.inference.read_off import SURE
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:

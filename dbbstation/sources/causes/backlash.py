@@ -8,8 +8,6 @@ import numpy as np
 
 from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Texts, of_each_strut
 from dbbstation.sources.laws.play_ends import first_side
 
@@ -79,8 +77,7 @@ class Backlash(ErrorSource):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lag [mm] and its derivative by the width [mm/mm], shapes (n, 6)."""
         self.require(motion)
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        travel = inverse(machine.hexapod, frames).length_mm
+        travel = motion.struts(machine).length_mm
         lag, by_width = np.empty_like(travel), np.empty_like(travel)
         follow(travel, MM_PER_UM * np.abs(values), lag, by_width)
         return np.where(values < 0.0, -lag, lag), by_width

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import base_loads
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, stated_tensions
@@ -60,8 +58,7 @@ class BaseCompliance(LinearSource):
             ModelError: the machine file has no masses.
             KinematicsError: a pose where the struts cannot hold the platform.
         """
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        struts = inverse(machine.hexapod, frames)
+        frames, struts = motion.frames(machine), motion.struts(machine)
         force = base_loads(struts, stated_tensions(self.name, machine, frames, struts), machine.strut_masses)
         horizontal, vertical = np.diag([1.0, 1.0, 0.0]), np.diag([0.0, 0.0, 1.0])
         return Effect(base_joint_mm=MM_PER_N * np.stack([force @ horizontal, force @ vertical], axis=-1))

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import DOWN, GRAVITY_M_S2, Load, stretch_mm, strut_tensions
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.weights import for_such_struts, platform_masses, strut_compliance
@@ -66,8 +64,7 @@ class CogShift(LinearSource):
             KinematicsError: a pose where the struts cannot hold the platform.
         """
         weight = platform_masses(self.name, machine).platform_kg * GRAVITY_M_S2 * DOWN
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        struts = inverse(machine.hexapod, frames)
+        frames, struts = motion.frames(machine), motion.struts(machine)
         stretch, tensions = [], []
         for axis in range(3):
             moment = np.cross(frames.rotation[:, :, axis], weight)

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.causes.backlash import follow
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
@@ -141,8 +139,7 @@ class DriveFriction(ErrorSource):
         time_s, length, place = driven_in_time(motion, machine)
         load = motion.load_n
         if load is None:
-            frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-            load = stated_loads(self.name, machine, frames, machine.hexapod)
+            load = stated_loads(self.name, machine, motion.frames(machine), machine.hexapod)
         return load, directions(length)[place], speed_mm_s(time_s, length)[place]
 
 
@@ -162,7 +159,7 @@ def driven_directions(motion: Motion, machine: Machine) -> NDArray[np.float64]:
 
     Between -1 and 1, within TURNED_OVER_MM after a reversal, a reading says nothing of a drive's friction.
     """
-    return directions(strut_lengths(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation)))
+    return directions(motion.struts(machine).length_mm)
 
 
 def _by_motor(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import platform_weight, stretch_mm, strut_tensions
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.weights import MM_PER_N, platform_masses, strut_compliance
@@ -67,8 +65,7 @@ class Gravity(LinearSource):
             KinematicsError: a pose where the struts cannot hold the platform.
         """
         masses = platform_masses(self.name, machine)
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        struts = inverse(machine.hexapod, frames)
+        frames, struts = motion.frames(machine), motion.struts(machine)
         tension = strut_tensions(struts, platform_weight(frames, masses))
         unit = replace(strut_compliance(machine), at_1000mm_mm_per_n=MM_PER_N)
         return Effect(strut_mm=stretch_mm(struts, unit, tension)[:, :, None])

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import stretch_mm, strut_tensions, transverse_load
 from dbbstation.sources.causes.backlash import follow
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Need, Owner, Texts, of_each_strut
@@ -78,7 +76,7 @@ class JointFriction(LinearSource):
             KinematicsError: a pose where the struts cannot hold the platform.
         """
         self.require(motion)
-        struts = inverse(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+        struts = motion.struts(machine)
         drag = friction_drag(struts, outer_axes(machine.hexapod))
         by_joint = []
         for i in range(STRUTS):

@@ -8,7 +8,6 @@ import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.travel import middle
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
@@ -86,8 +85,8 @@ class JointRunout(LinearSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each strut answers to the offsets of its own two joints."""
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        unit, rest = inverse(machine.hexapod, frames).unit, inverse(machine.hexapod, middle(machine)).unit[0]
+        frames = motion.frames(machine)
+        unit, rest = motion.struts(machine).unit, inverse(machine.hexapod, middle(machine)).unit[0]
         across = _across(rest)
         in_platform = np.einsum("nji,nkj->nki", frames.rotation, unit)
         swings = [np.einsum("nki,kai->nka", seen - rest, across) for seen in (unit, in_platform)]

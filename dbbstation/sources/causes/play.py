@@ -8,8 +8,6 @@ import numpy as np
 
 from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensions, transverse_load, transverse_pull
 from dbbstation.sources.contract import (
     SMOOTH_MM,
@@ -110,8 +108,7 @@ class Play(ErrorSource):
         """Error of each strut [mm] and its derivative by the width [mm/mm], shapes (n, 6)."""
         self.require(motion)
         masses = platform_masses(self.name, machine)
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        struts = inverse(machine.hexapod, frames)
+        frames, struts = motion.frames(machine), motion.struts(machine)
         load = platform_weight(frames, masses)
         if machine.strut_masses is not None:
             load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))

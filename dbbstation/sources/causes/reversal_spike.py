@@ -8,8 +8,6 @@ import numpy as np
 
 from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import (
     SMOOTH_MM,
     Effect,
@@ -109,8 +107,7 @@ class ReversalSpike(ErrorSource):
             Rise -s a (1 - exp(-d / 2|a|)) [mm], its derivative by a [1], exp(-sqrt(d / l)) [1], its derivative by l [1/mm].
         """
         self.require(motion)
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        since = since_turning(strut_lengths(machine.hexapod, frames))
+        since = since_turning(motion.struts(machine).length_mm)
         way, sign = np.abs(since), np.sign(since)
         height, length = MM_PER_UM * values[:STRUTS], float(values[STRUTS])
         # What rises over no way has risen; a strut that has not turned has no sign, and no spike.

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 
 if TYPE_CHECKING:
@@ -75,7 +73,7 @@ class RunStart(ErrorSource):
     def _along(self, motion: Motion, machine: Machine) -> tuple[NDArray[np.float64], CubicSpline]:
         """Angle travelled at each row, shape (n,) [deg], and commanded strut lengths over it [mm]."""
         self.require(motion)
-        length = strut_lengths(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+        length = motion.struts(machine).length_mm
         from scipy.interpolate import CubicSpline  # noqa: PLC0415 - takes a third of a second; every command knows all sources
 
         standing = np.zeros(len(motion)), CubicSpline([0.0, 1.0], np.tile(length[:1], (2, 1)))

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.screws import screw_lead_mm
 
@@ -75,8 +73,7 @@ class ScrewCyclic(LinearSource):
         Raises:
             ModelError: the machine file has no screw lead.
         """
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        turned_rad = 2.0 * np.pi / screw_lead_mm(self.name, machine) * strut_lengths(machine.hexapod, frames)
+        turned_rad = 2.0 * np.pi / screw_lead_mm(self.name, machine) * motion.struts(machine).length_mm
         waves = np.stack([np.sin(turned_rad), np.cos(turned_rad)], axis=-1)
         own = waves[:, :, None, :] * np.eye(STRUTS)[:, :, None]
         return Effect(strut_mm=MM_PER_UM * own.reshape(len(motion), STRUTS, 2 * STRUTS))

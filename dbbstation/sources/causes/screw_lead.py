@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Texts, of_each_strut
 
 if TYPE_CHECKING:
@@ -51,8 +49,7 @@ class ScrewLead(LinearSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each strut answers to its own lead."""
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        travel = strut_lengths(machine.hexapod, frames) - _middle_mm(machine)
+        travel = motion.struts(machine).length_mm - _middle_mm(machine)
         return Effect(strut_mm=MM_PER_UM_M * travel[:, :, None] * np.eye(STRUTS))
 
 

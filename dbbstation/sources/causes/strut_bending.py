@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import DOWN
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 
@@ -62,6 +60,6 @@ class StrutBending(LinearSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Shortening of each strut."""
-        struts = inverse(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+        struts = motion.struts(machine)
         across_squared = 1.0 - (struts.unit @ DOWN) ** 2
         return Effect(strut_mm=-MM_PER_UM * (across_squared * (struts.length_mm / 1000.0) ** 5)[:, :, None])

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import StrutMasses
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import motor_loads, stretch_mm, strut_tensions, transverse_load, transverse_pull
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
@@ -79,8 +77,7 @@ class StrutWeight(LinearSource):
         Raises:
             KinematicsError: a pose where the struts cannot hold the platform.
         """
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        struts = inverse(machine.hexapod, frames)
+        struts = motion.struts(machine)
         lengths = replace(machine.strut_masses or USUAL, strut_kg=0.0, motor_kg=0.0, screw_kg=0.0)
         stretch, loads = [], []
         for part in _parts(machine):

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
 from dbbstation.sources.laws import by_temperature
 from dbbstation.sources.laws.by_temperature import MACHINE, STEEL_UM_M_K, FollowsTemperature
@@ -95,5 +93,4 @@ class _ByTemperature(FollowsTemperature, cause=ThermalStruts):
 
 def _per_growth_mm(motion: Motion, machine: Machine) -> NDArray[np.float64]:
     """Growth of every strut per µm/m, shape (n, 6) [mm]."""
-    frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-    return MM_PER_UM_M * inverse(machine.hexapod, frames).length_mm
+    return MM_PER_UM_M * motion.struts(machine).length_mm

@@ -8,7 +8,6 @@ import numpy as np
 
 from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.travel import middle
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter, Texts
 from dbbstation.sources.laws.screws import screw_lead_mm
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import JointAxes, Machine
+    from dbbstation.machine.kinematics import Struts
+    from dbbstation.machine.rotation import Frames
 
 ALONG = 0.05
 """Sine of the angle between a joint's axis and its strut below which the joint is locked, 3 degrees [1]."""
@@ -68,16 +69,17 @@ class UjointScrew(LinearSource):
             ModelError: the machine file has no joint axes, or one that lies along its strut.
         """
         axes = _axes(machine)
-        here = _second_axes(machine, axes, Frames.from_poses(motion.poses, machine.hexapod.rotation))
-        rest = _second_axes(machine, axes, middle(machine))
+        here = _second_axes(axes, motion.struts(machine), motion.frames(machine))
+        at_rest = middle(machine)
+        rest = _second_axes(axes, inverse(machine.hexapod, at_rest), at_rest)
         # Products of unit complex numbers: differences of angles that never jump by a turn.
         turned = np.angle(here * rest.conj())
         return Effect(strut_mm=(turned / (2.0 * np.pi))[:, :, None])
 
 
-def _second_axes(machine: Machine, axes: JointAxes, frames: Frames) -> NDArray[np.complex128]:
+def _second_axes(axes: JointAxes, struts: Struts, frames: Frames) -> NDArray[np.complex128]:
     """Angle psi of each strut as a complex number of length one, shape (n, 6)."""
-    unit = inverse(machine.hexapod, frames).unit
+    unit = struts.unit
     platform = np.einsum("nij,kj->nki", frames.rotation, axes.platform / _length(axes.platform))
     base = np.broadcast_to(axes.base / _length(axes.base), unit.shape)
     of_base, of_platform = np.cross(base, unit), np.cross(platform, unit)

@@ -6,9 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -33,7 +30,7 @@ def driven_in_time(
         shape (n,). Of rows at one time the last one holds.
     """
     time_s = np.asarray(motion.time_s)
-    length = strut_lengths(machine.hexapod, Frames.from_poses(motion.poses, machine.hexapod.rotation))
+    length = motion.struts(machine).length_mm
     later = np.diff(time_s) > SHORTEST_S
     return (
         time_s[np.append(later, True)],

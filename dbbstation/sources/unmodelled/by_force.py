@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.machine.statics import GRAVITY_M_S2, platform_weight, strut_tensions
 from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Owner, Parameter
 from dbbstation.sources.laws.weights import platform_masses
@@ -52,9 +50,8 @@ class UnexplainedByForce(LinearSource):
             KinematicsError: a pose where the struts cannot hold the platform.
         """
         points = _points_n(self.name, machine)
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        weight = platform_weight(frames, platform_masses(self.name, machine))
-        return piecewise_linear(points, strut_tensions(inverse(machine.hexapod, frames), weight))
+        weight = platform_weight(motion.frames(machine), platform_masses(self.name, machine))
+        return piecewise_linear(points, strut_tensions(motion.struts(machine), weight))
 
 
 def _points_n(name: str, machine: Machine) -> NDArray[np.float64]:

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import Effect, LinearSource, Motion, Owner, Parameter
 from dbbstation.sources.unmodelled.points import piecewise_linear, texts, values_at
 
@@ -43,8 +41,7 @@ class UnexplainedByLength(LinearSource):
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
         """Each strut answers to its own values on both sides of its length."""
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        return piecewise_linear(_points_mm(machine), strut_lengths(machine.hexapod, frames))
+        return piecewise_linear(_points_mm(machine), motion.struts(machine).length_mm)
 
 
 def _points_mm(machine: Machine) -> NDArray[np.float64]:

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.machine.kinematics import strut_lengths
-from dbbstation.machine.rotation import Frames
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Owner, Parameter
 from dbbstation.sources.unmodelled.points import MM_PER_UM, PLAUSIBLE_UM, TOLERANCE_UM, texts
 
@@ -74,7 +72,6 @@ def _waves(
     motion: Motion, machine: Machine, period_mm: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sine and cosine of each strut, shape (n, 6, 2), and the angle in them, shape (n, 6) [rad]; 0 for no period."""
-    frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-    travel = strut_lengths(machine.hexapod, frames) - sum(machine.travel.strut_mm) / 2.0
+    travel = motion.struts(machine).length_mm - sum(machine.travel.strut_mm) / 2.0
     turned_rad = 2.0 * np.pi * travel / np.where(period_mm == 0.0, np.inf, period_mm)
     return np.stack([np.sin(turned_rad), np.cos(turned_rad)], axis=-1), turned_rad

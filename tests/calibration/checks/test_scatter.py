@@ -56,6 +56,7 @@ def test_sizes_that_are_right_are_said_to_fit(machine):
         assert found == pytest.approx(stated_um, rel=0.1)
 
 
+@pytest.mark.slow
 def test_sizes_that_are_a_third_of_the_truth_are_found_out(machine):
     """Five mountings, of which the fit takes half for itself, show a factor of three mostly; ten show it always."""
     checks = [check_scatter(seats_of(calibration)) for calibration in sessions(machine, 1.0 / 3.0)]
@@ -64,6 +65,7 @@ def test_sizes_that_are_a_third_of_the_truth_are_found_out(machine):
     assert all(check.fits is False and check.low_um > check.stated_um for check in many)
 
 
+@pytest.mark.slow
 def test_the_squares_of_seats_are_chi_square(machine):
     """Mean of chi-square is its degrees of freedom, its variance twice that."""
     seats = [seat for calibration in sessions(machine, 1.0) for seat in seats_of(calibration)]

@@ -68,6 +68,7 @@ def test_centre_compensation_loses_the_six_rigid_motions(conv_a):
         assert conv_a.solution.covariance[column, column] == pytest.approx(0.0, abs=1e-20)
 
 
+@pytest.mark.slow
 def test_a_free_place_of_the_ball_is_centre_compensation(machine, truth):
     """The same circles, each with its least-squares centre taken out of measured and predicted lengths alike
     [CAL eq 6], fitted by a general solver: the same parameters to a small part of their uncertainty.

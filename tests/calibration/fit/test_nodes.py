@@ -34,6 +34,7 @@ def without_nodes(monkeypatch):
     monkeypatch.setattr(nodes, "LONG", 10**9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [(), ("gravity", "bar-drift")])
 def test_a_fit_through_nodes_is_that_of_all_samples(long_runs, monkeypatch, more):
     sources = sources_named((*USUAL, *more))

@@ -50,6 +50,7 @@ def test_lags_are_found_but_for_what_all_struts_share(clean):
     assert (sigma_ms < 0.02).all()
 
 
+@pytest.mark.slow
 def test_a_skew_is_found_by_the_machines_own_errors(clean):
     """Beside what the session has of its own: feed-in and feed-out are found to a sample's fraction only."""
     skew = known_sources()["time-skew"]

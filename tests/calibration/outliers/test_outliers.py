@@ -100,6 +100,7 @@ def test_two_badly_seated_holders_are_both_named(recorded, sound):
     assert pull(calibration, sound) < 2.5
 
 
+@pytest.mark.slow
 def test_a_wrong_cmm_row_is_wrong_in_every_mounting(recorded, tmp_path):
     """The same machine and plate measured twice; one row of the sheet is 30 µm off."""
     record(tmp_path / "again", seed=9, mechanisms=[RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)], rate_hz=20.0)

@@ -98,6 +98,7 @@ def test_without_friction_among_the_sources_the_mean_of_both_directions_is_predi
         assert one.predicted_um == pytest.approx(measured, rel=0.1, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_weight_that_is_a_fifth_too_large_predicts_the_same(tmp_path):
     """The compliance takes it up; without any weight the error says so."""
     folder = recorded_machine(tmp_path, 3, rubs=False)

@@ -1,0 +1,172 @@
+"""Causes that can stand for each other: those alike in all that was measured, and those of which one is there for sure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.hypotheses import Hypothesis, Posterior
+    from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
+
+SURE = 0.95
+"""Probability from which on something is said to be there."""
+
+EVEN = 0.5
+"""Probability from which on a cause that is not certain is rather there than not."""
+
+EQUIVALENT = 0.999
+"""Cosine between the effects of two causes, beside base and other causes, from which on nothing measured here tells one from the
+other, unless it is so large that even this decides: what is left of one beside the other is 4.5 % of it."""
+
+MOST_ALTERNATIVES = 6
+"""Causes that may stand for each other in one ambiguity, at the most; more explain nothing to anybody."""
+
+NEGLIGIBLE = 30.0
+"""Log odds against the best set of causes from which on a set counts for nothing, however many there are of them."""
+
+RIVALS = 3
+"""Causes in the place of each member that are laid out at their own best values before they are compared."""
+
+RANK = 1e-9
+"""Rank tolerance: share of the largest eigenvalue below which a direction says nothing."""
+
+
+class Alternatives:
+    """Classes of equivalent causes and ambiguities of a comparison.
+
+    Args:
+        comparison: of columns.
+        causes: that were compared.
+        posterior: over sets of them.
+        best: the set that is taken.
+        form_uncertainty: says of a member by how much its formula may be off, as a share of its effect.
+        of: members of the best set whose classes are wanted.
+
+    Attributes:
+        classes: by name of a member, causes whose effects nothing measured here tells from its own, itself first.
+        ambiguities: by name of a member that is not there for sure, causes of which one is, as `ambiguity` has them.
+    """
+
+    def __init__(
+        self,
+        comparison: ModelComparison,
+        causes: Sequence[Cause],
+        posterior: Posterior,
+        best: Hypothesis,
+        form_uncertainty: Callable[[Member], float],
+        of: Iterable[Member],
+    ) -> None:
+        self._comparison, self._causes, self._best = comparison, causes, best
+        self._form_uncertainty = form_uncertainty
+        self._inside, self._weights, self._place = _inclusions(posterior)
+        self.classes = {member.cause.name: self._class(member) for member in of}
+        self.ambiguities = {
+            name: self.ambiguity(name) for name, equal in self.classes.items() if self.probability(equal) < SURE
+        }
+
+    def probability(self, names: Iterable[str]) -> float:
+        """Probability that at least one of these causes is there."""
+        columns = [self._place[name] for name in names if name in self._place]
+        return float(self._weights @ self._inside[:, columns].any(axis=1)) if columns else 0.0
+
+    def class_with(self, name: str) -> tuple[str, ...]:
+        """Class that a cause belongs to; itself alone where there is none."""
+        return next((equal for equal in self.classes.values() if name in equal), (name,))
+
+    def ambiguity(self, name: str) -> tuple[str, ...]:
+        """Causes of which one is there for sure, if not this one, most probable first; none where there are none such."""
+        chosen = list(self.class_with(name))
+        own = self._inside[:, self._place[name]] if name in self._place else np.zeros(len(self._weights), dtype=bool)
+        both = (self._weights * own) @ self._inside
+        every = self._weights @ self._inside
+        # What is there beside it anyway is no alternative to it.
+        alone = {
+            other: float(every[k] - both[k])
+            for other, k in self._place.items()
+            if other not in chosen and both[k] < EVEN * self.probability((name,))
+        }
+        for other in sorted(alone, key=lambda n: -alone[n]):
+            if self.probability(chosen) >= SURE or len(chosen) > MOST_ALTERNATIVES:
+                break
+            chosen.append(other)
+        return tuple(other for other in chosen if other != name) if self.probability(chosen) >= SURE else ()
+
+    def _class(self, member: Member) -> tuple[str, ...]:
+        others = self._best.without(member.cause.name)
+        rivals = [c for c in self._causes if c.name not in self._best.names and not c.setup]
+        return (member.cause.name, *(c.name for c in rivals if self._is_alike(member, c, others)))
+
+    def _is_alike(self, member: Member, rival: Cause, others: tuple[Member, ...]) -> bool:
+        """Whether a cause in the place of a member does the same, in any of its forms of as many amplitudes."""
+        own = member.variant.columns
+        same = [v.columns for v in rival.variants if len(v.columns) == len(own)]
+        cosine = max((self._cosine(own, columns, others) for columns in same), default=0.0)
+        return cosine > EQUIVALENT and not self._is_decided(member, rival, others, cosine)
+
+    def _is_decided(self, member: Member, rival: Cause, others: tuple[Member, ...], cosine: float) -> bool:
+        """Whether what was measured decides between a member and a cause in its place: a thousandth of a very large effect is seen.
+
+        Nothing is decided by what the formulas themselves may be off by.
+        """
+        in_place = self._comparison.scan(others, [rival])
+        formulas = np.hypot(self._form_uncertainty(member), self._form_uncertainty(in_place.best[0]))
+        if np.sqrt(1.0 - cosine**2) <= formulas:
+            return False
+        return self._best.log_factor(member.cause.name) - float(in_place.log_factor[0]) > NEGLIGIBLE
+
+    def _cosine(self, one: NDArray[np.int64], other: NDArray[np.int64], others: tuple[Member, ...]) -> float:
+        """Least cosine between what two causes of as many amplitudes span beside base and others; 1: the same effects."""
+        products = self._comparison.beside(others, np.concatenate([one, other]))
+        size = len(one)
+        a, b, across = products[:size, :size], products[size:, size:], products[:size, size:]
+        cosines = np.linalg.svd(_inverse_root(a) @ across @ _inverse_root(b), compute_uv=False)
+        return float(min(cosines.min(), 1.0)) if len(cosines) else 0.0
+
+
+def in_place_of(name: str, comparison: ModelComparison, causes: Sequence[Cause], best: Hypothesis) -> list[Member]:
+    """Return the few causes that do best in the place of a member, and not much worse than it does.
+
+    Args:
+        name: of the member.
+        comparison: of columns.
+        causes: to choose from; those of the hypothesis are passed over.
+        best: hypothesis that the member is of.
+    """
+    scan = comparison.scan(best.without(name), [cause for cause in causes if cause.name not in best.names])
+    enough = max(0.5 * best.log_factor(name), 0.0)
+    return [scan.best[k] for k in np.argsort(-scan.log_factor)[:RIVALS] if scan.log_factor[k] > enough]
+
+
+def standing_out(products: NDArray[np.float64], plausible: NDArray[np.float64]) -> NDArray[np.float64]:
+    """By how many standard deviations combinations of plausible amplitudes stand out, least first, shape (p,).
+
+    Args:
+        products: of the columns of a cause beside others, each by the noise, shape (p, p).
+        plausible: sizes of its amplitudes, shape (p,).
+    """
+    return np.sqrt(np.maximum(np.linalg.eigvalsh(plausible[:, None] * products * plausible), 0.0))
+
+
+def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.float64], dict[str, int]]:
+    """Sets of causes that count, shape (s, c): which cause is in which; their probabilities, shape (s,); places of causes."""
+    top = max(posterior.weights.values())
+    sets = [(key, weight) for key, weight in posterior.weights.items() if weight > top - NEGLIGIBLE]
+    place = {name: k for k, name in enumerate(sorted(set().union(*(key for key, _ in sets))))}
+    inside = np.zeros((len(sets), len(place)), dtype=bool)
+    for row, (key, _) in enumerate(sets):
+        inside[row, [place[name] for name in key]] = True
+    weights = np.exp(np.array([weight for _, weight in sets]) - top)
+    return inside, weights / weights.sum(), place
+
+
+def _inverse_root(products: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse square root of products of columns; directions that are nothing are left out."""
+    value, axes = np.linalg.eigh(products)
+    usable = value > RANK * max(float(value[-1]), 1e-300)
+    return np.asarray((axes[:, usable] / np.sqrt(value[usable])) @ axes[:, usable].T, dtype=np.float64)

@@ -1,0 +1,159 @@
+"""An instrument that stays open while one after the other needs it: the checklist, the bar, the circles, what follows."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import StationError
+from dbbstation.instrument.driver import Instrument
+from dbbstation.service.patience import RECONNECT_S, driver_patience
+from dbbstation.service.reading_rate import ReadingRate
+from dbbstation.station.run_record import unrecorded
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from dbbstation.instrument.bytelog import ByteLog
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.station.events import Sample
+
+_TICK_S = 0.05
+"""Between looks at an instrument that nobody else reads: as often as a display can be read [s]."""
+
+AGAIN_S = 2.0
+"""An instrument that does not answer is opened again after so long [s]."""
+
+_KEPT = 4096
+"""Samples kept for whoever looks: more than a second of the quickest instrument, so that its rate can be told."""
+
+_JOIN_S = 10.0
+"""A serial line that hangs in the operating system is waited for so long [s]."""
+
+
+class HeldLine:
+    """Owns an instrument from the moment it is made until it is closed.
+
+    While nobody has borrowed the instrument its readings are only seen; what came before is not handed to a borrower.
+    An instrument that fails meanwhile is opened again, as often as it takes.
+
+    Args:
+        protocol: of the instrument.
+        port: name or URL.
+        baud: where the instrument is not set to the usual rate.
+        clock: what stamps the readings [s].
+        time_scale: how much faster than real time that goes.
+        log: where every byte is written down; the caller closes it.
+
+    Attributes:
+        protocol: as given.
+        latest: the last reading seen; None before one came, and while none comes.
+        failure: why none comes; None while all is well.
+        rate: of the readings seen.
+    """
+
+    def __init__(
+        self,
+        protocol: Protocol,
+        port: str,
+        baud: int | None = None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        time_scale: float = 1.0,
+        log: ByteLog | None = None,
+    ) -> None:
+        self.protocol = protocol
+        self.latest: Sample | None = None
+        self.failure: StationError | None = None
+        self.rate = ReadingRate()
+        self._port, self._baud = port, baud
+        self._instrument = Instrument(
+            protocol, port, baud=baud, clock=clock, log=log, reconnect_s=RECONNECT_S, **driver_patience(time_scale)
+        )
+        self._turn = threading.Lock()
+        self._seen: deque[Sample] = deque(maxlen=_KEPT)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"hold {port}", daemon=True)
+        self._thread.start()
+
+    def is_of(self, protocol: Protocol, port: str, baud: int | None) -> bool:
+        """Return whether it is this instrument at this port."""
+        return (protocol, port, baud) == (self.protocol, self._port, self._baud)
+
+    @contextmanager
+    def lent(self) -> Iterator[Instrument]:
+        """Give the started instrument to one borrower at a time; it stays open afterwards.
+
+        Raises:
+            InstrumentError: it cannot be opened.
+        """
+        with self._turn:
+            self._ready()
+            with suppress(StationError):  # a failure of this moment meets whoever reads
+                self._instrument.drain()
+            self._seen.clear()
+            yield self._instrument
+
+    def seen(self) -> tuple[Sample, ...]:
+        """Return what came since the last call while nobody had borrowed the instrument."""
+        came = []
+        with suppress(IndexError):
+            while True:
+                came.append(self._seen.popleft())
+        return tuple(came)
+
+    def close(self) -> None:
+        """Close the instrument, once its borrower has given it back."""
+        self._stop.set()
+        self._thread.join(_JOIN_S)
+
+    def _run(self) -> None:
+        while not self._stop.wait(_TICK_S):
+            with self._turn:
+                try:
+                    self._look()
+                except StationError as error:
+                    self.failure, self.latest = error, None
+                    self.rate.forget()
+            if self.failure is not None:
+                self._stop.wait(AGAIN_S)
+        with self._turn, suppress(StationError):
+            self._instrument.close()
+
+    def _look(self) -> None:
+        self._ready()
+        samples = [unrecorded(reading) for reading in self._instrument.drain()]
+        if samples:
+            self.failure, self.latest = None, samples[-1]
+            self.rate.add(samples)
+            self._seen.extend(samples)
+
+    def _ready(self) -> None:
+        """Open the instrument where it is not open, and again where it failed."""
+        if not self._instrument.reading:
+            with suppress(StationError):
+                self._instrument.close()
+            self._instrument.start()
+
+
+class HeldOpen:
+    """The instrument that is held open: one at most."""
+
+    def __init__(self) -> None:
+        self._line: HeldLine | None = None
+
+    def line(self, protocol: Protocol, port: str, baud: int | None) -> HeldLine:
+        """Return the instrument; another one that was held open is closed before."""
+        if self._line is None or not self._line.is_of(protocol, port, baud):
+            self.release()
+            self._line = HeldLine(protocol, port, baud)
+        return self._line
+
+    def release(self) -> None:
+        """Close the instrument, where one is held open."""
+        line, self._line = self._line, None
+        if line is not None:
+            line.close()

@@ -1,0 +1,61 @@
+"""Causes of which one is there for sure: against sums over all sets of causes, one by one."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
+from dbbstation.inference.hypotheses import Hypothesis, Posterior
+
+NAMES = "abcdef"
+
+
+def posterior_of(probabilities: dict[str, float]) -> Posterior:
+    """Over sets of one-letter names, such as "ab"."""
+    weights = {frozenset(names): float(np.log(p)) for names, p in probabilities.items()}
+    return Posterior((Hypothesis((), 0.0),), weights)
+
+
+def alternatives(posterior: Posterior) -> Alternatives:
+    return Alternatives(None, (), posterior, posterior.best, lambda _member: 0.0, ())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_probabilities_are_sums_over_sets(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    sets = ["".join(chosen) for size in range(4) for chosen in combinations(NAMES, size)]
+    drawn = rng.dirichlet(np.full(len(sets), 0.1))
+    posterior = posterior_of({names: p for names, p in zip(sets, drawn, strict=True) if p > 0.0})
+    found = alternatives(posterior)
+    for wanted in ("a", "bc", "adf", NAMES):
+        exact = sum(p for names, p in zip(sets, drawn, strict=True) if set(names) & set(wanted))
+        # Sets with less than e^-30 of the best count for nothing.
+        assert found.probability(wanted) == pytest.approx(exact, abs=1e-9)
+        assert posterior.probability(wanted) == pytest.approx(exact, abs=1e-9)
+    for name in NAMES:
+        others = found.ambiguity(name)
+        if others:
+            assert name not in others
+            assert found.probability((name, *others)) >= SURE
+            # Without the last of them it would not be sure.
+            assert found.probability((name, *others[:-1])) < SURE
+
+
+def test_one_of_two_is_there_and_what_is_beside_them_is_no_alternative() -> None:
+    found = alternatives(posterior_of({"ac": 0.6, "bc": 0.38, "c": 0.02}))
+    assert found.ambiguity("a") == ("b",)
+    assert found.ambiguity("b") == ("a",)
+    assert found.probability("c") > EVEN
+
+
+def test_nothing_is_made_sure_by_what_is_not_there() -> None:
+    found = alternatives(posterior_of({"a": 0.5, "": 0.4, "b": 0.1}))
+    assert found.ambiguity("a") == ()
+
+
+def test_combinations_stand_out_by_their_eigenvalues() -> None:
+    products = np.array([[4.0, 0.0], [0.0, 9.0]])
+    assert standing_out(products, np.array([10.0, 1.0])) == pytest.approx([3.0, 20.0])

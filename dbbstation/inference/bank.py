@@ -191,20 +191,24 @@ class Bank:
         return -len(target) * float(np.log(innovation)) - uneven - squares - float(np.log(seen).sum())
 
     def _spread_of(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Spread of each kept row that makes whitened rows most probable: a constant part, and those that grow as the channel says."""
-        grows = self.channel.grows
-        if grows is None:
+        """Spread of each kept row that makes whitened rows most probable: a constant part, those known, and those that grow."""
+        grows, known = self.channel.grows, self.channel.known_noise
+        if grows is None and known is None:
             return self.spread
-        squares = np.square(grows[self.channel.kept].reshape(len(left), -1))
+        kept = self.channel.kept
+        squares = np.zeros((len(left), 0)) if grows is None else np.square(grows[kept].reshape(len(left), -1))
         squares = squares / np.maximum(np.mean(squares, axis=0), 1e-300)
+        even = 1.0 + (
+            0.0 if known is None else np.square(known[kept] / (self.noise.innovation * float(self.spread.min())))
+        )
         powers = np.square(left * self.spread)
         every = np.array(list(product(GROWN, repeat=squares.shape[1])))
         costs = []
         for parts in every:
-            tried = 1.0 + squares @ np.square(parts)
+            tried = even + squares @ np.square(parts)
             costs.append(0.5 * np.sum(np.log(tried)) + 0.5 * len(left) * np.log(np.mean(powers / tried)))
         parameters = np.count_nonzero(every, axis=1)  # [Schwarz 1978]
-        best = 1.0 + squares @ np.square(every[int(np.argmin(costs + 0.5 * np.log(len(left)) * parameters))])
+        best = even + squares @ np.square(every[int(np.argmin(costs + 0.5 * np.log(len(left)) * parameters))])
         return np.asarray(np.sqrt(best / np.mean(best)))
 
     def _colour_of(
@@ -393,7 +397,7 @@ def alike(one: Coloured, other: Coloured) -> bool:
 GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 """Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
 
-NOISE_ROUNDS = 5
+NOISE_ROUNDS = 8
 """Times that the noise is measured, each time beside what the last level lets in."""
 
 TIE = 1e-3

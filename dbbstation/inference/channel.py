@@ -129,6 +129,8 @@ class Channel:
             sec. 6.4.9.4]; None: its estimate is taken, for which half of that is as good.
         grows: size of what a part of the noise may be in proportion to, beside a constant part, shape (n,); None: noise is the same
             in all rows.
+        known_noise: standard deviation of noise that a row is known to have beyond that of the others, in the unit of the residual,
+            shape (n,); None: no row is known to have more.
         clock: of all rows, where some were left out or where they show a step by and by; None: they show it at once.
         direction: of travel as the rows show it, shape (n,); None: nothing is looked for in time that turns with it.
     """
@@ -149,6 +151,7 @@ class Channel:
     least_noise: float = 0.0
     surely: float | None = None
     grows: NDArray[np.float64] | None = None
+    known_noise: NDArray[np.float64] | None = None
     clock: Clock | None = None
     direction: NDArray[np.float64] | None = None
 

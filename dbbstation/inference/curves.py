@@ -22,17 +22,19 @@ CUBIC = 3
 class Spline(Form):
     """Any smooth curve: a cubic spline of so many functions over a range; outside it goes on as at its end.
 
-    The functions add up to one [de Boor, A Practical Guide to Splines, rev. ed., ch. IX, eq. 36].
+    The functions add up to one [de Boor, A Practical Guide to Splines, rev. ed., ch. IX, eq. 36]. Without the last of them (`falls`) a
+    curve falls to zero at the upper end.
     """
 
     low: float
     high: float
     functions: int = 7
+    falls: bool = False
 
     @property
     def count(self) -> int:
         """One amplitude per function."""
-        return self.functions
+        return self.functions - self.falls
 
     def columns(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """B-splines at the values, shape (..., p)."""
@@ -40,7 +42,7 @@ class Spline(Form):
         knots = np.concatenate([np.zeros(CUBIC), inner, np.ones(CUBIC)])
         share = np.clip((np.asarray(values, dtype=np.float64) - self.low) / (self.high - self.low), 0.0, 1.0)
         flat = BSpline.design_matrix(share.ravel(), knots, CUBIC).toarray()
-        return np.asarray(flat.reshape(*share.shape, self.functions), dtype=np.float64)
+        return np.asarray(flat.reshape(*share.shape, self.functions)[..., : self.count], dtype=np.float64)
 
     def points(self, low: float, high: float) -> NDArray[np.float64]:
         """Three for each function."""

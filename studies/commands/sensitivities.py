@@ -56,7 +56,7 @@ def sensitivities(
     Examples:
       dbbstation study sensitivities drive.csv
       dbbstation study sensitivities --pair before after --jobs 1
-      dbbstation study sensitivities drive.csv --only APART --only REACH
+      dbbstation study sensitivities drive.csv --only APART --only LEAST_SHARE
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import count_bar

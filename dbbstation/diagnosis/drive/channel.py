@@ -42,6 +42,10 @@ WAVE_STEP = 0.25
 TIGHT, LOOPS = 28, 14
 """Functions of a curve over the position, and by direction of travel: tight spots and loops of friction turn sharper than others."""
 
+NEAR_STANDSTILL = 0.28
+"""Share of the greatest speed below which friction may be anything that follows the speed, the greatest Stribeck speed that is tried:
+a curve of low speed has its rivals there, and above it Coulomb and viscous friction are what they are."""
+
 MOST_WAVES = 4000
 STRONGEST = 6
 """Waves that the comparison looks at."""
@@ -116,6 +120,7 @@ def drive_channel(
         static=curves,
         surely=SURE,
         grows=np.abs(recordings.motion[:, 0]),
+        known_noise=recordings.edge_noise_n,
         clock=Clock(recordings.time_s / recordings.samples_apart_s, recordings.step_response),
         direction=recordings.compared(lambda s: s.direction),
     )
@@ -125,11 +130,16 @@ def drive_channel(
 def _beyond(straight: NDArray[np.float64], patterns: Iterator[Pattern]) -> Iterator[Pattern]:
     """Curves less what base and causes of one number do: these are not displaced by a curve that contains them.
 
+    A curve near standstill stays as it is. Less its share of Coulomb and viscous friction it would reach up to the greatest speed.
+
     A spot on the travel is another matter: it is no sum of a load, a spring and the rest of a curve. Over the position the whole
     curve, without a name, is therefore a hypothesis beside a name with the rest of it.
     """
     axes = _axes(straight)
     for pattern in patterns:
+        if isinstance(pattern.form, Spline) and pattern.form.falls:
+            yield pattern  # zero at speed, where causes of one number are known by
+            continue
         samples = pattern.samples - axes @ (axes.T @ pattern.samples)
         norms = np.linalg.norm(samples, axis=0)
         if norms.max(initial=0.0) <= SAME * np.linalg.norm(pattern.samples):
@@ -228,14 +238,33 @@ def _curves(recordings: Recordings) -> Iterator[Pattern]:
     for name, unit, kind, values, factor in every:
         functions = LOOPS if factor is not None else TIGHT if name == "position" else CURVES
         variable = Variable(name, unit, kind, recordings.at(values))
-        if variable.extent <= 0.0:
-            continue
-        spline = Spline(variable.low, variable.high, functions)
+        if variable.extent > 0.0:
+            spline = Spline(variable.low, variable.high, functions)
+            yield from _curve_over(recordings, variable, spline, values, factor)
+    slowest, slow = max(s.standing_m_s for s in recordings.signals), NEAR_STANDSTILL * scale.speed_m_s
 
-        samples = recordings.compared(partial(_curve, spline=spline, values=values, factor=factor))
-        norms = np.linalg.norm(samples, axis=0)
-        samples = samples[:, norms > SAME * norms.max()]
-        yield Pattern(Family.CURVE if factor is None else Family.BY_DIRECTION, (variable,), samples, spline)
+    def low_speed(signals: Signals) -> NDArray[np.float64]:
+        return np.log(np.clip(np.abs(signals.speed_m_s), slowest, max(slow, slowest)))
+
+    variable = Variable("log speed", "", Kind.ANY, recordings.at(low_speed))
+    if slowest < slow and variable.extent > 0.0:
+        spline = Spline(float(np.log(slowest)), float(np.log(slow)), CURVES, falls=True)
+        yield from _curve_over(recordings, variable, spline, low_speed, way)
+
+
+def _curve_over(
+    recordings: Recordings,
+    variable: Variable,
+    spline: Spline,
+    values: Callable[[Signals], NDArray[np.float64]],
+    factor: Callable[[Signals], NDArray[np.float64]] | None,
+) -> Iterator[Pattern]:
+    """A curve over a variable, with those of its functions that the recordings show; none where they show none."""
+    samples = recordings.compared(partial(_curve, spline=spline, values=values, factor=factor))
+    norms = np.linalg.norm(samples, axis=0)
+    seen = samples[:, norms > SAME * norms.max()]
+    if seen.shape[1]:
+        yield Pattern(Family.CURVE if factor is None else Family.BY_DIRECTION, (variable,), seen, spline)
 
 
 def _curve(

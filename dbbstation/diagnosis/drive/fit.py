@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import log_ndtr
 
-from dbbstation.diagnosis.drive.channel import BASE_UNITS
+from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.inference.settle import moved
 from dbbstation.inference.verdict import Value
 
@@ -219,7 +219,11 @@ def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[s
     found = {}
     for name, value in best.base.items():
         between = sum(p * (base[name].value - value.value) ** 2 for p, base in fits)
-        sigma = float(np.sqrt(value.uncertainty**2 + between + (METHOD_U_SHARE * value.value) ** 2))
+        # A force that is the mean over as long as the differences loses what they lose, one at an instant nothing; which it is, or
+        # what lies between, no recording says [rectangular distribution: JCGM 100:2008, sec. 4.3.7].
+        lost = drive.recordings.lost_share / np.sqrt(3.0) if name == MASS else 0.0
+        share = np.hypot(METHOD_U_SHARE, lost)
+        sigma = float(np.sqrt(value.uncertainty**2 + between + (share * value.value) ** 2))
         found[name] = Value(value.value, sigma, value.unit)
     return found
 

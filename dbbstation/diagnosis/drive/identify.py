@@ -240,7 +240,8 @@ def _curve(explained: Explained) -> Curve:
     speeds = recordings.at(lambda s: s.speed_m_s)
     low, high = float(speeds.min()), float(speeds.max())
     speed = np.linspace(low, high, CURVE_POINTS)
-    speed = np.unique(np.concatenate([speed, [-NEAR_ZERO * scale.speed_m_s, NEAR_ZERO * scale.speed_m_s]]))
+    nearest = NEAR_ZERO * scale.speed_m_s
+    speed = np.unique(np.concatenate([speed[np.abs(speed) > nearest], [-nearest, nearest]]))
     speed = speed[(speed >= low) & (speed <= high)]
     still = np.zeros_like(speed)
     middle = np.full_like(speed, 0.5 * (scale.low_m + scale.high_m))

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.contract import Scale
-from dbbstation.diagnosis.drive.signals import EDGE_PERIODS, derivatives, signals_of
+from dbbstation.diagnosis.drive.moving import impulse_response
+from dbbstation.diagnosis.drive.signals import acceleration_over_two, derivatives, signals_of
 from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
@@ -72,6 +73,26 @@ class Recordings:
         return self.compared(lambda s: np.column_stack(derivatives(s.measured_m, s.rate_hz)[::-1]))
 
     @cached_property
+    def lost_share(self) -> float:
+        """Share of the acceleration that its differences over one sample lose, from what they lose over two.
+
+        With h the time of a sample and w the angular frequency, they lose (w h)²/12 and (2 w h)²/12.
+        """
+        over_one = self.motion[:, 0]
+        over_two = self.compared(lambda s: acceleration_over_two(s.measured_m, s.rate_hz))
+        return max(float(over_one @ (over_one - over_two)) / 3.0 / max(float(over_one @ over_one), 1e-300), 0.0)
+
+    @cached_property
+    def edge_noise_n(self) -> NDArray[np.float64]:
+        """Noise of the force of a sample beyond that of the others, where it is a mean over less than the whole band, shape (m,) [N].
+
+        It is that of the acceleration times the mass, as mass and friction alone find it: its size matters, not its digits.
+        """
+        direction = self.compared(lambda s: s.direction)
+        mass = np.linalg.lstsq(np.column_stack([self.motion, direction]), self.force_n, rcond=None)[0][0]
+        return np.asarray(abs(float(mass)) * np.concatenate([one.edge_noise_m_s2 for one in self.signals]))
+
+    @cached_property
     def time_s(self) -> NDArray[np.float64]:
         """Time, later recordings behind earlier ones, shape (m,) [s]."""
         found, end = [], 0.0
@@ -108,10 +129,8 @@ class Recordings:
     @cached_property
     def _response(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         one = self.signals[0]
-        reach = int(np.ceil(EDGE_PERIODS * one.rate_hz / one.cutoff_hz))
-        at = np.arange(-2 * reach, 2 * reach + 1)
-        seen = replace(one, kept=np.arange(reach, 3 * reach + 1)).compared((at >= 0).astype(np.float64))
-        return at[reach : 3 * reach + 1] / one.rate_hz, seen
+        step = np.cumsum(impulse_response(one.rate_hz, one.cutoff_hz))
+        return (np.arange(len(step)) - len(step) // 2) / one.rate_hz, step
 
     @property
     def notes(self) -> list[str]:

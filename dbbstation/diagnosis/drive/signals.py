@@ -5,6 +5,10 @@ The standard practice of inverse dynamic identification by least squares: positi
 the model then pass one and the same second low-pass and are decimated together. Here the force passes the position's
 low-pass too: all filters then change both sides alike, and starts and stops that reach beyond the band do no harm. [Gautier, Dynamic identification of robots with power model, ICRA 1997; Janot, Vandanjon and Gautier, A generic
 instrumental variable approach for industrial robot identification, IEEE TCST 22 (2014), sec. II-C]
+
+Friction does not follow the band: it turns over at once where the speed does. Speed is therefore read at the full rate over as few
+samples as its noise allows, and what is computed from it is weighted before the low-pass: samples whose speed was read from a
+standing drive have no weight, those of a force channel that is stuck neither.
 """
 
 from __future__ import annotations
@@ -15,8 +19,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import label
-from scipy.signal import butter, sosfiltfilt, welch
+from scipy.signal import butter, savgol_filter, sosfiltfilt, welch
 
+from dbbstation.diagnosis.drive.moving import (
+    EDGE_PERIODS,
+    ORDER,
+    POSITION_BAND,
+    edge_noise_m_s2,
+    half_window,
+    low_passed,
+    rise_of_weights,
+    speed_noise_m_s,
+    weights,
+    within,
+)
 from dbbstation.diagnosis.drive.sampling import evenly_sampled
 from dbbstation.diagnosis.drive.stuck import stuck_samples
 from dbbstation.errors import CalibrationError
@@ -26,17 +42,8 @@ if TYPE_CHECKING:
 
     from dbbstation.trace.drive_recording import DriveRecording
 
-ORDER = 4
-"""Of the Butterworth filters; twice that after both passes."""
-
-POSITION_BAND = 2.0
-"""Cut-off of the position's filter over that of the comparison: it must be flat where force and model are compared."""
-
 PER_CUTOFF = 2.5
 """Samples that are kept per period of the cut-off."""
-
-EDGE_PERIODS = 3.0
-"""Periods of the cut-off that are left out at both ends, where the filters had to invent samples."""
 
 WIDEST = 1 / 20
 """Widest band that is chosen, of the sampling rate: the differences lose a hundredth of the acceleration there."""
@@ -49,14 +56,18 @@ NOISE_SHARE = 0.03
 small by the square of this, a thousandth."""
 
 MOVING_SHARE = 0.005
-"""Speed, of the greatest, below which the drive counts as standing: friction has no known value there."""
+"""Speed, of the greatest, below which the drive counts as standing: friction has no known value there. Noise of the speed is kept
+below a third of it, or it is raised to three times that noise."""
+
+SURE_SIGMA = 3.0
+"""Standard deviations of its noise by which a speed that counts is above zero: one sample in 700 of a standing drive moves by chance."""
 
 ACCELERATING_SHARE = 0.1
 """Acceleration, of the greatest, above which the drive counts as accelerating."""
 
-REACH = 2
-"""Samples of the comparison beside a standstill that are left out: there a step of the force, such as friction that turns over,
-has come within 2 % of its end in the band; one sample earlier it is off by 6 %."""
+LEAST_SHARE = 0.5
+"""Share of the band about a sample that has weight, from which on it is compared: below it the mean is of less than half, and noise of
+the force is more than half as large again."""
 
 SLOW_HZ = 5.0
 """Band that strokes of a second need, for friction if not for the mass: slow recordings get up to it."""
@@ -76,13 +87,16 @@ class Signals:
     Attributes:
         t_s: shape (n,) [s].
         measured_m: position as measured [m].
-        position_m: low-passed [m].
-        speed_m_s: its central difference [m/s].
-        acceleration_m_s2: its second difference [m/s²].
+        position_m: of a parabola through as few samples as the noise of the speed allows [m].
+        speed_m_s: its slope [m/s].
+        acceleration_m_s2: second difference of the low-passed position [m/s²].
         force_n: as measured [N].
         rate_hz: samples per second.
         cutoff_hz: of the band in which force and model are compared.
         acceleration_noise_m_s2: root mean square that the position's noise alone puts into the acceleration there.
+        position_noise_m: standard deviation of the measured position [m].
+        standing_m_s: speed below which the drive counts as standing [m/s].
+        weight: of every sample, zero where nothing is known of its force, shape (n,).
         kept: indices of the samples that are compared, shape (m,).
         notes: what was done to the recording, sentences.
     """
@@ -96,14 +110,27 @@ class Signals:
     rate_hz: float
     cutoff_hz: float
     acceleration_noise_m_s2: float
+    position_noise_m: float
+    standing_m_s: float
+    weight: NDArray[np.float64]
     kept: NDArray[np.int64]
     notes: tuple[str, ...]
 
     def compared(self, columns: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Pass columns at the full rate, shape (n,) or (n, p), through both low-passes; keep the samples compared."""
-        bands = (self.cutoff_hz, POSITION_BAND * self.cutoff_hz)
-        sos = np.vstack([butter(ORDER, band, fs=self.rate_hz, output="sos") for band in bands])
-        return np.ascontiguousarray(sosfiltfilt(sos, columns, axis=0)[self.kept])
+        """Means in the band of columns at the full rate, shape (n,) or (n, p), over what has weight about each sample compared."""
+        weight, share = (self.weight, self.share) if columns.ndim == 1 else (self.weight[:, None], self.share[:, None])
+        found = low_passed(weight * columns, self.rate_hz, self.cutoff_hz)[self.kept]
+        return np.ascontiguousarray(found / share)
+
+    @cached_property
+    def share(self) -> NDArray[np.float64]:
+        """Share of the band about each sample compared that has weight, shape (m,)."""
+        return low_passed(self.weight, self.rate_hz, self.cutoff_hz)[self.kept]
+
+    @cached_property
+    def edge_noise_m_s2(self) -> NDArray[np.float64]:
+        """Noise in the acceleration of each sample compared beyond that of the others, shape (m,) [m/s²]."""
+        return edge_noise_m_s2(self.weight, self.kept, self.position_noise_m, self.rate_hz, self.cutoff_hz)
 
     @cached_property
     def direction(self) -> NDArray[np.float64]:
@@ -128,7 +155,7 @@ class Signals:
 
     @cached_property
     def turns(self) -> NDArray[np.bool_]:
-        """Where the drive starts, stops or reverses, as far as the filters reach, shape (n,).
+        """Where the drive starts, stops or reverses, and half a period of the band to either side, shape (n,).
 
         What it accelerates by on its way is none: a force from elsewhere does that, too.
         """
@@ -136,12 +163,7 @@ class Signals:
         changing = (self.direction == 0.0) | (acceleration > ACCELERATING_SHARE * acceleration.max())
         stretch, _ = label(changing)
         stands = np.unique(stretch[self.direction == 0.0])
-        return _widened(np.isin(stretch, stands[stands > 0]), int(REACH * self.rate_hz / (PER_CUTOFF * self.cutoff_hz)))
-
-    @cached_property
-    def standing_m_s(self) -> float:
-        """Speed below which the drive counts as standing [m/s]."""
-        return MOVING_SHARE * float(np.abs(self.speed_m_s).max())
+        return within(np.isin(stretch, stands[stands > 0]), int(0.5 * self.rate_hz / self.cutoff_hz))
 
 
 def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Signals:
@@ -177,18 +199,25 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
             where=recording.name,
             remedy="record for longer, ten strokes to and fro at several speeds, or give a higher --cutoff-hz",
         )
-    smooth = sosfiltfilt(butter(ORDER, POSITION_BAND * cutoff, fs=rate, output="sos"), position)
-    speed, acceleration = derivatives(smooth, rate)
     step = max(int(rate / (PER_CUTOFF * cutoff)), 1)
-    # A standing drive spoils samples as far as the filter of the comparison reaches, a stuck force, whose error knows no
-    # bounds, as far as it rings.
-    standing = np.abs(speed) <= MOVING_SHARE * np.abs(speed).max()
+    smooth = sosfiltfilt(butter(ORDER, POSITION_BAND * cutoff, fs=rate, output="sos"), position)
+    slow, acceleration = derivatives(smooth, rate)
+    # White noise of a power per hertz, up to half of the sampling rate.
+    noise_m, standing_m_s = float(np.sqrt(0.5 * floor * rate)), MOVING_SHARE * float(np.abs(slow).max())
+    half = half_window(noise_m, rate, standing_m_s / SURE_SIGMA, max(step // 2, 1))
+    standing_m_s = max(standing_m_s, SURE_SIGMA * speed_noise_m_s(noise_m, rate, half))
+    place, speed = (savgol_filter(position, 2 * half + 1, 2, deriv=k, delta=1.0 / rate) for k in (0, 1))
+    standing = np.abs(speed) <= standing_m_s
     stuck, stuck_notes = stuck_samples(even.force_n, even.t_s, ~standing, recording.name)
     notes += [*stuck_notes, *_rests(standing, even.force_n, rate, step)]
-    standing[1:] |= speed[1:] * speed[:-1] < 0.0  # a quick reversal passes through standstill between two samples
-    usable = ~(_widened(standing, REACH * step) | _widened(stuck, edge))
+    turned = speed[1:] * speed[:-1] < 0.0  # a quick reversal passes through standstill between two samples
+    standing[1:] |= turned
+    standing[:-1] |= turned
+    # As far as the speed was read from a standing drive its size and sign are not those of one that moves.
+    allowed = NOISE_SHARE * float(np.sqrt(np.mean(acceleration**2)))
+    weight = weights(within(standing, half) | stuck, rise_of_weights(noise_m, rate, cutoff, allowed, step))
     kept = np.arange(edge, len(position) - edge, step)
-    kept = kept[usable[kept]]
+    kept = kept[low_passed(weight, rate, cutoff)[kept] >= LEAST_SHARE]
     if len(kept) < FEWEST:
         raise CalibrationError(
             f"only {len(kept)} samples in the band show a moving drive",
@@ -198,13 +227,16 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     return Signals(
         t_s=even.t_s,
         measured_m=position,
-        position_m=smooth,
+        position_m=place,
         speed_m_s=speed,
         acceleration_m_s2=acceleration,
         force_n=even.force_n,
         rate_hz=rate,
         cutoff_hz=cutoff,
         acceleration_noise_m_s2=float(np.sqrt(_acceleration_noise(floor, cutoff))),
+        position_noise_m=noise_m,
+        standing_m_s=standing_m_s,
+        weight=weight,
         kept=kept,
         notes=tuple(notes),
     )
@@ -236,11 +268,11 @@ def derivatives(position_m: NDArray[np.float64], rate_hz: float) -> tuple[NDArra
     return np.gradient(position_m, 1.0 / rate_hz), acceleration
 
 
-def _widened(marked: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
-    """Samples no farther than `by` from a marked one, shape (n,)."""
-    count = np.concatenate([[0], np.cumsum(marked)])
-    at = np.arange(len(marked))
-    return np.asarray(count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)])
+def acceleration_over_two(position_m: NDArray[np.float64], rate_hz: float) -> NDArray[np.float64]:
+    """Acceleration [m/s²] by central differences over two samples to either side, shape (n,); zero at both ends."""
+    found = np.zeros_like(position_m)
+    found[2:-2] = (position_m[4:] - 2.0 * position_m[2:-2] + position_m[:-4]) * (0.5 * rate_hz) ** 2
+    return found
 
 
 def _noise_floor(position_m: NDArray[np.float64], rate_hz: float) -> float:

@@ -93,14 +93,27 @@ def test_at_one_speed_coulomb_friction_is_not_ruled_out(recorded):
 
 
 def test_friction_at_32_speeds(recorded):
+    """The force that its authors read at each of the speeds, half the difference of both directions, against the law that is named.
+
+    A line alone through them is 9.1 N and 231 N·s/m and 0.4 N off; with Stribeck friction 0.1 N off: 7.35 N, 570 N·s/m, and 2.7 N that
+    decay over 1.5 mm/s.
+    """
     summary = answered(recorded("drives/lead-screw-32-speeds.csv"))
     found = sources(summary)
     assert found["coulomb-friction"]["verdict"] == "identified"
-    number = found["coulomb-friction"]["parameters"]["coulomb_n"]
-    assert abs(number["value"] - 9.1) < 3.0 * number["uncertainty"]
-    viscous = summary["parameters"]["viscous_n_s_m"]
-    assert not viscous["identifiable"] or abs(viscous["value"] - 231.0) < 3.0 * viscous["uncertainty"]
-    assert found["stribeck-friction"]["verdict"] != "ruled-out"
+    stribeck = found["stribeck-friction"]
+    assert stribeck["verdict"] in {"identified", "ambiguous"}
+    rpm, force = np.loadtxt(recorded("drives/lead-screw-friction-map.csv"), delimiter=",", skiprows=1).T
+    speed = np.abs(rpm[rpm > 0.0]) * 2e-3 / 60.0
+    read = 0.5 * (force[rpm > 0.0] - force[rpm < 0.0][::-1])
+    law = found["coulomb-friction"]["parameters"]["coulomb_n"]["value"]
+    law = law + summary["parameters"]["viscous_n_s_m"]["value"] * speed
+    excess, decay = (stribeck["parameters"][name]["value"] for name in ("static_excess_n", "stribeck_speed_m_s"))
+    law = law + excess * np.exp(-speed / decay)
+    assert np.sqrt(np.mean((law - read) ** 2)) < 0.25
+    assert abs(excess - 2.7) < 3.0 * stribeck["parameters"]["static_excess_n"]["uncertainty"]
+    # What is no pulse is not said to be one for tens of seconds.
+    assert all(part["t_s"][1] - part["t_s"][0] < 2.0 for part in found["transient-force"]["parts"])
 
 
 def test_a_motor_to_and_fro(recorded):
@@ -118,7 +131,10 @@ def test_a_motor_to_and_fro(recorded):
     assert not viscous["identifiable"] or abs(viscous["value"] - 1.2) < 3.0 * viscous["uncertainty"]
     if coulomb["verdict"] == "identified":
         number = coulomb["parameters"]["coulomb_n"]
-        assert abs(number["value"] - 0.81) < 3.0 * number["uncertainty"]
+        # Where viscous friction is left out as impossible, this is the friction at the speeds that it travels at, up to 0.26 m/s.
+        viscous_n = 1.2 * 0.26 if viscous["value"] is None else 0.0
+        reach = 3.0 * number["uncertainty"]
+        assert 0.81 - reach < number["value"] < 0.81 + viscous_n + reach
 
 
 def test_a_damper_with_play_is_not_taken_for_a_wrong_sign(recorded):

@@ -7,8 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from dbbstation.diagnosis.drive.pulses import Edges
-from dbbstation.diagnosis.drive.recordings import recordings_of
-from dbbstation.diagnosis.drive.signals import REACH, signals_of
+from dbbstation.diagnosis.drive.signals import signals_of
 from dbbstation.trace.drive_recording import DriveRecording
 from tests.diagnosis.drive.plant import Truth, record, to_and_fro
 
@@ -41,10 +40,3 @@ def test_turns_are_starts_stops_and_reversals_and_no_push_on_the_way():
     assert signals.turns[highest - 50 : highest + 50].all()
     assert not signals.turns[(seconds > 4.7) & (seconds < 5.4)].any()
     assert 0.05 < signals.turns.mean() < 0.25
-
-
-def test_friction_that_turns_over_is_past_where_samples_beside_a_standstill_are_compared():
-    recordings = recordings_of([DriveRecording("to and fro", *record(Truth(coulomb=20.0), to_and_fro(seconds=8.0)))])
-    shown = recordings.step_response(np.linspace(REACH, 3.0 * REACH, 50))
-    assert np.abs(shown - 1.0).max() < 0.025
-    assert recordings.step_response(np.array([REACH - 1.0]))[0] > 1.05

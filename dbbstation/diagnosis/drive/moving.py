@@ -1,0 +1,134 @@
+"""How much every sample of a recording weighs in the comparison, and what that does to the noise.
+
+While a drive stands, friction is a reaction: it is whatever holds the drive, and no law gives it. Low-passes are linear. A sum of
+columns that holds at every sample where a weight is not zero therefore holds for what they leave of weighted columns,
+
+    h * (w F) = sum of theta_k h * (w phi_k),
+
+exactly, whatever the force is where w = 0. Divided by h * w this is a mean over what moves about a sample. [Normalized
+convolution: Knutsson and Westin, Normalized and differential convolution, CVPR 1993, 515, eq. 4]
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+from scipy.signal import butter, sosfiltfilt
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+ORDER = 4
+"""Of the Butterworth filters; twice that after both passes."""
+
+POSITION_BAND = 2.0
+"""Cut-off of the position's filter over that of the comparison: it must be flat where force and model are compared."""
+
+EDGE_PERIODS = 3.0
+"""Periods of the cut-off over which the filters ring."""
+
+
+def low_passed(columns: NDArray[np.float64], rate_hz: float, cutoff_hz: float) -> NDArray[np.float64]:
+    """Columns, shape (n,) or (n, p), through the low-pass of the comparison and that of the position, without phase shift.
+
+    Beyond both ends a column goes on as at its end.
+    """
+    bands = (cutoff_hz, POSITION_BAND * cutoff_hz)
+    sos = np.vstack([butter(ORDER, band, fs=rate_hz, output="sos") for band in bands])
+    beyond = min(_reach(rate_hz, cutoff_hz), len(columns) - 1)
+    return np.asarray(sosfiltfilt(sos, columns, axis=0, padtype="constant", padlen=beyond), dtype=np.float64)
+
+
+def impulse_response(rate_hz: float, cutoff_hz: float) -> NDArray[np.float64]:
+    """What `low_passed` makes of a single sample of one, in the middle, as far as it rings, shape (2 k + 1,)."""
+    reach = _reach(rate_hz, cutoff_hz)
+    at = np.arange(-2 * reach, 2 * reach + 1)
+    return low_passed((at == 0).astype(np.float64), rate_hz, cutoff_hz)[reach:-reach]
+
+
+def _reach(rate_hz: float, cutoff_hz: float) -> int:
+    return int(np.ceil(EDGE_PERIODS * rate_hz / cutoff_hz))
+
+
+def speed_noise_m_s(noise_m: float, rate_hz: float, half: int) -> float:
+    """Standard deviation that white noise of the position puts into its slope over 2 `half` + 1 samples [m/s]."""
+    return float(noise_m * rate_hz * np.sqrt(3.0 / (half * (half + 1) * (2 * half + 1))))
+
+
+def half_window(noise_m: float, rate_hz: float, allowed_m_s: float, most: int) -> int:
+    """Samples on either side of the shortest window whose slope has no more noise than is allowed, `most` at the most."""
+    fine = (half for half in range(1, most) if speed_noise_m_s(noise_m, rate_hz, half) <= allowed_m_s)
+    return next(fine, most)
+
+
+def within(marked: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
+    """Samples no farther than `by` from a marked one, shape (n,)."""
+    count = np.concatenate([[0], np.cumsum(marked)])
+    at = np.arange(len(marked))
+    return np.asarray(count[np.minimum(at + by + 1, len(marked))] > count[np.maximum(at - by, 0)])
+
+
+def weights(unknown: NDArray[np.bool_], rise: int) -> NDArray[np.float64]:
+    """Weight of every sample, shape (n,): zero where the force is unknown, from there rising to one over so many samples more."""
+    if not unknown.any():
+        return np.ones(len(unknown))
+    away = np.asarray(distance_transform_edt(~unknown), dtype=np.float64)
+    return np.asarray(np.sin(0.5 * np.pi * np.minimum(away / (rise + 1), 1.0)) ** 2)
+
+
+def rise_of_weights(noise_m: float, rate_hz: float, cutoff_hz: float, allowed_m_s2: float, most: int) -> int:
+    """Samples over which weights must rise for their edge to add no more noise to the acceleration than is allowed.
+
+    A difference of positions that is cut off at an edge keeps what its neighbours would have cancelled: the sharper the edge, the more of
+    the position's noise it lets into the band.
+
+    Args:
+        noise_m: standard deviation of the position's white noise [m].
+        rate_hz: samples per second.
+        cutoff_hz: of the comparison.
+        allowed_m_s2: standard deviation that it may add [m/s²].
+        most: samples at the most.
+    """
+    response = impulse_response(rate_hz, cutoff_hz)
+    at = np.arange(len(response)) - len(response) // 2
+    own, unit = _of_second_difference(response), noise_m * rate_hz**2
+    for rise in range(most):
+        # The edge lies in the middle of the band: nowhere else it matters more.
+        edge = weights(at <= -((rise + 1) // 2), rise)
+        if unit**2 * (_of_second_difference(response * edge) - own) <= allowed_m_s2**2:
+            return rise
+    return most
+
+
+def edge_noise_m_s2(
+    weight: NDArray[np.float64], kept: NDArray[np.int64], noise_m: float, rate_hz: float, cutoff_hz: float
+) -> NDArray[np.float64]:
+    """Standard deviation of noise in the acceleration of samples compared beyond that of a drive that moves all the time.
+
+    Args:
+        weight: of every sample, shape (n,).
+        kept: indices of the samples compared, shape (m,).
+        noise_m: standard deviation of the position's white noise [m].
+        rate_hz: samples per second.
+        cutoff_hz: of the comparison.
+
+    Returns:
+        shape (m,) [m/s²].
+    """
+    response = impulse_response(rate_hz, cutoff_hz)
+    reach = len(response) // 2
+    around = np.pad(weight, reach, mode="edge")
+    own = _of_second_difference(response)
+    more = np.zeros(len(kept))
+    for row, first in enumerate(kept):
+        near = around[first : first + len(response)]
+        if near.min() < 1.0:
+            more[row] = _of_second_difference(response * near / float(response @ near)) - own
+    return np.asarray(noise_m * rate_hz**2 * np.sqrt(np.maximum(more, 0.0)))
+
+
+def _of_second_difference(row: NDArray[np.float64]) -> float:
+    """Variance of a weighted sum of second differences of white noise of variance one."""
+    return float(np.sum(np.diff(np.pad(row, 2), 2) ** 2))

@@ -140,7 +140,7 @@ def test_a_file_without_an_error_source(tmp_path):
 
 def test_a_name_that_is_taken(tmp_path):
     text = told(changed(tmp_path, ('"scale-bow"', '"gravity"')))
-    assert re.search(r"own\.py:11: an error source `gravity` is known already, from dbbstation itself", text)
+    assert re.search(r"own\.py:9: an error source `gravity` is known already, from dbbstation itself", text)
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_a_name_that_is_taken(tmp_path):
 )
 def test_what_is_lacking_of_the_contract_is_told(tmp_path, old, new, why):
     text = told(changed(tmp_path, (old, new)))
-    assert re.search(r"own\.py:11: ScaleBow: ", text)
+    assert re.search(r"own\.py:9: ScaleBow: ", text)
     assert why in text
 
 
@@ -177,7 +177,7 @@ def test_a_derivative_that_is_not_that_of_the_effect_is_told(tmp_path):
 def test_an_error_in_its_own_code_has_its_line(tmp_path):
     path = changed(tmp_path, ("shortest, longest = machine.travel.strut_mm", "shortest, longest = machine.travel"))
     text = told(path)
-    assert re.search(r"own\.py:30: ScaleBow: TypeError: .*, when it was tried on a circle", text)
+    assert re.search(r"own\.py:28: ScaleBow: TypeError: .*, when it was tried on a circle", text)
 
 
 def test_all_faults_of_all_files_are_told(tmp_path):

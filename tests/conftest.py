@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from collections import defaultdict
 from pathlib import Path
 
 # As the command line does, before NumPy looks: several workers with threads each wait for one another most of the time.
@@ -32,9 +33,29 @@ def pytest_xdist_auto_num_workers() -> int:
     return (os.cpu_count() or 1) + 1
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Slow tests first: one that begins last keeps a worker busy while the others have nothing to do."""
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+@pytest.hookimpl(trylast=True)  # behind what leaves tests out
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Slow tests first, those of a file together and files shared out: one that begins last is waited for by all workers.
+
+    Workers begin with equal parts of the list, one behind the other, and take from the ends of each other's parts. Files that lie
+    highest test the most at once, and take longest.
+    """
+    slow = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("slow") is not None:
+            slow[item.path].append(item)
+    quick = [item for item in items if item.path not in slow or item not in slow[item.path]]
+    queues: list[list[pytest.Item]] = [[] for _ in range(getattr(config, "workerinput", {}).get("workercount", 1))]
+    for path in sorted(slow, key=lambda path: len(path.parts)):
+        min(queues, key=len).extend(slow[path])
+    left, begun = len(items), 0
+    items.clear()
+    for number, queue in enumerate(queues):
+        size = left // (len(queues) - number)
+        taken = max(size - len(queue), 0)
+        items += queue + quick[begun : begun + taken]
+        left, begun = left - size, begun + taken
+    items += quick[begun:]
 
 
 @pytest.fixture(scope="session")

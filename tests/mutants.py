@@ -4,8 +4,11 @@
 
 A mutant is a copy of the package in which one operator, comparison, number, condition or returned value is another
 [DeMillo, Lipton and Sayward, Computer 11 (1978) 34]. It is killed where a test fails. The default tier runs first, then the
-slow one, with `--nightly` that one too, so that the table shows what the default tier alone would miss. Rows that the file has are not run again: a
-study that was interrupted goes on where it stopped.
+slow one, with `--nightly` that one too, so that the table shows what the default tier alone would miss.
+
+Which tests run a line is recorded once, into a file beside the table (mutants.coverage), and a mutant is shown to these tests only.
+Where none was seen to run it, as with constants of a module, compiled kernels and programs that a test starts, the whole folder
+runs. Rows that the table has are not run again: a study that was interrupted goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -28,12 +31,13 @@ from pathlib import Path
 from threading import Lock
 
 import numpy as np
+from coverage import CoverageData
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = "dbbstation"
 
 TIERS = {"default": "not slow and not nightly", "slow": "slow and not nightly", "nightly": "nightly"}
-LONGEST_S = 1500.0
+LONGEST_S = 900.0
 """A run of tests that takes longer is one that the mutant made endless: killed."""
 
 OTHERS = {
@@ -137,7 +141,33 @@ def tests_of(file: str) -> list[str]:
     return [f"tests/{folder}"] + (["tests/cli"] if folder.parts[0] == "cli" else [])
 
 
-def killed_by(mutant: Mutant, tiers: list[str], workplace: Path) -> str:
+def record(out: Path, workplace: Path) -> None:
+    """Record which tests of the default and the slow tier run each line."""
+    settings = workplace / "coverage.ini"
+    settings.write_text(f"[run]\nrelative_files = true\ndata_file = {out.resolve()}.part\n")
+    options = [f"--cov={PACKAGE}", "--cov-context=test", "--cov-report=", f"--cov-config={settings}"]
+    code = _run_tests([*options, "-n", "auto", "-m", "not nightly", "tests"], workplace, 4.0 * LONGEST_S)
+    if code != 0:
+        sys.exit(f"The tests do not pass without a mutant (exit code {code}): nothing can be said of mutants.")
+    Path(f"{out.resolve()}.part").rename(out)
+
+
+def running(mutant: Mutant, recorded: CoverageData) -> list[str]:
+    """Return the tests of a mutant's folder that run its line; the folders where no test was seen to.
+
+    Of a line that runs while a fixture is made, every test of the file counts: fixtures are shared.
+    """
+    folders = tests_of(mutant.file)
+    path = next((path for path in recorded.measured_files() if Path(path) == Path(PACKAGE) / mutant.file), None)
+    seen = set()
+    for context in recorded.contexts_by_lineno(path).get(mutant.line, []) if path else []:
+        test, _, phase = context.rpartition("|")
+        if any(test.startswith(f"{folder}/") for folder in folders):
+            seen.add(test if phase == "run" else test.partition("::")[0])
+    return sorted(test for test in seen if "::" not in test or test.partition("::")[0] not in seen) or folders
+
+
+def killed_by(mutant: Mutant, tests: list[str], tiers: list[str], workplace: Path) -> str:
     """First tier whose tests fail with a mutant, or `survived`."""
     path = workplace / PACKAGE / mutant.file
     original = path.read_text()
@@ -147,17 +177,29 @@ def killed_by(mutant: Mutant, tiers: list[str], workplace: Path) -> str:
     assert other is not None
     path.write_text(ast.unparse(ast.fix_missing_locations(_Exchange(node, other).visit(tree))))
     try:
-        return next((tier for tier in tiers if _fails(mutant.file, TIERS[tier], workplace)), "survived")
+        for tier in tiers:
+            if _fails(tests_of(mutant.file) if tier == "nightly" else tests, TIERS[tier], workplace):
+                return tier
+        return "survived"
     finally:
         path.write_text(original)
 
 
-def _fails(file: str, tier: str, workplace: Path) -> bool:
+def _fails(tests: list[str], tier: str, workplace: Path) -> bool:
     """Whether a test of the tier fails; no test there is no failure."""
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", tier, *tests_of(file)]
+    named = workplace / "tests.txt"
+    named.write_text("\n".join(tests))
+    return _run_tests(["-x", "-p", "no:cacheprovider", "-m", tier, f"@{named}"], workplace) not in {
+        0,
+        5,
+    }
+
+
+def _run_tests(options: list[str], workplace: Path, longest_s: float = LONGEST_S) -> int:
+    """Run pytest on a copy of the checkout and return its exit code; -1 where it takes longer than it may."""
     environment = {**os.environ, "PYTHONPATH": str(workplace), "NUMBA_CACHE_DIR": str(workplace / "compiled")}
     tests = subprocess.Popen(
-        command,
+        [sys.executable, "-m", "pytest", "-q", *options],
         cwd=workplace,
         env=environment,
         stdout=subprocess.DEVNULL,
@@ -165,9 +207,9 @@ def _fails(file: str, tier: str, workplace: Path) -> bool:
         start_new_session=True,
     )
     try:
-        return tests.wait(LONGEST_S) not in {0, 5}
+        return tests.wait(longest_s)
     except subprocess.TimeoutExpired:
-        return True
+        return -1
     finally:
         if tests.poll() is None:
             os.killpg(tests.pid, signal.SIGKILL)
@@ -196,11 +238,17 @@ def main() -> None:
         for number in range(chosen.workers):
             free.append(Path(temporary) / str(number))
             shutil.copytree(ROOT, free[-1], ignore=shutil.ignore_patterns(".venv", "_build", "__pycache__", ".*_cache"))
+        lines = chosen.out.with_suffix(".coverage")
+        if not lines.exists():
+            record(lines, free[0])
+        recorded = CoverageData(str(lines))
+        recorded.read()
+        tests = {mutant: running(mutant, recorded) for mutant in mutants}
 
         def run(mutant: Mutant) -> None:
             workplace = free.pop()
             began = time.monotonic()
-            by = killed_by(mutant, tiers, workplace)
+            by = killed_by(mutant, tests[mutant], tiers, workplace)
             free.append(workplace)
             with writing, chosen.out.open("a", newline="") as file:
                 took = f"{time.monotonic() - began:.0f}"

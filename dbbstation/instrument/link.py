@@ -12,6 +12,7 @@ from serial.tools import list_ports
 from serial.urlhandler.protocol_socket import Serial as SocketPort
 
 from dbbstation.errors import InstrumentError
+from dbbstation.instrument.damaged import Marks, mark_damaged
 from dbbstation.instrument.holders import holders
 
 if TYPE_CHECKING:
@@ -67,13 +68,22 @@ class Link:
         name: what messages call it.
         owned: close the port with the link; a port that somebody else opened stays open.
         log: where every byte is written down.
+        marks: takes out what the system marks damaged characters with; None where it marks none.
     """
 
-    def __init__(self, port: Port, *, name: str, owned: bool, log: ByteLog | None = None) -> None:
+    def __init__(
+        self, port: Port, *, name: str, owned: bool, log: ByteLog | None = None, marks: Marks | None = None
+    ) -> None:
         self._port = port
         self._owned = owned
         self._log = log
+        self._marks = marks
         self.name = name
+
+    @property
+    def sees_damage(self) -> bool:
+        """Whether characters with a wrong parity or stop bit are known."""
+        return self._marks is not None
 
     def read(self) -> bytes:
         """Return the bytes that have arrived, after waiting a moment for the first; empty where none came.
@@ -87,6 +97,8 @@ class Link:
                 raw += self._rest()
         except _ERRORS as error:
             raise self._gone(error) from None
+        if self._marks is not None:
+            raw = self._marks.taken_out(raw)
         if raw and self._log is not None:
             self._log.note("<", raw)
         return raw
@@ -140,7 +152,9 @@ def _close_quietly(port: object) -> None:
                 close()
 
 
-def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: ByteLog | None = None) -> Link:
+def open_link(
+    port: str | Port, line: Line, *, baud: int | None = None, log: ByteLog | None = None, text: bool = False
+) -> Link:
     """Open a line to an instrument.
 
     Args:
@@ -148,6 +162,7 @@ def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: Byt
         line: its settings.
         baud: baud rate to use instead of the usual one.
         log: where every byte is written down.
+        text: all that comes is text, so that characters with a wrong parity or stop bit can be marked in it.
 
     Raises:
         InstrumentError: no such port, no permission, in use, settings that the port does not take.
@@ -176,7 +191,8 @@ def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: Byt
     except _OPENING_ERRORS as error:
         _close_quietly(opened)
         raise _not_opened(port, speed, error) from None
-    return Link(opened, name=port, owned=True, log=log)
+    marks = Marks(line.data_bits) if text and mark_damaged(opened) else None
+    return Link(opened, name=port, owned=True, log=log, marks=marks)
 
 
 def connected_ports() -> list[tuple[str, str, str]]:

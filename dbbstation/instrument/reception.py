@@ -28,6 +28,7 @@ class Tally:
     Attributes:
         readings: handed out.
         lost: samples that never came, or came and were rejected.
+        doubtful: handed out as doubtful.
         rejected: frames and stretches of bytes that were not believed, by reason.
         garbage_bytes: bytes of these.
         garbage: an example of them.
@@ -36,6 +37,7 @@ class Tally:
 
     readings: int = 0
     lost: int = 0
+    doubtful: int = 0
     rejected: dict[Reason, int] = field(default_factory=dict)
     garbage_bytes: int = 0
     garbage: bytes = b""

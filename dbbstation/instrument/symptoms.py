@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.codec import Decoder, Piece
+from dbbstation.instrument.damaged import damaged_in
 from dbbstation.instrument.fields import Content
 from dbbstation.instrument.recognise import looks_like
 
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
 
 _TELLING_BYTES = 12
+
+_MOSTLY = 0.25
+"""Share of characters with a wrong parity above which no noise did it: with another parity set all are wrong, with none half."""
 
 _OTHERS = 3
 """Instruments that a message names: the likeliest."""
@@ -76,6 +80,12 @@ def shown(raw: bytes) -> str:
 def _cause(protocol: Protocol, raw: bytes, baud: int) -> str:
     seven_bits = bytes(byte & 0x7F for byte in raw)
     if seven_bits != raw and _holds_reading(protocol, seven_bits):
+        damaged = damaged_in(raw, protocol.line)
+        if damaged and not parity_in(raw):
+            # Set to the right bits a port marks what came with a wrong parity.
+            few = damaged < _MOSTLY * len(raw)
+            cause = "look after the cable and its screen" if few else f"set the device to {protocol.line.text}"
+            return f"{damaged} of its {len(raw)} characters came with a wrong parity: {cause}"
         # Seven bits and a parity in eight: the port is set to eight, or the device to seven.
         wrong = "the device" if protocol.line.data_bits == 8 else "the port"  # noqa: PLR2004 (bits)
         return (

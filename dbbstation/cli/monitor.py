@@ -82,12 +82,13 @@ def _conclude(tally: Tally, *, as_json: bool) -> None:
         totals: dict[str, object] = {
             "readings": tally.readings,
             "lost": tally.lost,
+            "doubtful": tally.doubtful,
             "garbage_bytes": tally.garbage_bytes,
         }
         totals |= {"rejected": tally.rejected, "reconnected": tally.reconnected}
         click.echo(json.dumps({"totals": totals, "provenance": provenance().data()}))
         return
-    text = f"{tally.readings} readings, {tally.lost} lost, {tally.garbage_bytes} bytes not understood"
+    text = f"{tally.readings} readings, {tally.lost} lost, {tally.doubtful} doubtful, {tally.garbage_bytes} bytes not understood"
     if tally.rejected:
         text += f" ({', '.join(f'{count} by {reason}' for reason, count in sorted(tally.rejected.items()))})"
     click.echo(text + (f", for example {tally.garbage[:24].hex(' ')}" if tally.garbage else ""), err=True)

@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING
 try:
     import termios
 except ImportError:  # Windows
-    termios = None  # type: ignore[assignment]
+    _MARKS = False
+else:
+    _MARKS = True
 
 if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Line
@@ -35,7 +37,7 @@ def mark_damaged(port: object) -> bool:
         port: an open port of pyserial, behind its last change of settings; other ports mark nothing.
     """
     descriptor = getattr(port, "fd", None)
-    if termios is None or not isinstance(descriptor, int):
+    if not _MARKS or not isinstance(descriptor, int):
         return False
     wanted = termios.INPCK | termios.PARMRK
     with suppress(termios.error):

@@ -159,7 +159,9 @@ class DecimalText(Number):
     @cached_property
     def _grammar(self) -> re.Pattern[str]:
         blanks = " *" if self.pad == " " or self.plus == " " else ""
-        sign = ("[+-]?" if self.signed and not self.plus else "[+ -]" if blanks else "[+-]") if self.signed else ""
+        sign = ""
+        if self.signed:
+            sign = "[+-]?" if not self.plus else "[+ -]" if blanks else "[+-]"
         return re.compile(rf"{blanks}({sign}){blanks}(\d*)(?:{re.escape(self.point)}(\d*))?")
 
     def _parsed(self, raw: bytes) -> float:

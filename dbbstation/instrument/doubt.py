@@ -4,9 +4,9 @@ A device writes all its numbers in one way, which is set on the device: one unit
 point as the number has (or always as many, with zeros in front). A digit lost or put in, a point that moved, a unit that changed show
 as another form than that of the lines before. Two things are no damage:
 
-- A number that passes a power of ten has a digit more or less. A digit lost or put in before the point changes a number by at least
-  0.8 of the place that it loses or gains: from d digits to d + 1, v grows from below 10^d to at least 10 v or by 10^d. Where the
-  step is less than half of 10^d, the number passed it.
+- A number that passes a power of ten has a digit more or less. A digit lost before the point takes at least 0.8 of 10^d from a number
+  v of d + 1 digits, of at least 10^d: the first digit itself is that much or more; without another one, v = a 10^d + ... becomes
+  less than (a + 1) 10^(d - 1). A digit put in is the same backwards. Where the step is less than half of 10^d, the number passed it.
 - The device was set to another form. Then all lines that follow have it. Where one line in a thousand is damaged, three in a row
   are once in 10^9 lines (two years at 14 lines a second), so the third is believed.
 """
@@ -55,8 +55,11 @@ class Written:
         return self.before == last.before or self._passed_a_power_of_ten(last)
 
     def _passed_a_power_of_ten(self, last: Written) -> bool:
-        place = 10.0 ** min(self.before, last.before)
-        return abs(self.before - last.before) == 1 and abs(self.value - last.value) < _TRUE_STEP * place
+        wider, narrower = (self, last) if self.before > last.before else (last, self)
+        place = 10.0**narrower.before
+        # A wider number with zeros in front has passed nothing.
+        whole = wider.before == narrower.before + 1 and abs(wider.value) >= place
+        return whole and abs(self.value - last.value) < _TRUE_STEP * place
 
     def difference(self, last: Written) -> str:
         """Say what is different from `last`."""

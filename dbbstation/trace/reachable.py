@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from dbbstation.plan.circle import Circle
 
 OVERRIDE = 1.2
@@ -38,17 +40,20 @@ class Reachable:
     """Tells lengths that the bar can have from others, from readings in time order.
 
     Args:
-        circle: as commanded.
+        circle: as commanded; None: nothing moves the bar, it is on its calibrator.
     """
 
-    def __init__(self, circle: Circle) -> None:
+    def __init__(self, circle: Circle | None) -> None:
+        self._good: tuple[float, float] | None = None
+        self._doubted: tuple[float, float] | None = None
+        self._agreeing = 0
+        self._off_turn_mm_s = self._on_turn_mm_s = 0.0
+        if circle is None:
+            return
         feed_mm_s = OVERRIDE * circle.feed_mm_min / 60.0
         self._off_turn_mm_s = feed_mm_s
         across_mm_s = UNDULATIONS * circle.feed_in_mm * float(np.radians(circle.turning_deg_s)) * OVERRIDE
         self._on_turn_mm_s = min(across_mm_s, feed_mm_s)
-        self._good: tuple[float, float] | None = None
-        self._doubted: tuple[float, float] | None = None
-        self._agreeing = 0
 
     def note(self, t_s: float, length_mm: float) -> None:
         """Take a reading that is held against nothing, while nobody knows how fast the bar is moved.
@@ -58,6 +63,17 @@ class Reachable:
             length_mm: it [mm].
         """
         self._good, self._doubted, self._agreeing = (t_s, length_mm), None, 0
+
+    @classmethod
+    def standing(cls, lengths_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which readings of a bar that stands can be its length, shape (n,).
+
+        Args:
+            lengths_mm: in time order, shape (n,) [mm].
+        """
+        bar = cls(None)
+        bar.note(0.0, float(np.median(lengths_mm)))
+        return np.array([not bar.doubt(0.0, float(one), on_turn=False) for one in lengths_mm], dtype=np.bool_)
 
     def doubt(self, t_s: float, length_mm: float, *, on_turn: bool) -> str:
         """Return why a reading cannot be the bar's length; empty where it can.

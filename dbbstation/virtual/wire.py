@@ -165,9 +165,8 @@ class VirtualInstrument:
             self._to_cut, self._silent_after_cut = keep, then_silent
 
     def damage_next_frame(self, damage: Callable[[bytes], bytes]) -> None:
-        """Send the next frame as `damage` returns it, as noise on the cable makes it."""
-        with self._lock:
-            self._damage = damage
+        """Send the next frame as `damage` returns it, as noise on the cable makes it; `length_mm_at` may call it too."""
+        self._damage = damage
 
     def drop_samples(self, count: int) -> None:
         """Do not send the next samples; the counter goes on."""

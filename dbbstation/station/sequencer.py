@@ -305,12 +305,12 @@ class Sequencer:
             return reading
         if self.state not in RECORDING or self._record is None:
             # The bar is put in by hand, and the machine comes at any feed.
-            self._reachable.note(reading.t_s, reading.length_mm)
+            self._reachable.note(reading.t_s, reading.length_mm, reading.t_uncertainty_s or 0.0)
             return reading
         phi_deg = self._record.phi_deg(reading.t_s - self._record.started_s)
         # Live angles are good to a degree or two, and at either end of the turn the machine may feed.
         on_turn = phi_deg is not None and FEEDING_DEG <= phi_deg <= FULL_TURN_DEG - FEEDING_DEG
-        why = self._reachable.doubt(reading.t_s, reading.length_mm, on_turn=on_turn)
+        why = self._reachable.doubt(reading.t_s, reading.length_mm, reading.t_uncertainty_s or 0.0, on_turn=on_turn)
         return replace(reading, status=DOUBTFUL, said=why, remedy=LOOK_AFTER_LINE) if why else reading
 
     def _begin_run(self, reading: Reading) -> None:

@@ -13,6 +13,7 @@ move, was hit or left its seat, which other checks find and say.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +37,15 @@ AGREEING = 3
 """Readings in a row that agree with each other and not with those before: then it was the bar."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A reading: its time [s], itself [mm], standard uncertainty of the time [s]."""
+
+    t_s: float
+    length_mm: float
+    t_uncertainty_s: float
+
+
 class Reachable:
     """Tells lengths that the bar can have from others, from readings in time order.
 
@@ -44,8 +54,8 @@ class Reachable:
     """
 
     def __init__(self, circle: Circle | None) -> None:
-        self._good: tuple[float, float] | None = None
-        self._doubted: tuple[float, float] | None = None
+        self._good: _Seen | None = None
+        self._doubted: _Seen | None = None
         self._agreeing = 0
         self._off_turn_mm_s = self._on_turn_mm_s = 0.0
         if circle is None:
@@ -55,14 +65,15 @@ class Reachable:
         across_mm_s = UNDULATIONS * circle.feed_in_mm * float(np.radians(circle.turning_deg_s)) * OVERRIDE
         self._on_turn_mm_s = min(across_mm_s, feed_mm_s)
 
-    def note(self, t_s: float, length_mm: float) -> None:
+    def note(self, t_s: float, length_mm: float, t_uncertainty_s: float = 0.0) -> None:
         """Take a reading that is held against nothing, while nobody knows how fast the bar is moved.
 
         Args:
             t_s: its time [s].
             length_mm: it [mm].
+            t_uncertainty_s: standard uncertainty of its time, of a rectangle [s].
         """
-        self._good, self._doubted, self._agreeing = (t_s, length_mm), None, 0
+        self._believe(_Seen(t_s, length_mm, t_uncertainty_s))
 
     @classmethod
     def standing(cls, lengths_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -75,34 +86,38 @@ class Reachable:
         bar.note(0.0, float(np.median(lengths_mm)))
         return np.array([not bar.doubt(0.0, float(one), on_turn=False) for one in lengths_mm], dtype=np.bool_)
 
-    def doubt(self, t_s: float, length_mm: float, *, on_turn: bool) -> str:
+    def doubt(self, t_s: float, length_mm: float, t_uncertainty_s: float = 0.0, *, on_turn: bool) -> str:
         """Return why a reading cannot be the bar's length; empty where it can.
 
         Args:
             t_s: its time [s].
             length_mm: it [mm].
+            t_uncertainty_s: standard uncertainty of its time, of a rectangle [s].
             on_turn: the machine is on the full turn, not on its way to the circle or from it.
         """
-        reading = (t_s, length_mm)
-        if self._good is None or self._follows(self._good, reading, on_turn=on_turn):
-            self.note(t_s, length_mm)
+        one, last = _Seen(t_s, length_mm, t_uncertainty_s), self._good
+        if last is None or self._follows(last, one, on_turn=on_turn):
+            self._believe(one)
             return ""
-        agrees = self._doubted is not None and self._follows(self._doubted, reading, on_turn=on_turn)
+        agrees = self._doubted is not None and self._follows(self._doubted, one, on_turn=on_turn)
         self._agreeing = self._agreeing + 1 if agrees else 1
-        self._doubted = reading
+        self._doubted = one
         if self._agreeing >= AGREEING:
-            self.note(t_s, length_mm)
+            self._believe(one)
             return ""
-        last_s, last_mm = self._good
-        apart_s = t_s - last_s
         return (
-            f"{length_mm - last_mm:+.4f} mm within {1e3 * apart_s:.0f} ms, at the feed {self._limit_mm(apart_s, on_turn=on_turn):.4f} mm "
-            "are possible"
+            f"{one.length_mm - last.length_mm:+.4f} mm within {1e3 * (one.t_s - last.t_s):.0f} ms, "
+            f"at the feed {self._limit_mm(last, one, on_turn=on_turn):.4f} mm are possible"
         )
 
-    def _follows(self, before: tuple[float, float], reading: tuple[float, float], *, on_turn: bool) -> bool:
-        return abs(reading[1] - before[1]) <= self._limit_mm(reading[0] - before[0], on_turn=on_turn)
+    def _believe(self, one: _Seen) -> None:
+        self._good, self._doubted, self._agreeing = one, None, 0
 
-    def _limit_mm(self, apart_s: float, *, on_turn: bool) -> float:
-        """Return by how much the length may change within a time [mm]."""
-        return (self._on_turn_mm_s if on_turn else self._off_turn_mm_s) * max(apart_s, 0.0) + SUDDEN_MM
+    def _follows(self, before: _Seen, one: _Seen, *, on_turn: bool) -> bool:
+        return abs(one.length_mm - before.length_mm) <= self._limit_mm(before, one, on_turn=on_turn)
+
+    def _limit_mm(self, before: _Seen, one: _Seen, *, on_turn: bool) -> float:
+        """Return by how much the length may change from one reading to another [mm]."""
+        # Half the width of a rectangle is the root of 3 times its standard uncertainty [GUM 4.3.7].
+        longest_s = one.t_s - before.t_s + np.sqrt(3.0) * (one.t_uncertainty_s + before.t_uncertainty_s)
+        return (self._on_turn_mm_s if on_turn else self._off_turn_mm_s) * max(float(longest_s), 0.0) + SUDDEN_MM

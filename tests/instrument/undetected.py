@@ -132,6 +132,8 @@ class Passage:
     def __init__(self, protocol: Protocol, place_deg: float, *, guarded: bool) -> None:
         self._protocol, self._guarded = protocol, guarded
         self._period_s = 1.0 / protocol.fastest_hz()
+        # Of an instrument that is asked, the driver knows the moment to a rectangle.
+        self._u_s = float(np.ptp(protocol.latch_bounds_s()) / np.sqrt(12.0)) if protocol.ask.asked else 0.0
         number = np.arange(-BEFORE, BEHIND + 1)
         theta = np.radians(place_deg + number * self._period_s * CIRCLE.turning_deg_s)
         noise = np.random.default_rng(round(place_deg)).normal(0.0, 0.5e-3, len(number))
@@ -145,7 +147,7 @@ class Passage:
             piece = Decoder(protocol, joining=False).feed(raw)[0] if not protocol.by_width else None
             if isinstance(piece, Piece):
                 self._doubts.judged(piece)
-            self._reachable.note((k - BEFORE) * self._period_s, self.true_mm[k])
+            self._reachable.note((k - BEFORE) * self._period_s, self.true_mm[k], self._u_s)
 
     def read(self, code: Code) -> list[Reading]:
         """Return the readings that come of the damaged frame and those behind it."""
@@ -156,7 +158,7 @@ class Passage:
         for number, piece, clean in pieces:
             reading = doubts.judged(piece, clean=clean) if self._guarded else piece.reading
             if self._guarded and reading.status == OK and reading.length_mm is not None:
-                why = reachable.doubt(number * self._period_s, reading.length_mm, on_turn=True)
+                why = reachable.doubt(number * self._period_s, reading.length_mm, self._u_s, on_turn=True)
                 if why:
                     continue
             readings.append(reading)

@@ -93,6 +93,11 @@ class Instrument:
         return self._port if isinstance(self._port, str) else str(getattr(self._port, "name", None) or "open port")
 
     @property
+    def sees_damage(self) -> bool:
+        """Whether characters with a wrong parity or stop bit are known on this port."""
+        return self._link is not None and self._link.sees_damage
+
+    @property
     def reading(self) -> bool:
         """Whether the line is being read; false before `start`, and once it has failed."""
         return self._thread is not None and self._thread.is_alive() and self._failure is None
@@ -239,6 +244,7 @@ class Instrument:
             tally=self.tally,
             stop=self._stop,
             put=self._put,
+            eighth_bit_marks=link.eighth_bit_marks,
         )
         if self.protocol.ask.asked:
             self.tally.reject(after, "bytes")

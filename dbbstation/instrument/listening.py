@@ -72,7 +72,8 @@ class Listener:
         """Stamp a reading and hand out what has its place."""
         size = heard.after + len(heard.raw)
         left_s = seen_s - size * self._to.character_s - self._to.protocol.timing.latch_delay_s
-        heard = replace(heard, reading=self._doubts.judged(heard))
+        judged = self._doubts.judged(heard)
+        heard = heard if judged is heard.reading else replace(heard, reading=judged)
         sample = (heard, left_s, self._arrivals.at_latest_s(size - 1))
         for placed in self._sequence.place(heard.reading.counter, sample):
             piece, sent_s, first_s = placed.sample

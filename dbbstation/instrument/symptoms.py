@@ -51,12 +51,23 @@ def half_line(raw: bytes, where: str, waited_s: float) -> InstrumentError:
     )
 
 
-def garbage(protocol: Protocol, where: str, raw: bytes, why: str, baud: int) -> InstrumentError:
-    """Return the error for bytes that are no reading, with the likeliest cause."""
+def garbage(
+    protocol: Protocol, where: str, raw: bytes, why: str, baud: int, *, marked: bool = False
+) -> InstrumentError:
+    """Return the error for bytes that are no reading, with the likeliest cause.
+
+    Args:
+        protocol: that is expected.
+        where: name of the port.
+        raw: the bytes.
+        why: what is wrong with them.
+        baud: of the port.
+        marked: the eighth bit of a character of seven can only be the mark of a wrong parity.
+    """
     return InstrumentError(
         f"what comes is not {protocol.label}: {shown(raw)}" + (f" ({why})" if why else ""),
         where=where,
-        remedy=_cause(protocol, raw, baud),
+        remedy=_cause(protocol, raw, baud, marked=marked),
     )
 
 
@@ -77,12 +88,12 @@ def shown(raw: bytes) -> str:
     return f"{text} = {head.decode('latin-1')!r}" if 2 * printable > len(head) else text
 
 
-def _cause(protocol: Protocol, raw: bytes, baud: int) -> str:
+def _cause(protocol: Protocol, raw: bytes, baud: int, *, marked: bool) -> str:
     seven_bits = bytes(byte & 0x7F for byte in raw)
     if seven_bits != raw and _holds_reading(protocol, seven_bits):
         damaged = damaged_in(raw, protocol.line)
-        if damaged and not parity_in(raw):
-            # Set to the right bits a port marks what came with a wrong parity.
+        if damaged and (marked or not parity_in(raw)):
+            # A device without parity sends a zero in its place: what has an odd number of bits then is wrong.
             few = damaged < _MOSTLY * len(raw)
             cause = "look after the cable and its screen" if few else f"set the device to {protocol.line.text}"
             return f"{damaged} of its {len(raw)} characters came with a wrong parity: {cause}"

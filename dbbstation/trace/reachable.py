@@ -33,6 +33,9 @@ SUDDEN_MM = 0.05
 """What a machine does between two readings however near: backlash at a reversal, a spike of friction, vibration [mm]. Tens of
 micrometres at a worn machine; calibrated ones stay below ten."""
 
+HALF_WIDTH = float(np.sqrt(3.0))
+"""Half the width of a rectangle by its standard uncertainty [GUM 4.3.7]."""
+
 AGREEING = 3
 """Readings in a row that agree with each other and not with those before: then it was the bar."""
 
@@ -118,6 +121,5 @@ class Reachable:
 
     def _limit_mm(self, before: _Seen, one: _Seen, *, on_turn: bool) -> float:
         """Return by how much the length may change from one reading to another [mm]."""
-        # Half the width of a rectangle is the root of 3 times its standard uncertainty [GUM 4.3.7].
-        longest_s = one.t_s - before.t_s + np.sqrt(3.0) * (one.t_uncertainty_s + before.t_uncertainty_s)
-        return (self._on_turn_mm_s if on_turn else self._off_turn_mm_s) * max(float(longest_s), 0.0) + SUDDEN_MM
+        longest_s = one.t_s - before.t_s + HALF_WIDTH * (one.t_uncertainty_s + before.t_uncertainty_s)
+        return (self._on_turn_mm_s if on_turn else self._off_turn_mm_s) * max(longest_s, 0.0) + SUDDEN_MM

@@ -30,12 +30,15 @@ from dbbstation.instrument.replay import replayed
 from tests.instrument.scripted_port import expected
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
 ND = load_instrument("heidenhain-nd281b")
 STREAM = load_instrument("streaming-encoder")
 BINARY = load_instrument("streaming-encoder-binary")
+
+
+ND_FRAME = b"+  150.0003    \r\n"
 
 
 @pytest.fixture
@@ -168,15 +171,16 @@ def test_a_reply_with_wrong_parity_is_asked_for_again_and_counted(
 @pytest.mark.parametrize(
     ("wrong", "remedy"),
     [(range(17), "17 of its 17 characters came with a wrong parity: set the device to 9600 baud, 7 data bits, even parity, 2 stop bits"),
+     ([k for k, one in enumerate(ND_FRAME) if one.bit_count() % 2],
+      "8 of its 17 characters came with a wrong parity: set the device to 9600 baud, 7 data bits, even parity, 2 stop bits"),
      ((4,), "1 of its 17 characters came with a wrong parity: look after the cable")],
-    ids=["all", "one"],
+    ids=["another parity", "no parity", "noise"],
 )  # fmt: skip
 def test_noise_and_another_parity_are_told_apart(
-    monkeypatch: pytest.MonkeyPatch, wrong: range | tuple[int, ...], remedy: str
+    monkeypatch: pytest.MonkeyPatch, wrong: Collection[int], remedy: str
 ) -> None:
     _with_marks(monkeypatch)
-    good = b"+  150.0003    \r\n"
-    raw = b"".join(bytes([0xFF, 0, one]) if k in wrong else bytes([one]) for k, one in enumerate(good))
+    raw = b"".join(bytes([0xFF, 0, one]) if k in wrong else bytes([one]) for k, one in enumerate(ND_FRAME))
     with (
         expected(*[(b"\x02", raw)] * 3) as port,
         Instrument(ND, port, timeout_s=0.2) as instrument,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from dbbstation.instrument.doubt import BELIEVED_AFTER, Doubts, Written
 from dbbstation.instrument.driver import Instrument
 from dbbstation.instrument.library import load_instrument, with_zero
 from tests.instrument.scripted_port import expected
-from tests.instrument.undetected import PLACES_DEG, unnoticed, usable_variants
+from tests.instrument.undetected import PAIRS, PLACES_DEG, SEED, rows, unnoticed, usable_variants
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -155,3 +156,13 @@ def test_what_passes_unnoticed_is_smaller_than_the_feed_allows(name: str) -> Non
     assert 0.0 < found.worst_um < 150.0
     assert alone.worst_um > 1e5
     assert found.wrong["changed"] < 0.25 * alone.wrong["changed"]
+
+
+@pytest.mark.nightly
+def test_the_table_of_the_documentation_is_what_is_measured() -> None:
+    """Every cell, the right side of `before → now`; two minutes of processor time."""
+    page = (Path(__file__).parents[2] / "docs" / "instruments.md").read_text(encoding="utf-8")
+    table = page.partition("| instrument | per second |")[2].partition("\n\n")[0]
+    lines = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
+    stated = {label: [cell.rpartition("→")[2].strip() for cell in cells] for label, *cells in lines}
+    assert stated == dict(rows([], guarded=True, pairs=PAIRS, seed=SEED))

@@ -163,3 +163,10 @@ def test_monitor_shows_a_doubtful_reading_as_one_and_counts_it(tmp_path: Path) -
     shown, talk = run(replay, str(log))
     assert len([line for line in shown.splitlines() if "doubtful" in line]) == 1
     assert "0 lost, 1 doubtful, " in talk
+
+
+def test_monitor_says_where_a_port_does_not_tell_of_wrong_parity() -> None:
+    for pty, said in ((True, False), (False, True)):
+        with VirtualInstrument(ND, lambda _: 150.0, pty=pty) as virtual:
+            talk = run(monitor, "--instrument", ND.name, "--port", virtual.port, "--count", "1")[1]
+        assert ("this port does not tell of characters with a wrong parity" in talk) is said

@@ -149,11 +149,11 @@ def test_no_lost_character_gives_a_wrong_length(protocol: Protocol) -> None:
 
 @pytest.mark.parametrize("name", ["heidenhain-nd281b", "sylvac-opto-rs"])
 def test_what_passes_unnoticed_is_smaller_than_the_feed_allows(name: str) -> None:
-    """A changed or swapped digit within what the machine can do is not seen: 50 µm at once and 50 µm by its errors."""
+    """A changed or swapped digit within what the machine can do is not seen: 50 µm at once, and 0.6 mm/s by its errors."""
     protocol = load_instrument(name)
     found = unnoticed(protocol, guarded=True, kinds=("changed", "swapped"), places_deg=PLACES_DEG[:1], pairs=50)
     alone = unnoticed(protocol, guarded=False, kinds=("changed", "swapped"), places_deg=PLACES_DEG[:1], pairs=50)
-    assert 0.0 < found.worst_um < 150.0
+    assert 0.0 < found.worst_um < 190.0
     assert alone.worst_um > 1e5
     assert found.wrong["changed"] < 0.25 * alone.wrong["changed"]
 

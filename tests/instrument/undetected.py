@@ -259,7 +259,8 @@ def rows(names: Iterable[str], *, guarded: bool, pairs: int, seed: int) -> Itera
         found = unnoticed(protocol, guarded=guarded, pairs=pairs, seed=seed)
         shares = [found.share(kind) for kind in (*KINDS, "two")]
         label = f"`{protocol.name}`" + (f" `{protocol.profile}`" if protocol.profile else "")
-        yield label, [f"{protocol.fastest_hz():.3g}", *shares, f"{found.worst_um:.3g}"]
+        rate_hz = protocol.fastest_hz()
+        yield label, [f"{rate_hz:.0f}" if rate_hz >= 100.0 else f"{rate_hz:.3g}", *shares, f"{found.worst_um:.3g}"]
 
 
 def main() -> None:
@@ -270,7 +271,7 @@ def main() -> None:
     asked.add_argument("--seed", type=int, default=SEED)
     asked.add_argument("--decoder-alone", action="store_true", help="without parity, doubts and feed")
     given = asked.parse_args()
-    sys.stdout.write("| instrument | readings per second | " + " | ".join(KINDS) + " | two | greatest error [µm] |\n")
+    sys.stdout.write("| instrument | per second | " + " | ".join(KINDS) + " | two | greatest error [µm] |\n")
     sys.stdout.write("| --- | --- |" + " --- |" * (len(KINDS) + 2) + "\n")
     for label, cells in rows(given.names, guarded=not given.decoder_alone, pairs=given.pairs, seed=given.seed):
         sys.stdout.write(f"| {label} | {' | '.join(cells)} |\n")

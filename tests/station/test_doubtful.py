@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -13,6 +14,8 @@ from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.recordings.session import read_session
 from dbbstation.service.board import Board
 from dbbstation.station import events
+from dbbstation.tui.bar_screen import BarScreen
+from dbbstation.tui.prepare_screen import PrepareScreen
 from dbbstation.tui.reading_panel import ReadingPanel
 from tests.station.readings import run_readings
 from tests.station.test_no_length import recorded
@@ -94,3 +97,14 @@ def test_the_screen_counts_doubtful_samples_beside_lost_ones() -> None:
     assert shown[1] == f"DOUBTFUL · 0 lost · 1 doubtful · {why}"
     board.take(events.SamplesRecorded(run, (events.Sample(1.2, 150.0),)))
     assert panel.text(board).plain.splitlines()[1].endswith("0 lost · 1 doubtful")
+
+
+def test_before_the_circles_a_doubtful_length_is_called_one_too() -> None:
+    """On the checklist, and while the bar is on its calibrator."""
+    sample = events.Sample(1.0, 50.123, "doubtful", "2 digits before the point")
+    line = SimpleNamespace(latest=sample, failure=None, rate=SimpleNamespace(per_s=None))
+    checklist = SimpleNamespace(_prepared=SimpleNamespace(first=None))
+    told = PrepareScreen._reading(checklist, line)  # type: ignore[arg-type]
+    assert told == ("!", "The instrument reads 50.1230 mm, doubtful: 2 digits before the point.")
+    bar = SimpleNamespace(_calibration=SimpleNamespace(latest=sample))
+    assert BarScreen._live(bar) == "now 50.1230 mm, doubtful: 2 digits before the point"  # type: ignore[arg-type]

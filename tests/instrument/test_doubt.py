@@ -69,6 +69,13 @@ def test_another_unit_is_doubtful() -> None:
     assert readings[2].said.startswith("its unit is mm, that of the lines before was um")
 
 
+def test_a_digit_put_into_a_number_with_leading_zeros_is_no_power_of_ten() -> None:
+    """12.34 µm as 112.34: four digits begin with a zero, so nothing was passed."""
+    mahr = with_zero(load_instrument("mahr-c1202"), 150.0)
+    readings = judged(mahr, [b"1 +012.34 um\r", b"1 +0112.34 um\r", b"1 +012.35 um\r"])
+    assert [one.status for one in readings] == ["ok", "doubtful", "ok"]
+
+
 def test_a_manual_that_has_a_sign_allows_none_to_be_missing() -> None:
     for protocol, raw in ((SYLVAC, b"150.123\r"), (load_instrument("keyence-dl-rs1a", "il-300"), b"M0,9150.12\r\n")):
         assert not any(isinstance(one, Piece) for one in Decoder(protocol, joining=False).feed(raw))

@@ -67,6 +67,12 @@ def _summary(protocol: Protocol) -> dict[str, object]:
     }
 
 
+NO_CHECKSUM = (
+    "none: damage shows only by parity, by how numbers are written, and where the feed does not allow a length"
+)
+"""What stands in for a checksum."""
+
+
 def _details(protocol: Protocol, profiles: list[str]) -> list[str]:
     low_mm, high_mm = protocol.length.range_mm
     asked = f"asked with {protocol.ask.request.hex(' ')}" if protocol.ask.request else "streams"
@@ -78,7 +84,7 @@ def _details(protocol: Protocol, profiles: list[str]) -> list[str]:
         f"  can be    {', '.join(str(rate) for rate in protocol.line.baud_choices) or protocol.line.baud} baud",
         f"  reading   {asked}, about {protocol.fastest_hz():.1f} per second",
         f"  range     {low_mm:g} to {high_mm:g} mm",
-        f"  checksum  {'yes' if protocol.has_checksum else 'none: a damaged digit is not noticed'}",
+        f"  checksum  {'yes' if protocol.has_checksum else NO_CHECKSUM}",
         f"  counter   {f'modulo {counter}: lost samples are seen' if counter else 'none'}",
     ]
     lines += ["", "Set on the instrument:", *(f"  - {step}" for step in protocol.setup)] if protocol.setup else []

@@ -157,7 +157,12 @@ class Summary:
         completed = self._completed.get(f"{run.test}-{run.direction}-{run.repeat}")
         if completed is None:
             return told
-        told |= {"samples": completed.samples, "lost": completed.lost, "problem": completed.problem or None}
+        told |= {
+            "samples": completed.samples,
+            "lost": completed.lost,
+            "doubtful": completed.doubtful,
+            "problem": completed.problem or None,
+        }
         told["findings"] = findings_summary(completed.findings)
         if completed.figures is not None:
             told |= {
@@ -282,6 +287,7 @@ def _of_run(
             return f"does not count, kept ({event.reason})"
         case events.RunCompleted(figures=figures) if figures is not None:
             lost = f", {event.lost} samples lost" if event.lost else ""
+            lost += f", {event.doubtful} doubtful" if event.doubtful else ""
             return (
                 f"{event.samples} samples{lost}; {centre} off {figures.centre_deviation_um:.1f} µm, "
                 f"mean {figures.mean_radial_error_um:+.1f} µm, circularity {figures.circularity_um:.1f} µm"

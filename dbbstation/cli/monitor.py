@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from dbbstation.instrument.reception import Tally
 
 
+NO_PARITY = "note: this port does not tell of characters with a wrong parity; connect the instrument directly where lines are noisy"
+"""Said of network ports, and on Windows."""
+
+
 @click.command()
 @instrument_options(required=True)
 @click.option("--count", type=click.IntRange(min=1), help="Number of readings after which to stop.")
@@ -53,6 +57,8 @@ def monitor(
     with ExitStack() as stack:
         book = stack.enter_context(spying(spy or log, protocol, port, force=force))
         driver = stack.enter_context(Instrument(protocol, port, baud=baud, log=book, reconnect_s=RECONNECT_S))
+        if protocol.line.parity != "none" and not driver.sees_damage:
+            click.echo(NO_PARITY, err=True)
         first_s: float | None = None
         try:
             for reading in driver.readings(count):
@@ -82,12 +88,13 @@ def _conclude(tally: Tally, *, as_json: bool) -> None:
         totals: dict[str, object] = {
             "readings": tally.readings,
             "lost": tally.lost,
+            "doubtful": tally.doubtful,
             "garbage_bytes": tally.garbage_bytes,
         }
         totals |= {"rejected": tally.rejected, "reconnected": tally.reconnected}
         click.echo(json.dumps({"totals": totals, "provenance": provenance().data()}))
         return
-    text = f"{tally.readings} readings, {tally.lost} lost, {tally.garbage_bytes} bytes not understood"
+    text = f"{tally.readings} readings, {tally.lost} lost, {tally.doubtful} doubtful, {tally.garbage_bytes} bytes not understood"
     if tally.rejected:
         text += f" ({', '.join(f'{count} by {reason}' for reason, count in sorted(tally.rejected.items()))})"
     click.echo(text + (f", for example {tally.garbage[:24].hex(' ')}" if tally.garbage else ""), err=True)

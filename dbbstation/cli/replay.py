@@ -33,6 +33,7 @@ def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: 
     from dbbstation.cli.output import print_json
     from dbbstation.instrument.bytelog import logged_instrument, read_byte_log
     from dbbstation.instrument.library import load_instrument, with_zero
+    from dbbstation.instrument.reading import DOUBTFUL
     from dbbstation.instrument.replay import replayed
 
     of_log, profile_of_log = logged_instrument(file)
@@ -47,6 +48,7 @@ def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: 
     readings = [row for row in rows if row.reading is not None]
     garbage = [row for row in rows if row.reading is None]
     lost = sum(row.reading.lost for row in rows if row.reading is not None)
+    doubtful = sum(row.reading.status == DOUBTFUL for row in readings if row.reading is not None)
     if as_json:
         said = [
             {"t_s": row.t_s, "length_mm": row.reading.length_mm, "status": row.reading.status, "lost": row.reading.lost}
@@ -54,7 +56,7 @@ def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: 
             if row.reading is not None
         ]
         unread = [{"t_s": row.t_s, "bytes": row.raw.hex(" "), "why": row.why} for row in garbage]
-        print_json({"readings": said, "lost": lost, "not_understood": unread})
+        print_json({"readings": said, "lost": lost, "doubtful": doubtful, "not_understood": unread})
         return
     for row in rows:
         if row.reading is None:
@@ -65,5 +67,7 @@ def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: 
         status = f"  {row.reading.status}: {row.reading.said}" if row.reading.status != "ok" else ""
         click.echo(f"{row.t_s:12.6f} s {length}{gap}{status}")
     click.echo(
-        f"{len(readings)} readings, {lost} lost, {sum(len(row.raw) for row in garbage)} bytes not understood", err=True
+        f"{len(readings)} readings, {lost} lost, {doubtful} doubtful, "
+        f"{sum(len(row.raw) for row in garbage)} bytes not understood",
+        err=True,
     )

@@ -159,7 +159,8 @@ def _run(checked: Checked) -> None:
     checked.warnings += run.warnings
     seconds = run.recording.t_s[-1] - run.recording.t_s[0]
     lost = lost_samples(run.recording.t_s)
-    told = f", {lost} lost" if lost else ""
+    unused = len(run.recording) - len(run.recording.good)
+    told = (f", {lost} lost" if lost else "") + (f", {unused} doubtful or no length" if unused else "")
     checked.summary = f"run: {_count(len(run.recording), 'sample')} in {seconds:.1f} s{told}"
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from dbbstation.errors import InstrumentError
+from dbbstation.instrument.damaged import damaged_in
+from dbbstation.instrument.doubt import Written
 from dbbstation.instrument.fields import Content, Found, Literally, NotRepresentable, NotUnderstood, Reason
 from dbbstation.instrument.reading import Reading, Status
 
@@ -22,11 +24,19 @@ is kept of bytes in which no frame of fixed width was found yet."""
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A reading (`lost` not yet counted, no time) with its bytes; `after` bytes of the same chunk follow it."""
+    """A reading (`lost` not yet counted, no time) with its bytes.
+
+    Attributes:
+        reading: what they tell.
+        raw: the bytes.
+        after: bytes of the same chunk that follow it.
+        written: how its number stood there; None where it has none in decimal digits.
+    """
 
     reading: Reading
     raw: bytes
     after: int
+    written: Written | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +98,10 @@ def decode(protocol: Protocol, raw: bytes) -> Reading:
     Raises:
         NotUnderstood: they are no whole frame of this protocol.
     """
+    return _decoded(protocol, raw)[0]
+
+
+def _decoded(protocol: Protocol, raw: bytes) -> tuple[Reading, Written | None]:
     wrong = NotUnderstood("no frame of this protocol")
     for frame in protocol.frames:
         match = frame.pattern.fullmatch(raw)
@@ -149,12 +163,20 @@ class Decoder:
                 heard.append(Garbage(raw, joining=True))
                 continue
             try:
-                heard.append(Piece(decode(self._protocol, raw), raw, len(self._pending)))
+                reading, written = _decoded(self._protocol, raw)
+                heard.append(Piece(reading, raw, len(self._pending), written))
             except NotUnderstood as error:
-                heard.append(Garbage(raw, str(error), reason=error.reason))
+                heard.append(self._not_understood(raw, error))
         if len(self._pending) > LONGEST_LINE:
             heard.append(Garbage(self.take_pending(), f"no line end in {LONGEST_LINE} bytes"))
         return heard
+
+    def _not_understood(self, raw: bytes, error: NotUnderstood) -> Garbage:
+        damaged = damaged_in(raw, self._protocol.line)
+        if not damaged:
+            return Garbage(raw, str(error), reason=error.reason)
+        characters = "character" if damaged == 1 else "characters"
+        return Garbage(raw, f"{damaged} {characters} with a wrong parity", reason="parity")
 
     def _cut_by_width(self) -> list[Heard]:
         """Slide to the next place where a frame fits; out of step, one must be followed by a second to be believed."""
@@ -201,11 +223,11 @@ class Decoder:
             match = frame.pattern.match(self._pending, start)
             if match is not None:
                 try:
-                    reading = _reading(self._protocol, frame.read(match))
+                    reading, written = _reading(self._protocol, frame.read(match))
                 except NotUnderstood as error:
                     wrong = error
                     continue
-                return Piece(reading, match[0], len(self._pending) - match.end())
+                return Piece(reading, match[0], len(self._pending) - match.end(), written)
         return wrong
 
 
@@ -222,7 +244,7 @@ def _skipped(raw: bytes, wrong: NotUnderstood | None, *, joining: bool) -> Garba
     return Garbage(raw, joining=joining) if wrong is None else Garbage(raw, str(wrong), joining, wrong.reason)
 
 
-def _reading(protocol: Protocol, found: Found) -> Reading:
+def _reading(protocol: Protocol, found: Found) -> tuple[Reading, Written | None]:
     length_mm: float | None = None
     if found.value is not None and found.status != "fault":
         length_mm = found.sign * found.value * protocol.length.mm_per_unit(found.unit) + protocol.length.zero_mm + 0.0
@@ -235,7 +257,11 @@ def _reading(protocol: Protocol, found: Found) -> Reading:
             )
     if length_mm is None and found.status == "ok":
         raise NotUnderstood("no number and no status")
-    return Reading(0.0, length_mm, found.status, 0, found.counter, found.said, found.remedy)
+    written = None
+    # What a device writes in place of a length, such as zeros, says nothing of how it writes lengths.
+    if found.value is not None and found.digits is not None and length_mm is not None:
+        written = Written(found.sign * found.value, *found.digits, found.unit or "")
+    return Reading(0.0, length_mm, found.status, 0, found.counter, found.said, found.remedy), written
 
 
 def _told(frame: Frame, content: Content) -> bytes:

@@ -19,6 +19,7 @@ from dbbstation.instrument.adapters import adapter_of, port_of
 from dbbstation.instrument.link import LineClosedError, open_link
 from dbbstation.instrument.listening import Listener
 from dbbstation.instrument.polling import Poller
+from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.instrument.reception import Reception, Tally
 
 if TYPE_CHECKING:
@@ -92,6 +93,11 @@ class Instrument:
         return self._port if isinstance(self._port, str) else str(getattr(self._port, "name", None) or "open port")
 
     @property
+    def sees_damage(self) -> bool:
+        """Whether characters with a wrong parity or stop bit are known on this port."""
+        return self._link is not None and self._link.sees_damage
+
+    @property
     def reading(self) -> bool:
         """Whether the line is being read; false before `start`, and once it has failed."""
         return self._thread is not None and self._thread.is_alive() and self._failure is None
@@ -104,7 +110,7 @@ class Instrument:
         """
         if self._thread is not None:
             raise InstrumentError("it is being read already", where=self.where, remedy="stop it first")
-        self._link = self._link or open_link(self._port, self.protocol.line, baud=self._baud, log=self._log)
+        self._link = self._link or self._open(self._port)
         self._adapter = adapter_of(self._port) if self._reconnect_s and isinstance(self._port, str) else None
         self._last_s, self._away = None, False
         self._stop.clear()
@@ -201,6 +207,10 @@ class Instrument:
             yield self.read()
             done += 1
 
+    def _open(self, port: str | Port) -> Link:
+        protocol = self.protocol
+        return open_link(port, protocol.line, baud=self._baud, log=self._log, text=protocol.is_text)
+
     def _begin(self, link: Link) -> bytes:
         """Send the start sequence; return what came behind its last answer."""
         after = b""
@@ -234,6 +244,7 @@ class Instrument:
             tally=self.tally,
             stop=self._stop,
             put=self._put,
+            eighth_bit_marks=link.eighth_bit_marks,
         )
         if self.protocol.ask.asked:
             self.tally.reject(after, "bytes")
@@ -254,7 +265,7 @@ class Instrument:
                 continue
             # A port that has just appeared may not be ready, or not be ours yet: it is tried again.
             with suppress(StationError):
-                link = open_link(name, self.protocol.line, baud=self._baud, log=self._log)
+                link = self._open(name)
                 self._link, self._away = link, True
                 self.tally.reconnected += 1
                 return link, self._begin(link)
@@ -269,6 +280,7 @@ class Instrument:
         with self._arrived:
             self.tally.readings += 1
             self.tally.lost += reading.lost
+            self.tally.doubtful += reading.status == DOUBTFUL
             self._queue.append(reading)
             self._arrived.notify_all()
 

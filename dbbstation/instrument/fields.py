@@ -22,13 +22,14 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from dbbstation.files.yaml.schema import Schema
-from dbbstation.instrument.reading import SEVERITY, Status
+from dbbstation.instrument.reading import SEVERITY, SaidStatus, Status
 
 Unit: TypeAlias = Literal["mm", "um", "nm", "m", "inch", "count"]
 
 
-Reason: TypeAlias = Literal["bytes", "checksum", "counter"]
-"""Why a frame is rejected: its bytes do not fit the grammar, its checksum is wrong, its sample counter is out of order."""
+Reason: TypeAlias = Literal["bytes", "parity", "checksum", "counter"]
+"""Why a frame is rejected: its bytes do not fit the grammar, a character has a wrong parity, its checksum is wrong, its sample
+counter is out of order."""
 
 
 class NotUnderstood(ValueError):  # noqa: N818 (it is no error of the program: most garbled bytes end here)
@@ -74,6 +75,7 @@ class Found:
         counter: sample counter.
         status, said, remedy: the worst status that a part reported.
         text: what the device says in words of its own.
+        digits: of the length: how many stood before its point and behind it; None where it is not written in decimal digits.
     """
 
     value: float | None = None
@@ -84,6 +86,7 @@ class Found:
     said: str = ""
     remedy: str = ""
     text: str = ""
+    digits: tuple[int, int] | None = None
 
     def report(self, status: Status, said: str, remedy: str) -> None:
         """Keep the worst of the statuses."""
@@ -117,7 +120,7 @@ class Code(Schema):
 
     code: Bytes
     means: str
-    status: Status = "ok"
+    status: SaidStatus = "ok"
     unit: Unit | None = None
     remedy: str = ""
 
@@ -127,7 +130,7 @@ class Bit(Schema):
 
     bit: int = Field(ge=0, le=7)
     means: str
-    status: Status
+    status: SaidStatus
     remedy: str = ""
 
 

@@ -12,7 +12,7 @@ from dbbstation.files.yaml.schema import Schema
 from dbbstation.instrument.checksum_part import Checksum
 from dbbstation.instrument.fields import Choice, Flags, Found, Literally, Sign, Skip
 from dbbstation.instrument.numbers import DecimalText, Ieee, Integer
-from dbbstation.instrument.reading import Status  # noqa: TC001 (pydantic needs it at run time)
+from dbbstation.instrument.reading import SaidStatus  # noqa: TC001 (pydantic needs it at run time)
 from dbbstation.instrument.telling import ErrorTable, Text
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class Frame(Schema):
     """
 
     name: str = "reading"
-    status: Status = "ok"
+    status: SaidStatus = "ok"
     means: str = ""
     remedy: str = ""
     bare: bool = False

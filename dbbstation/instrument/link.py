@@ -12,6 +12,7 @@ from serial.tools import list_ports
 from serial.urlhandler.protocol_socket import Serial as SocketPort
 
 from dbbstation.errors import InstrumentError
+from dbbstation.instrument.damaged import Marks, mark_damaged
 from dbbstation.instrument.holders import holders
 
 if TYPE_CHECKING:
@@ -67,13 +68,36 @@ class Link:
         name: what messages call it.
         owned: close the port with the link; a port that somebody else opened stays open.
         log: where every byte is written down.
+        marks: takes out what the system marks damaged characters with; None where it marks none.
+        has_bits: it is a line with bits, not a pseudo-terminal.
     """
 
-    def __init__(self, port: Port, *, name: str, owned: bool, log: ByteLog | None = None) -> None:
+    def __init__(
+        self,
+        port: Port,
+        *,
+        name: str,
+        owned: bool,
+        log: ByteLog | None = None,
+        marks: Marks | None = None,
+        has_bits: bool = True,
+    ) -> None:
         self._port = port
         self._owned = owned
         self._log = log
+        self._marks = marks
+        self._has_bits = has_bits
         self.name = name
+
+    @property
+    def sees_damage(self) -> bool:
+        """Whether characters with a wrong parity or stop bit are known."""
+        return self._marks is not None
+
+    @property
+    def eighth_bit_marks(self) -> bool:
+        """Whether the eighth bit of a character of seven can only be the mark of a wrong parity."""
+        return self._marks is not None and self._has_bits
 
     def read(self) -> bytes:
         """Return the bytes that have arrived, after waiting a moment for the first; empty where none came.
@@ -87,6 +111,8 @@ class Link:
                 raw += self._rest()
         except _ERRORS as error:
             raise self._gone(error) from None
+        if self._marks is not None:
+            raw = self._marks.taken_out(raw)
         if raw and self._log is not None:
             self._log.note("<", raw)
         return raw
@@ -140,7 +166,9 @@ def _close_quietly(port: object) -> None:
                 close()
 
 
-def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: ByteLog | None = None) -> Link:
+def open_link(
+    port: str | Port, line: Line, *, baud: int | None = None, log: ByteLog | None = None, text: bool = False
+) -> Link:
     """Open a line to an instrument.
 
     Args:
@@ -148,6 +176,7 @@ def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: Byt
         line: its settings.
         baud: baud rate to use instead of the usual one.
         log: where every byte is written down.
+        text: all that comes is text, so that characters with a wrong parity or stop bit can be marked in it.
 
     Raises:
         InstrumentError: no such port, no permission, in use, settings that the port does not take.
@@ -156,7 +185,8 @@ def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: Byt
         return Link(port, name=str(getattr(port, "name", None) or "open port"), owned=False, log=log)
     speed = baud or line.baud
     # A pseudo-terminal has no bits: asked a second time for parity, the system finds nothing to change and refuses.
-    bits = (8, "none", 1) if _is_pseudo_terminal(port) else (line.data_bits, line.parity, line.stop_bits)
+    has_bits = not _is_pseudo_terminal(port)
+    bits = (line.data_bits, line.parity, line.stop_bits) if has_bits else (8, "none", 1)
     opened = None
     try:
         opened = serial.serial_for_url(
@@ -176,7 +206,8 @@ def open_link(port: str | Port, line: Line, *, baud: int | None = None, log: Byt
     except _OPENING_ERRORS as error:
         _close_quietly(opened)
         raise _not_opened(port, speed, error) from None
-    return Link(opened, name=port, owned=True, log=log)
+    marks = Marks(line.data_bits) if text and mark_damaged(opened) else None
+    return Link(opened, name=port, owned=True, log=log, marks=marks, has_bits=has_bits)
 
 
 def connected_ports() -> list[tuple[str, str, str]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.instrument.arrivals import Arrivals
 from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage, Piece
+from dbbstation.instrument.doubt import Doubts
 from dbbstation.instrument.reception import INCOMPLETE
 from dbbstation.instrument.sequence import Sequence
 from dbbstation.instrument.stamps import StreamStamps
@@ -33,6 +34,7 @@ class Listener:
         # Behind the answer to a start command the stream begins with a whole frame.
         self._decoder = Decoder(protocol, joining=not (protocol.ask.start and protocol.ask.start[-1].reply))
         self._stamps = StreamStamps(1.0 / protocol.fastest_hz(reception.baud), reception.memory_s)
+        self._doubts = Doubts(protocol)
         self._arrivals = Arrivals(reception.character_s, 2 * LONGEST_LINE)
         self._good_s = time.monotonic()
         self._garbled, self._unread, self._why = 0, b"", ""
@@ -70,6 +72,8 @@ class Listener:
         """Stamp a reading and hand out what has its place."""
         size = heard.after + len(heard.raw)
         left_s = seen_s - size * self._to.character_s - self._to.protocol.timing.latch_delay_s
+        judged = self._doubts.judged(heard)
+        heard = heard if judged is heard.reading else replace(heard, reading=judged)
         sample = (heard, left_s, self._arrivals.at_latest_s(size - 1))
         for placed in self._sequence.place(heard.reading.counter, sample):
             piece, sent_s, first_s = placed.sample

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 import struct
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, model_validator
@@ -60,6 +61,7 @@ class Number(Schema):
         value = self._parsed(raw)
         if self.of == "length":
             found.value = self._times(value, self.scale)
+            found.digits = self._places(raw)
         else:
             found.counter = int(value)
 
@@ -92,6 +94,10 @@ class Number(Schema):
     def _digits(self) -> bytes:
         raise NotImplementedError
 
+    def _places(self, raw: bytes) -> tuple[int, int] | None:  # noqa: ARG002 (numbers in text have digits)
+        """Return how many digits stand before the point and behind it; None where the number is not in decimal digits."""
+        return None
+
     def _parsed(self, raw: bytes) -> float:
         raise NotImplementedError
 
@@ -107,8 +113,9 @@ class DecimalText(Number):
         decimals: decimals that the device writes; others are understood only with `decimals_vary`.
         point: the decimal point.
         pad: what fills the width on the left.
-        signed: the sign stands in this field; `plus` is what a positive number has there.
-        min_width: of a number of free width: blanks fill it up on the left.
+        signed: the sign stands in this field; `plus` is what a positive number has there. Where it has something, a number
+            without a sign is not understood; a blank is, where blanks fill up.
+        min_width: of a number of free width: blanks or zeros fill it up on the left, and a narrower one is not understood.
         leading_zero: whether the device writes 0 before the point of a number below one.
     """
 
@@ -141,17 +148,29 @@ class DecimalText(Number):
 
     def _digits(self) -> bytes:
         characters = b"[ 0-9+-" + re.escape(self.point.encode()) + b"]"
-        return characters + (b"{%d}" % self.width if self.width else b"{1,%d}" % self.max_width)
+        if self.width:
+            return characters + b"{%d}" % self.width
+        return characters + b"{%d,%d}" % (max(self.min_width, 1), max(self.min_width, self.max_width))
+
+    def _places(self, raw: bytes) -> tuple[int, int]:
+        before, _, behind = raw.decode("latin-1").partition(self.point)
+        return sum(one.isdigit() for one in before), len(behind)
+
+    @cached_property
+    def _grammar(self) -> re.Pattern[str]:
+        blanks = " *" if self.pad == " " or self.plus == " " else ""
+        sign = ""
+        if self.signed:
+            sign = "[+-]?" if not self.plus else "[+ -]" if blanks else "[+-]"
+        return re.compile(rf"{blanks}({sign}){blanks}(\d*)(?:{re.escape(self.point)}(\d*))?")
 
     def _parsed(self, raw: bytes) -> float:
-        blanks = " *" if self.pad == " " or self.plus == " " else ""
-        sign = "[+-]?" if self.signed else ""
-        match = re.fullmatch(rf"{blanks}({sign}){blanks}(\d*)(?:{re.escape(self.point)}(\d*))?", raw.decode("latin-1"))
+        match = self._grammar.fullmatch(raw.decode("latin-1"))
         if match is None or not (match[2] or match[3]):
             raise NotUnderstood(f"{raw!r} is no number")
         if not self.decimals_vary and len(match[3] or "") != self.decimals:
             raise NotUnderstood(f"{raw!r} has not {self.decimals} decimals")
-        return float(f"{match[1]}{match[2] or '0'}.{match[3] or '0'}")
+        return float(f"{match[1].strip()}{match[2] or '0'}.{match[3] or '0'}")
 
     def _written(self, value: float) -> bytes:
         if value < 0 and not self.signed:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.instrument.codec import LONGEST_LINE, Decoder, Garbage, Piece
+from dbbstation.instrument.doubt import Doubts
 from dbbstation.instrument.latch import latch_of
 from dbbstation.instrument.reading import Reading
 from dbbstation.instrument.reception import INCOMPLETE
@@ -65,6 +66,7 @@ class Poller:
         self._to = reception
         self._protocol = reception.protocol
         self._sequence = Sequence[tuple[Piece, Reading]](self._protocol.counter_modulus, reception.where)
+        self._doubts = Doubts(self._protocol)
         self._last_s = float("-inf")
         self._failed: list[Garbage] = []
         self._recent: deque[Answer] = deque(maxlen=EXCHANGES)
@@ -89,7 +91,8 @@ class Poller:
             if isinstance(answer.heard, Garbage):
                 self._fail(answer.heard)
                 continue
-            self._take(answer.heard, answer.first_s, asked_s)
+            judged = self._doubts.judged(answer.heard, clean=answer.clean)
+            self._take(replace(answer.heard, reading=judged), answer.first_s, asked_s)
             self._refuse_strangers()
             while clock() < asked_s + pause_s and not stop.wait(_PAUSE_TICK_S):
                 pass

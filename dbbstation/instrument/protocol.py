@@ -322,6 +322,11 @@ class Protocol(Schema):
         """Whether a wrong digit in a reading is noticed."""
         return any(part.kind == "checksum" for part in self.frames[0].parts)
 
+    @property
+    def is_text(self) -> bool:
+        """Whether all that comes is text."""
+        return not any(frame.binary for frame in self.frames)
+
     def voice(self, status: Status) -> tuple[Frame, Code | Bit | None] | None:
         """Return how the device says `status`: a code in its reading, or else a message; None where it cannot."""
         for frame in self.frames:

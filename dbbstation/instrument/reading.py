@@ -5,10 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-Status: TypeAlias = Literal["ok", "overrange", "fault"]
-"""`ok`: the length can be trusted. `overrange`: the device says (or its range says) that it cannot. `fault`: no length."""
+SaidStatus: TypeAlias = Literal["ok", "overrange", "fault"]
+"""What a device says of a length. `ok`: it can be trusted. `overrange`: it (or its range) says that it cannot. `fault`: no length."""
 
-SEVERITY: dict[Status, int] = {"ok": 0, "overrange": 1, "fault": 2}
+Status: TypeAlias = Literal["ok", "doubtful", "overrange", "fault"]
+"""`doubtful`: the device says nothing against the length, but it may have been damaged on the line. It is kept and not used."""
+
+OK: Status = "ok"
+DOUBTFUL: Status = "doubtful"
+
+SEVERITY: dict[Status, int] = {"ok": 0, "doubtful": 1, "overrange": 2, "fault": 3}
 """Where several parts of a reply speak of the status, the worst is taken."""
 
 
@@ -22,7 +28,7 @@ class Reading:
         status: see `Status`.
         lost: samples lost immediately before this one (gap of the counter, or replies that could not be read).
         counter: the device's own sample counter, None where its wire has none.
-        said: what the device said where `status` is not `ok`.
+        said: what the device said where `status` is not `ok`; why it is doubted where it is `doubtful`.
         remedy: what to do about it.
         t_uncertainty_s: standard uncertainty of `t_s` where the request bounds it [s]; None of a stream, whose clock does
             better than its bounds.
@@ -38,3 +44,8 @@ class Reading:
     remedy: str = ""
     t_uncertainty_s: float | None = None
     first_byte_s: float = 0.0
+
+    @property
+    def gone(self) -> bool:
+        """Whether the device itself says that there is no length to be trusted; a doubtful one is lost on the line only."""
+        return self.status not in {OK, DOUBTFUL}

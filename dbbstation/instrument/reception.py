@@ -28,6 +28,7 @@ class Tally:
     Attributes:
         readings: handed out.
         lost: samples that never came, or came and were rejected.
+        doubtful: handed out as doubtful.
         rejected: frames and stretches of bytes that were not believed, by reason.
         garbage_bytes: bytes of these.
         garbage: an example of them.
@@ -36,6 +37,7 @@ class Tally:
 
     readings: int = 0
     lost: int = 0
+    doubtful: int = 0
     rejected: dict[Reason, int] = field(default_factory=dict)
     garbage_bytes: int = 0
     garbage: bytes = b""
@@ -63,6 +65,7 @@ class Reception:
         tally: counts what comes.
         stop: set when reading shall end.
         put: takes every reading.
+        eighth_bit_marks: the eighth bit of a character of seven can only be the mark of a wrong parity.
     """
 
     protocol: Protocol
@@ -74,6 +77,7 @@ class Reception:
     tally: Tally
     stop: threading.Event
     put: Callable[[Reading], None]
+    eighth_bit_marks: bool = False
 
     @property
     def character_s(self) -> float:
@@ -92,4 +96,4 @@ class Reception:
             return symptoms.silence(self.protocol, self.where, self.timeout_s, self.baud, heard_before=heard_before)
         if why == INCOMPLETE and symptoms.begins_well(self.protocol, raw):
             return symptoms.half_line(raw, self.where, self.timeout_s)
-        return symptoms.garbage(self.protocol, self.where, raw, why, self.baud)
+        return symptoms.garbage(self.protocol, self.where, raw, why, self.baud, marked=self.eighth_bit_marks)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.codec import Decoder, Piece
+from dbbstation.instrument.doubt import Doubts
 from dbbstation.instrument.sequence import Sequence
 
 if TYPE_CHECKING:
@@ -55,6 +56,8 @@ class _Decoding:
         self._answers = {step.reply for step in (*protocol.ask.start, *protocol.ask.stop) if step.reply}
         self._decoder = Decoder(protocol, joining=not protocol.ask.asked)
         self._sequence = self._anew()
+        self._doubts = Doubts(protocol)
+        self._answer = b""
         self._explaining = False
         self._last_s = 0.0
 
@@ -63,6 +66,7 @@ class _Decoding:
         if not self._protocol.ask.asked:
             return
         yield from self._unfinished("no end before the next request")
+        self._answer = b""
         follow_up = self._protocol.ask.follow_up
         self._explaining = follow_up is not None and raw == follow_up.request
         told = self._protocol.explaining if self._explaining else None
@@ -71,6 +75,7 @@ class _Decoding:
     def came(self, chunk: Chunk) -> Iterator[Replayed]:
         """Take bytes that came from the device."""
         self._last_s = chunk.t_s
+        self._answer += chunk.raw if self._protocol.ask.asked else b""
         for heard in self._decoder.feed(chunk.raw):
             if isinstance(heard, Piece):
                 if not self._explaining:
@@ -85,6 +90,8 @@ class _Decoding:
         yield from self._unfinished("the log ends within it")
 
     def _placed(self, heard: Piece) -> Iterator[Replayed]:
+        clean = heard.raw == self._answer or not self._protocol.ask.asked
+        heard = replace(heard, reading=self._doubts.judged(heard, clean=clean))
         try:
             placed = self._sequence.place(heard.reading.counter, (heard, self._last_s))
         except InstrumentError as error:

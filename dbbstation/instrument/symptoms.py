@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InstrumentError
 from dbbstation.instrument.codec import Decoder, Piece
+from dbbstation.instrument.damaged import damaged_in
 from dbbstation.instrument.fields import Content
 from dbbstation.instrument.recognise import looks_like
 
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
 
 _TELLING_BYTES = 12
+
+_MOSTLY = 0.25
+"""Share of characters with a wrong parity above which no noise did it: with another parity set all are wrong, with none half."""
 
 _OTHERS = 3
 """Instruments that a message names: the likeliest."""
@@ -47,12 +51,23 @@ def half_line(raw: bytes, where: str, waited_s: float) -> InstrumentError:
     )
 
 
-def garbage(protocol: Protocol, where: str, raw: bytes, why: str, baud: int) -> InstrumentError:
-    """Return the error for bytes that are no reading, with the likeliest cause."""
+def garbage(
+    protocol: Protocol, where: str, raw: bytes, why: str, baud: int, *, marked: bool = False
+) -> InstrumentError:
+    """Return the error for bytes that are no reading, with the likeliest cause.
+
+    Args:
+        protocol: that is expected.
+        where: name of the port.
+        raw: the bytes.
+        why: what is wrong with them.
+        baud: of the port.
+        marked: the eighth bit of a character of seven can only be the mark of a wrong parity.
+    """
     return InstrumentError(
         f"what comes is not {protocol.label}: {shown(raw)}" + (f" ({why})" if why else ""),
         where=where,
-        remedy=_cause(protocol, raw, baud),
+        remedy=_cause(protocol, raw, baud, marked=marked),
     )
 
 
@@ -73,9 +88,15 @@ def shown(raw: bytes) -> str:
     return f"{text} = {head.decode('latin-1')!r}" if 2 * printable > len(head) else text
 
 
-def _cause(protocol: Protocol, raw: bytes, baud: int) -> str:
+def _cause(protocol: Protocol, raw: bytes, baud: int, *, marked: bool) -> str:
     seven_bits = bytes(byte & 0x7F for byte in raw)
     if seven_bits != raw and _holds_reading(protocol, seven_bits):
+        damaged = damaged_in(raw, protocol.line)
+        if damaged and (marked or not parity_in(raw)):
+            # A device without parity sends a zero in its place: what has an odd number of bits then is wrong.
+            few = damaged < _MOSTLY * len(raw)
+            cause = "look after the cable and its screen" if few else f"set the device to {protocol.line.text}"
+            return f"{damaged} of its {len(raw)} characters came with a wrong parity: {cause}"
         # Seven bits and a parity in eight: the port is set to eight, or the device to seven.
         wrong = "the device" if protocol.line.data_bits == 8 else "the port"  # noqa: PLR2004 (bits)
         return (

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.circles.analysis import CircleAnalysis, analyse, feed_shown
 from dbbstation.errors import TraceError
 from dbbstation.inference.harmonics import amplitudes
-from dbbstation.trace.cut import cut, lost_on_turn
+from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -80,7 +80,8 @@ class Seen:
         run: the run.
         analysis: its figures; None where it shows no circle.
         problem: why it shows none; empty where it does.
-        lost: samples lost on the turn, and kept.
+        lost: samples missing on the turn, and there.
+        unusable: of the missing ones, how many are recorded but cannot be used.
         feed_mm_min: feed that its overlap shows and its standard uncertainty [mm/min]; None where it shows none.
         coefficients_um: orthonormal Fourier coefficients of the readings less the bar's length, harmonics 0 to 3 by
             commanded angle from the start of the turn towards +Y: mean, cosines, sines, shape (7,) [µm].
@@ -92,6 +93,7 @@ class Seen:
     lost: tuple[int, int]
     feed_mm_min: tuple[float, float] | None = None
     coefficients_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2 * HIGHEST_HARMONIC + 1))
+    unusable: int = 0
 
     @property
     def u_um(self) -> float:
@@ -104,16 +106,17 @@ class Seen:
 def seen(run: Run) -> Seen:
     """Cut and analyse a run."""
     lost = lost_on_turn(run.recording, run.circle)
+    unusable = unusable_on_turn(run.recording, run.circle)
     try:
         analysis = analyse(cut(run.recording, run.circle), run.recording)
     except TraceError as error:
-        return Seen(run, None, f"{error.what}; {error.remedy}", lost, _feed_of(run))
+        return Seen(run, None, f"{error.what}; {error.remedy}", lost, _feed_of(run), unusable=unusable)
     raw = analysis.raw
     theta = np.radians(raw.theta_deg - raw.circle.start_deg)
     found = amplitudes(1e3 * (raw.length_mm - raw.circle.bar_mm), theta, HIGHEST_HARMONIC)
     waves = found[1:] / np.sqrt(2.0)
     orthonormal = np.concatenate([found[:1].real, waves.real, -waves.imag])
-    return Seen(run, analysis, "", lost, analysis.feed_mm_min, orthonormal)
+    return Seen(run, analysis, "", lost, analysis.feed_mm_min, orthonormal, unusable)
 
 
 def _feed_of(run: Run) -> tuple[float, float] | None:

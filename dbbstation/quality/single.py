@@ -25,7 +25,7 @@ def lost_samples(one: Seen) -> Finding:
     """Share of the turn's samples that were lost, against what the plan allows."""
     lost, kept = one.lost
     percent = 100.0 * lost / max(lost + kept, 1)
-    stated = share_lost(lost, kept) if lost else "no sample is missing on the turn"
+    stated = share_lost(lost, kept, one.unusable) if lost else "no sample is missing on the turn"
     return found(Name.LOST, percent, one.run.largest_loss_percent, "%", stated, f"{stated}; {AFTER_LOSS}")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from dbbstation.errors import InstrumentError
 from dbbstation.files.formats.bar import BarFile
 from dbbstation.plan.bar import USUAL_READINGS
+from dbbstation.trace.reachable import Reachable
 from dbbstation.trace.steady import steady
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def read_on_calibrator(
     resolution_um: float | None = None,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> Steady:
-    """Return the mean of so many good readings.
+    """Return the mean of so many good readings, less those that a bar that stands cannot have.
 
     Args:
         source: started instrument.
@@ -50,7 +51,9 @@ def read_on_calibrator(
     else:
         what = f"only {len(lengths)} of {2 * count} readings are a length"
         raise InstrumentError(what, where=source.where, remedy="put the bar on the calibrator, check its cable")
-    return steady(np.array(lengths), None if resolution_um is None else 1e-3 * resolution_um)
+    readings_mm = np.array(lengths)
+    possible = Reachable.standing(readings_mm)
+    return steady(readings_mm[possible], None if resolution_um is None else 1e-3 * resolution_um)
 
 
 def bar_file(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.plan.circle import Direction
 from dbbstation.service.live_trace import LiveTrace, View, difference
 from dbbstation.service.messages import Message, Weight, message_of
@@ -90,6 +91,7 @@ class Board:
         sample: the last one.
         rate: of the readings.
         lost: samples that the line lost during the run that goes on, or went on last.
+        doubtful: samples of that run that may have been damaged on the line.
         swept_deg: travelled since the feed-in [deg].
         traces: of the test that was started last, by direction.
         last: circles of the same test in the session before, by direction; empty where none were found.
@@ -115,6 +117,7 @@ class Board:
     sample: events.Sample | None = None
     rate: ReadingRate = field(default_factory=ReadingRate)
     lost: int = 0
+    doubtful: int = 0
     swept_deg: float = 0.0
     traces: dict[Direction, LiveTrace] = field(default_factory=dict)
     last: Mapping[Direction, LiveTrace] = field(default_factory=dict)
@@ -282,7 +285,7 @@ class Board:
             if direction is not run.direction and trace.run.mounting == run.mounting
         }
         self.traces[run.direction] = LiveTrace(run, self.announced.circle)
-        self.lost, self.swept_deg, self.difference = 0, 0.0, None
+        self.lost, self.doubtful, self.swept_deg, self.difference = 0, 0, 0.0, None
 
     def _complete(self, completed: events.RunCompleted) -> None:
         self.completed = self.runs[completed.run.label] = completed
@@ -328,6 +331,7 @@ class Board:
         samples: Sequence[events.Sample] = event.samples
         if isinstance(event, events.SamplesRecorded):
             self.lost += sum(sample.lost for sample in samples)
+            self.doubtful += sum(sample.status == DOUBTFUL for sample in samples)
             self._trace(event.run, samples)
         self.rate.add(samples)
         self.sample = samples[-1]

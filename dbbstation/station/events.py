@@ -48,8 +48,8 @@ class Sample:
     Attributes:
         t_s: machine time; since the run's first sample while a run is recorded, of the driver's clock before [s].
         length_mm: distance between the ball centres [mm]; None where the instrument gave no number.
-        status: `ok`, `overrange` or `fault`.
-        said: what the instrument said where the status is not `ok`.
+        status: `ok`, `doubtful`, `overrange` or `fault`.
+        said: what the instrument said where the status is not `ok`; why it is doubted where it is `doubtful`.
         lost: samples lost immediately before this one.
         phi_deg: progress along the turn as far as it can be told live, 0 to 360 on the full turn, negative on the
             overshoot before it, above 360 behind it [deg]; None off the circle.
@@ -181,6 +181,7 @@ class RunCompleted:
         figures: of its circle; None where there is none.
         problem: why it cannot be used; empty where it can.
         findings: all that was looked for in its circle; empty where it has none.
+        doubtful: samples that may have been damaged on the line; they are kept, and in no figure.
     """
 
     run: RunId
@@ -189,6 +190,7 @@ class RunCompleted:
     figures: CircleFigures | None
     problem: str
     findings: tuple[Finding, ...] = ()
+    doubtful: int = 0
 
     @property
     def wrong(self) -> tuple[Finding, ...]:

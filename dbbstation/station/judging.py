@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dbbstation.errors import InputError
 from dbbstation.files.recordings.entries import RunEntry, RunState
 from dbbstation.files.recordings.judged import runs_of
+from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
 from dbbstation.station import events
@@ -93,7 +94,9 @@ class RunJudge:
             shown = None if one.analysis is None else figures(one.analysis.raw)
             run = events.RunId(*_key(entry), entry.mounting or 0)
             findings = () if shown is None else together.judge(one).findings
-            completed = events.RunCompleted(run, len(one.run.recording), one.lost[0], shown, one.problem, findings)
+            doubtful = 0 if entry.counts is None else entry.counts.rejected.get(DOUBTFUL, 0)
+            samples = len(one.run.recording)
+            completed = events.RunCompleted(run, samples, one.lost[0], shown, one.problem, findings, doubtful)
             found.append(JudgedRun(completed, entry.state is RunState.ACCEPTED, entry.reason))
         return tuple(found)
 

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from dbbstation.errors import TraceError
+from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.station.detector import DWELL_BEHIND_S, live_phi_deg
 from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
-from dbbstation.trace.cut import cut
+from dbbstation.trace.cut import cut, unusable_on_turn
 from dbbstation.trace.cut import lost_on_turn as shown_lost
 from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 from dbbstation.trace.recording import Recording
@@ -72,7 +73,8 @@ class RunRecord:
         fed_out_s: of the feed-out edge, likewise.
         samples: how many it has.
         lost: samples that the line counted as lost, wherever in the run.
-        lost_on_turn: those from feed-in to feed-out.
+        lost_on_turn: those from feed-in to feed-out, and doubtful ones there: both are missing in the circle.
+        doubtful: samples that may have been damaged on the line, wherever in the run.
     """
 
     run: RunId
@@ -83,6 +85,7 @@ class RunRecord:
     samples: int = 0
     lost: int = 0
     lost_on_turn: int = 0
+    doubtful: int = 0
     _last_s: float = 0.0
     _last_mm: float | None = None
 
@@ -104,11 +107,18 @@ class RunRecord:
         self._last_s, self._last_mm = t_s, length_mm
         self.samples += 1
         self.lost += reading.lost
-        phi = None
-        if self.fed_in_s is not None and self.fed_out_s is None:
-            self.lost_on_turn += reading.lost
-            phi = live_phi_deg(self.circle, t_s - self.fed_in_s)
+        doubtful = int(reading.status == DOUBTFUL)
+        self.doubtful += doubtful
+        phi = self.phi_deg(t_s)
+        if phi is not None:
+            self.lost_on_turn += reading.lost + doubtful
         return Sample(t_s, length_mm, reading.status, reading.said, reading.lost, phi, reading.t_uncertainty_s)
+
+    def phi_deg(self, t_s: float) -> float | None:
+        """Progress along the turn at a time since the first sample, as far as it can be told live [deg]; None off the circle."""
+        if self.fed_in_s is None or self.fed_out_s is not None:
+            return None
+        return live_phi_deg(self.circle, t_s - self.fed_in_s)
 
     def swept_deg(self) -> float:
         """Travelled since the feed-in, as far as it can be told live [deg]."""
@@ -144,7 +154,8 @@ def circle_figures(
         largest_loss_percent: share of the samples that may be lost [%].
     """
     shown, kept = shown_lost(recording, circle)
-    if problem := too_many_lost(max(lost_on_turn, shown), kept, largest_loss_percent):
+    unusable = unusable_on_turn(recording, circle)
+    if problem := too_many_lost(max(lost_on_turn, shown), kept, largest_loss_percent, unusable):
         return None, f"{problem}; {AFTER_LOSS}"
     try:
         return figures(cut(recording, circle, counted_lost=lost)), ""

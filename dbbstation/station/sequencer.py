@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from dbbstation.instrument.reading import DOUBTFUL, OK
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.plan.sampling import sampling
 from dbbstation.station import events
@@ -22,6 +23,7 @@ from dbbstation.station.states import (
     State,
     commands_allowed,
 )
+from dbbstation.trace.reachable import Reachable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -49,6 +51,13 @@ class Waiting:
 
     completed: events.RunCompleted
     samples: tuple[Sample, ...]
+
+
+FEEDING_DEG = 10.0
+"""Stretch at either end of the turn that may be feed-in or feed-out where there is no overshoot [deg]."""
+
+LOOK_AFTER_LINE = "look after bar, balls and cable"
+"""What to do about a reading that cannot be."""
 
 
 class Sequencer:
@@ -95,6 +104,7 @@ class Sequencer:
         self._record: RunRecord | None = None
         self._edges: EdgeDetector | None = None
         self._watch: CircleWatch | None = None
+        self._reachable: Reachable | None = None
         self._remounted = False
         self._unjudged = deque(waiting)
         self._waiting_since_s: float | None = None
@@ -174,6 +184,7 @@ class Sequencer:
         test = self.plan.tests[run.test]
         program = self._programs.get((run.test, run.direction), "")
         self._commanded = circle = test.run(run.direction)
+        self._reachable = Reachable(circle)
         seen = None if self._rate_hz is None else sampling(circle, self._rate_hz)
         announced = events.RunAnnounced(
             run=run,
@@ -258,8 +269,9 @@ class Sequencer:
     # Readings.
 
     def _take(self, reading: Reading) -> None:
+        reading = self._held_against_feed(reading)
         outside = None
-        if self._edges is not None and reading.length_mm is not None and reading.status == "ok":
+        if self._edges is not None and reading.length_mm is not None and reading.status == OK:
             outside = self._edges.outside(reading.length_mm)
         if self._waiting_since_s is None:
             self._waiting_since_s = reading.t_s
@@ -280,12 +292,26 @@ class Sequencer:
             self._move(Cause.FED_OUT)
         elif self.state is State.LEAVING and self._record.left(sample.t_s):
             self._move(Cause.CIRCLE_FOUND if self._complete() else Cause.CIRCLE_MISSING)
-        elif reading.status != "ok" and sample.phi_deg is not None and 0.0 <= sample.phi_deg <= FULL_TURN_DEG:
+        elif reading.gone and sample.phi_deg is not None and 0.0 <= sample.phi_deg <= FULL_TURN_DEG:
             self._complete(problem=_length_gone(reading, sample.phi_deg))
             self._move(Cause.LENGTH_GONE)
         else:
             self._check_patience(reading)
         self._tell_progress()
+
+    def _held_against_feed(self, reading: Reading) -> Reading:
+        """Return a reading of a run, doubtful where the machine cannot have moved the bar so fast."""
+        if self._reachable is None or reading.length_mm is None or reading.status != OK:
+            return reading
+        if self.state not in RECORDING or self._record is None:
+            # The bar is put in by hand, and the machine comes at any feed.
+            self._reachable.note(reading.t_s, reading.length_mm, reading.t_uncertainty_s or 0.0)
+            return reading
+        phi_deg = self._record.phi_deg(reading.t_s - self._record.started_s)
+        # Live angles are good to a degree or two, and at either end of the turn the machine may feed.
+        on_turn = phi_deg is not None and FEEDING_DEG <= phi_deg <= FULL_TURN_DEG - FEEDING_DEG
+        why = self._reachable.doubt(reading.t_s, reading.length_mm, reading.t_uncertainty_s or 0.0, on_turn=on_turn)
+        return replace(reading, status=DOUBTFUL, said=why, remedy=LOOK_AFTER_LINE) if why else reading
 
     def _begin_run(self, reading: Reading) -> None:
         # Only now is it certain that a ball stands: a start that comes to nothing leaves no mounting.
@@ -314,7 +340,7 @@ class Sequencer:
 
     def _look_for_missed(self, reading: Reading) -> None:
         """Say so where the machine is on its circle and nobody records it."""
-        if self._watch is None or reading.length_mm is None or reading.status != "ok":
+        if self._watch is None or reading.length_mm is None or reading.status != OK:
             return
         if not self._watch.seen(reading.t_s, reading.length_mm):
             return
@@ -356,7 +382,9 @@ class Sequencer:
             found, problem = record.circle_figures(recording, self.plan.largest_loss_percent)
             if found is not None and self._judge_run is not None:
                 findings = self._judge_run(record.run, recording)
-        self._out.append(events.RunCompleted(record.run, len(record), record.lost, found, problem, findings))
+        self._out.append(
+            events.RunCompleted(record.run, len(record), record.lost, found, problem, findings, record.doubtful)
+        )
         self.schedule.recorded(record.run)
         self._edges = None
         return found is not None

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.station.events import RunCompleted, RunId, Sample
 from dbbstation.station.run_record import circle_figures
 from dbbstation.station.sequencer import Waiting
@@ -46,7 +47,8 @@ def _waiting(
     found, problem = circle_figures(recording, circle, lost, lost, session.plan.largest_loss_percent)
     samples = () if found is None else _on_turn(cut(recording, circle))
     findings = () if found is None else judge(run, recording)
-    return Waiting(RunCompleted(run, len(recording), lost, found, problem, findings), samples)
+    doubtful = 0 if entry.counts is None else entry.counts.rejected.get(DOUBTFUL, 0)
+    return Waiting(RunCompleted(run, len(recording), lost, found, problem, findings, doubtful), samples)
 
 
 def _on_turn(raw: RawCircle) -> tuple[Sample, ...]:

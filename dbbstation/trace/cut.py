@@ -101,15 +101,30 @@ def cut(recording: Recording, circle: Circle, counted_lost: int = 0) -> RawCircl
 
 
 def lost_on_turn(recording: Recording, circle: Circle) -> tuple[int, int]:
-    """Return how many samples of the turn were lost and how many were kept; of the whole recording where it has no turn.
+    """Return how many samples of the turn are missing and how many are there; of the whole recording where it has no turn.
 
-    What is missing before the feed-in or behind the feed-out harms nothing: a bar may be put up there while nothing comes.
+    Missing are those that never came and those that cannot be used. What is missing before the feed-in or behind the feed-out
+    harms nothing: a bar may be put up there while nothing comes.
     """
     try:
         t_s = _cut(recording, circle).t_s
     except TraceError:
         t_s = recording.t_s
-    return lost_samples(t_s), len(t_s)
+    return max(lost_samples(t_s), _left_out(recording, t_s)), len(t_s)
+
+
+def unusable_on_turn(recording: Recording, circle: Circle) -> int:
+    """Return how many samples between the first and the last of the turn are there and cannot be used; 0 without a turn."""
+    try:
+        return _left_out(recording, _cut(recording, circle).t_s)
+    except TraceError:
+        return 0
+
+
+def _left_out(recording: Recording, t_s: NDArray[np.float64]) -> int:
+    if recording.usable is None:
+        return 0
+    return int(np.count_nonzero(~recording.usable & (recording.t_s >= t_s[0]) & (recording.t_s <= t_s[-1])))
 
 
 def _cut(recording: Recording, circle: Circle) -> RawCircle:
@@ -153,7 +168,7 @@ def start_uncertainty_deg(recording: Recording, circle: Circle) -> float:
     sqrt(2). Where several samples lie on the feed-in, straight lines through them find it in so many times less; what
     is too small to matter is zero.
     """
-    spacing_s = float(np.median(np.diff(recording.t_s)))
+    spacing_s = float(np.median(np.diff(recording.good.t_s)))
     feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
     share = min(1.0, spacing_s / feeding_s)
     found = spacing_s / np.sqrt(24.0) * share * circle.turning_deg_s
@@ -170,7 +185,9 @@ def edges_of(recording: Recording, circle: Circle) -> tuple[float, float]:
     Raises:
         TraceError: one of them is missing, or less than a turn lies between them.
     """
-    t, length = recording.t_s, recording.length_mm
+    t, length = recording.good.t_s, recording.good.length_mm
+    if not len(t):
+        raise TraceError("no sample of it can be used", where=recording.name, remedy="repeat the run")
     # Half the feed-in below where the trace stands at its ends, so that a machine that is wrong by as much as the
     # feed-in is long still shows it.
     first = _first_below(t, length, circle)
@@ -292,7 +309,7 @@ def _match(recording: Recording, circle: Circle, middle: float, start_s: float) 
     on the slope of the common shape gives what T is off by, and its uncertainty; a few rounds settle it.
     """
     half_s = circle.overshoot_deg / FULL_TURN_DEG * start_s
-    t, length = recording.t_s - middle, recording.length_mm
+    t, length = recording.good.t_s - middle, recording.good.length_mm
     # The first pass lies about half a turn before the middle; a wrong feed moves it, so its inner part is used.
     rows = np.abs(t + start_s / 2.0) < half_s * (1.0 - FEED_SEARCH)
     when, first = t[rows], length[rows]

@@ -37,22 +37,30 @@ def lost_samples(t_s: NDArray[np.float64]) -> int:
     return int(np.sum(whole[wide] - 1.0))
 
 
-def share_lost(lost: int, kept: int) -> str:
-    """Return how many samples were lost, in words with the share of all."""
-    return f"{lost} of {lost + kept} samples were lost ({100.0 * lost / (lost + kept):.2g} %)"
+def share_lost(lost: int, kept: int, unusable: int = 0) -> str:
+    """Return how many samples were lost, in words with the share of all.
+
+    Args:
+        lost: number of samples that are missing.
+        kept: number of samples that are there.
+        unusable: of the missing ones, how many are recorded but cannot be used.
+    """
+    how = "were lost or cannot be used" if unusable else "were lost"
+    return f"{lost} of {lost + kept} samples {how} ({100.0 * lost / (lost + kept):.2g} %)"
 
 
-def too_many_lost(lost: int, kept: int, largest_percent: float) -> str:
+def too_many_lost(lost: int, kept: int, largest_percent: float, unusable: int = 0) -> str:
     """Return what is wrong with a run that lost so many samples; empty where that is within the limit.
 
     Args:
         lost: number of samples that were lost.
         kept: number of samples that were recorded.
         largest_percent: share of all that may be lost [%].
+        unusable: of the lost ones, how many are recorded but cannot be used.
     """
     if 100.0 * lost <= largest_percent * (lost + kept):
         return ""
-    return f"{share_lost(lost, kept)}, more than the {largest_percent:g} % that the plan allows"
+    return f"{share_lost(lost, kept, unusable)}, more than the {largest_percent:g} % that the plan allows"
 
 
 AFTER_LOSS = "look after the cable and after programs that keep the computer busy, and repeat the run"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
-from dbbstation.trace.columns import WithLogged
+from dbbstation.trace.columns import WithLogged, each
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,7 +26,7 @@ class Recording(WithLogged):
         theta_deg: commanded angle from +X towards +Y [deg]; present where the rows are already cut to the
             circle, None where the circle has to be found in the trace.
         logged: what was logged beside the bar, by the name of its column.
-        usable: False for samples that the instrument itself called bad; they stay in the recording.
+        usable: False for samples that the instrument itself called bad, and for doubtful ones; they stay in the recording.
     """
 
     name: str
@@ -37,3 +38,17 @@ class Recording(WithLogged):
 
     def __len__(self) -> int:
         return len(self.t_s)
+
+    @cached_property
+    def good(self) -> Recording:
+        """The samples that can be used: all that a calculation may see."""
+        if self.usable is None or self.usable.all():
+            return self
+        rows = self.usable
+        return Recording(
+            name=self.name,
+            t_s=self.t_s[rows],
+            length_mm=self.length_mm[rows],
+            theta_deg=None if self.theta_deg is None else self.theta_deg[rows],
+            logged=each(self.logged, lambda values: values[rows]),
+        )

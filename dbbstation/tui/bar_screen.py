@@ -8,6 +8,7 @@ from textual.content import Content
 from textual.widgets import OptionList
 
 from dbbstation.errors import StationError
+from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.service.front import NoNumberError
 from dbbstation.tui import texts
 from dbbstation.tui.asking import TypeQuestion
@@ -133,6 +134,8 @@ class BarScreen(RowScreen):
             return ""
         if reading.length_mm is None:
             return texts.BAR_NO_BAR.format(said=reading.said or reading.status)
+        if reading.status == DOUBTFUL:
+            return texts.BAR_DOUBTFUL.format(length=reading.length_mm, said=reading.said)
         off_um = self._front.off_calibrator_um(reading.length_mm, self._values)
         return (
             texts.BAR_LIVE.format(length=reading.length_mm, off=off_um)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.content import Content
 
+from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.service.held_line import AGAIN_S
 from dbbstation.service.seated import seat
 from dbbstation.service.shop_temperature import shop_degc
@@ -187,6 +188,8 @@ class PrepareScreen(RowScreen):
         rate = "" if line.rate.per_s is None else texts.RATE.format(rate=line.rate.per_s)
         if latest.length_mm is None:
             return _GOOD, texts.CHECK_NO_BAR.format(rate=rate, said=latest.said or latest.status)
+        if latest.status == DOUBTFUL:
+            return _OPEN, texts.CHECK_DOUBTFUL.format(length=latest.length_mm, rate=rate, said=latest.said)
         if first is None:
             return _GOOD, texts.CHECK_READS_ALL.format(length=latest.length_mm, rate=rate)
         seat_now = seat_words(seat(latest.length_mm, first))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.service.seated import seat
 from dbbstation.station.states import State
 from dbbstation.tui.panel import Panel, lines
@@ -107,13 +108,16 @@ def _seat(length_mm: float, circle: Circle) -> Content:
 
 
 def _quality(sample: Sample, board: Board, old_s: float | None) -> list[Content]:
+    if sample.status == DOUBTFUL:
+        # Length, why and count: what a damaged line shows must not look like the bar.
+        return [Content.styled("DOUBTFUL", "bold $text-warning"), *_lost(board), Content.styled(sample.said, "dim")]
     if sample.status != "ok" and board.state in _WITHOUT_BAR:
         # Nobody has put the bar in yet: that is no fault.
         return [Content.styled(f"no bar: {sample.said or sample.status}", "dim")]
     if sample.status != "ok":
         # What the instrument says needs the room.
         return [Content.styled(f"{sample.status.upper()} {sample.said}".rstrip(), "bold $text-error")]
-    return [Content.styled("ok", "$text-success"), _rate(board, old_s), _lost(board)]
+    return [Content.styled("ok", "$text-success"), _rate(board, old_s), *_lost(board)]
 
 
 def _rate(board: Board, old_s: float | None) -> Content:
@@ -122,7 +126,11 @@ def _rate(board: Board, old_s: float | None) -> Content:
     return Content("…/s" if board.rate.per_s is None else f"{board.rate.per_s:.0f}/s")
 
 
-def _lost(board: Board) -> Content:
-    return (
+def _lost(board: Board) -> list[Content]:
+    """Say what is missing in the run; doubtful samples only where there are some."""
+    lost = (
         Content(f"{board.lost} lost") if not board.lost else Content.styled(f"{board.lost} lost", "bold $text-warning")
     )
+    if not board.doubtful:
+        return [lost]
+    return [lost, Content.styled(f"{board.doubtful} doubtful", "bold $text-warning")]

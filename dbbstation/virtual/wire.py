@@ -102,6 +102,7 @@ class VirtualInstrument:
         self._to_cut: int | None = None
         self._silent_after_cut = False
         self._to_drop = 0
+        self._damage: Callable[[bytes], bytes] | None = None
 
     def start(self) -> None:
         """Open the line and switch the instrument on; `port` is known from then on."""
@@ -162,6 +163,10 @@ class VirtualInstrument:
         """Send only the first `keep` bytes of the next frame, and nothing more after it with `then_silent`."""
         with self._lock:
             self._to_cut, self._silent_after_cut = keep, then_silent
+
+    def damage_next_frame(self, damage: Callable[[bytes], bytes]) -> None:
+        """Send the next frame as `damage` returns it, as noise on the cable makes it; `length_mm_at` may call it too."""
+        self._damage = damage
 
     def drop_samples(self, count: int) -> None:
         """Do not send the next samples; the counter goes on."""
@@ -264,6 +269,8 @@ class VirtualInstrument:
             length_mm = self._length_mm_at(at_s)
             self._fault = length_mm is None
             raw = encode(self.protocol, length_mm, counter=counter)
+        if self._damage is not None:
+            raw, self._damage = self._damage(raw), None
         if self._to_cut is None:
             self._send(raw, start_s)
             return

@@ -141,3 +141,32 @@ def test_ctrl_c_ends_the_monitor_with_its_totals() -> None:
     assert monitoring.returncode == 0, talk
     assert talk == ""
     assert json.loads(text.splitlines()[-1])["totals"]["garbage_bytes"] == 0
+
+
+def test_monitor_shows_a_doubtful_reading_as_one_and_counts_it(tmp_path: Path) -> None:
+    log = tmp_path / "bytes.txt"
+    sylvac = load_instrument("sylvac-opto-rs", "continuous")
+    taken: list[float] = []
+
+    def length_mm(t_s: float) -> float:
+        taken.append(t_s)
+        if len(taken) == 6:
+            virtual.damage_next_frame(lambda raw: raw.replace(b"+1", b"+"))
+        return 150.123
+
+    with VirtualInstrument(sylvac, length_mm, rate_hz=50.0) as virtual:
+        words = ["--instrument", sylvac.name, "--profile", "continuous", "--port", virtual.port, "--count", "9"]
+        shown, talk = run(monitor, *words, "--spy", str(log))
+    (doubtful,) = [line for line in shown.splitlines() if "doubtful" in line]
+    assert "50.12300 mm  doubtful: its number has 2 digits before the point, the lines before had 3" in doubtful
+    assert "0 lost, 1 doubtful, 0 bytes not understood" in talk
+    shown, talk = run(replay, str(log))
+    assert len([line for line in shown.splitlines() if "doubtful" in line]) == 1
+    assert "0 lost, 1 doubtful, " in talk
+
+
+def test_monitor_says_where_a_port_does_not_tell_of_wrong_parity() -> None:
+    for pty, said in ((True, False), (False, True)):
+        with VirtualInstrument(ND, lambda _: 150.0, pty=pty) as virtual:
+            talk = run(monitor, "--instrument", ND.name, "--port", virtual.port, "--count", "1")[1]
+        assert ("this port does not tell of characters with a wrong parity" in talk) is said

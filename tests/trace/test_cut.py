@@ -10,7 +10,16 @@ import pytest
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace.average import means
-from dbbstation.trace.cut import PIECES, SHAPE_ORDER, _slopes, cut
+from dbbstation.trace.cut import (
+    PIECES,
+    SHAPE_ORDER,
+    _slopes,
+    cut,
+    edges_of,
+    lost_on_turn,
+    overlap_feed,
+    unusable_on_turn,
+)
 from dbbstation.trace.recording import Recording
 
 CIRCLE = Circle((0, 0, 0), (0, 0, 0), 150, (0, 0, 0), 1000, 0, 45, 1.5, 0, Direction.CCW)
@@ -195,3 +204,26 @@ def test_a_turn_is_cut_out_once_and_another_circle_anew():
     recording = trace()
     assert cut(recording, CIRCLE) is cut(recording, CIRCLE)
     assert cut(recording, replace(CIRCLE, start_deg=20)).circle.start_deg == 20
+
+
+def test_samples_that_cannot_be_used_move_neither_edges_nor_feed():
+    """A digit that was lost in the dwell looks like the feed-in, one in the overlap like another feed."""
+    whole = trace(noise_mm=0.0003)
+    length, usable = whole.length_mm.copy(), np.ones(len(whole), dtype=bool)
+    for place in (20, 60, 900, len(whole) // 2, len(whole) - 700, len(whole) - 30):
+        length[place] -= 100.0
+        usable[place] = False
+    damaged = replace(whole, length_mm=length, usable=usable)
+    good, raw = cut(whole, CIRCLE), cut(damaged, CIRCLE)
+    assert lost_on_turn(damaged, CIRCLE)[0] == unusable_on_turn(damaged, CIRCLE) == len(good) - len(raw)
+    assert np.isin(raw.t_s, good.t_s).all()
+    assert raw.phi_deg == pytest.approx(good.phi_deg[np.isin(good.t_s, raw.t_s)], abs=1e-5)
+    found = overlap_feed(damaged, CIRCLE, edges_of(damaged, CIRCLE))
+    assert found is not None
+    assert found[0] == pytest.approx(1000.0, abs=6.0 * found[1])
+
+
+def test_a_recording_of_which_nothing_can_be_used_is_refused_in_words():
+    whole = trace()
+    with pytest.raises(TraceError, match="no sample of it can be used"):
+        cut(replace(whole, usable=np.zeros(len(whole), dtype=bool)), CIRCLE)

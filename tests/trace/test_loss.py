@@ -72,3 +72,14 @@ def test_loss_is_suspected_before_the_feed() -> None:
     with pytest.raises(TraceError) as without:
         cut(Recording("a run", whole.t_s, whole.length_mm), CIRCLE)
     assert "lost" not in str(without.value)
+
+
+def test_samples_that_cannot_be_used_are_missing_also_where_times_show_no_loss() -> None:
+    """A computer that asks when it has time leaves no whole periods."""
+    whole = trace(noise_mm=0.0003)
+    jitter = np.random.default_rng(3).uniform(-0.45, 0.45, len(whole)) * np.median(np.diff(whole.t_s))
+    usable = np.ones(len(whole), dtype=bool)
+    usable[2000:2400:8] = False
+    asked = replace(whole, t_s=whole.t_s + jitter, usable=usable)
+    assert lost_samples(asked.good.t_s) == 0
+    assert lost_on_turn(asked, CIRCLE)[0] == 50

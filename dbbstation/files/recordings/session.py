@@ -34,7 +34,7 @@ from dbbstation.files.source_text import read_bytes
 from dbbstation.files.yaml.schema import read_document, validate
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
-from dbbstation.trace.cut import lost_on_turn
+from dbbstation.trace.cut import lost_on_turn, unusable_on_turn
 from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 
 if TYPE_CHECKING:
@@ -171,7 +171,8 @@ class SessionFolder(SessionDetails):
     def loss(self, run: RunEntry, recording: Recording) -> list[Problem]:
         """Return what is to be said of samples that a run lost, where they are more than the plan allows."""
         lost, kept = lost_on_turn(recording, self.circle(run))
-        what = too_many_lost(lost, kept, self.plan.largest_loss_percent)
+        unusable = unusable_on_turn(recording, self.circle(run))
+        what = too_many_lost(lost, kept, self.plan.largest_loss_percent, unusable)
         return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
 
     def _implausible(self, run: RunEntry, recording: Recording) -> list[Problem]:

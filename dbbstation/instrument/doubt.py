@@ -1,0 +1,116 @@
+"""Readings that may be damaged though they fit the grammar: lines without a checksum prove nothing of their digits.
+
+A device writes all its numbers in one way, which is set on the device: one unit, so many decimals, and as many digits before the
+point as the number has (or always as many, with zeros in front). A digit lost or put in, a point that moved, a unit that changed show
+as another form than that of the lines before. Two things are no damage:
+
+- A number that passes a power of ten has a digit more or less. A digit lost before the point takes at least 0.8 of 10^d from a number
+  v of d + 1 digits, of at least 10^d: the first digit itself is that much or more; without another one, v = a 10^d + ... becomes
+  less than (a + 1) 10^(d - 1). A digit put in is the same backwards. Where the step is less than half of 10^d, the number passed it.
+- The device was set to another form. Then all lines that follow have it. Where one line in a thousand is damaged, three in a row
+  are once in 10^9 lines (two years at 14 lines a second), so the third is believed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from dbbstation.instrument.reading import DOUBTFUL, OK
+
+if TYPE_CHECKING:
+    from dbbstation.instrument.codec import Piece
+    from dbbstation.instrument.protocol import Protocol
+    from dbbstation.instrument.reading import Reading
+
+BELIEVED_AFTER = 3
+"""Lines in a row of another form that make it the form of the device."""
+
+_TRUE_STEP = 0.5
+"""Greatest step across a power of ten, in units of it, that is no lost digit: those are 0.8 and more."""
+
+_REMEDY = "look after the cable, its screen and connectors, and what switches motors beside it"
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """How a number stood on the wire.
+
+    Attributes:
+        value: it, in the unit of the wire, with its sign.
+        before: digits before its point.
+        behind: digits behind it.
+        unit: that the wire names; empty where it names none.
+    """
+
+    value: float
+    before: int
+    behind: int
+    unit: str = ""
+
+    def continues(self, last: Written) -> bool:
+        """Whether the device that wrote `last` may have written this without being set to something else."""
+        if (self.behind, self.unit) != (last.behind, last.unit):
+            return False
+        return self.before == last.before or self._passed_a_power_of_ten(last)
+
+    def _passed_a_power_of_ten(self, last: Written) -> bool:
+        wider, narrower = (self, last) if self.before > last.before else (last, self)
+        place = 10.0**narrower.before
+        # A wider number with zeros in front has passed nothing.
+        whole = wider.before == narrower.before + 1 and abs(wider.value) >= place
+        return whole and abs(self.value - last.value) < _TRUE_STEP * place
+
+    def difference(self, last: Written) -> str:
+        """Say what is different from `last`."""
+        if self.unit != last.unit:
+            return f"its unit is {self.unit}, that of the lines before was {last.unit}"
+        count, place, of = self.behind, "behind", last.behind
+        if count == of:
+            count, place, of = self.before, "before", last.before
+        digits = "digit" if count == 1 else "digits"
+        return f"its number has {count} {digits} {place} the point, the lines before had {of}"
+
+
+class Doubts:
+    """Marks readings of one line as doubtful.
+
+    Args:
+        protocol: of the line; with a checksum nothing is doubtful.
+    """
+
+    def __init__(self, protocol: Protocol) -> None:
+        self._proved = protocol.has_checksum
+        self._form: Written | None = None
+        self._other: Written | None = None
+        self._others = 0
+
+    def judged(self, piece: Piece, *, clean: bool = True) -> Reading:
+        """Return the reading of a piece, marked where it is doubtful.
+
+        Args:
+            piece: in wire order.
+            clean: the piece is all that came in answer to a request.
+        """
+        reading, written = piece.reading, piece.written
+        if self._proved:
+            return reading
+        why = "" if written is None else self._unlike(written)
+        if not clean:
+            why = why or "bytes that belong to no reply came with it"
+        if not why or reading.status != OK:
+            return reading
+        return replace(reading, status=DOUBTFUL, said=f"{why}: a character was damaged or lost", remedy=_REMEDY)
+
+    def _unlike(self, written: Written) -> str:
+        """Return how a number is written otherwise than those before; empty where it is not, or that is its form from now on."""
+        last = self._form
+        if last is None or written.continues(last):
+            self._form, self._others = written, 0
+            return ""
+        repeated = self._others and self._other is not None and written.continues(self._other)
+        self._other, self._others = written, self._others + 1 if repeated else 1
+        if self._others >= BELIEVED_AFTER:
+            self._form, self._others = written, 0
+            return ""
+        return written.difference(last)

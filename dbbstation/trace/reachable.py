@@ -1,0 +1,125 @@
+"""Lengths that the bar can have, by how fast the machine moves it: what a line without a checksum may have made up shows here.
+
+The fixed ball stands and the tool tip moves with the feed F, so between two readings the distance of the balls changes by no more
+than F times their time apart, whatever the machine's errors are (triangle inequality). On the full turn the machine moves across
+the bar, and what changes the length there are its errors alone. They stay within the feed-in A (a turn that leaves it is refused)
+and are mostly made of few undulations: a curve of no more than n undulations per revolution that stays within A changes by no more
+than n A per radian (Bernstein's inequality). With A = 1.5 mm, n = 3, F = 1000 mm/min and a radius of 150 mm these are 0.6 mm in a
+second, with the override: 43 um from one reading of a display (14 per second) to the next, 2.4 um at 250 readings per second.
+
+To both comes what a machine does at once. A reading beyond is doubtful, unless the ones behind it agree with it: then the bar did
+move, was hit or left its seat, which other checks find and say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.plan.circle import Circle
+
+OVERRIDE = 1.2
+"""Greatest feed override of usual controls: a machine that runs faster than programmed is for others to notice."""
+
+UNDULATIONS = 3
+"""Per revolution, of the errors that are as large as the feed-in: centre and scale one, tilts and squareness two, struts three."""
+
+SUDDEN_MM = 0.05
+"""What a machine does between two readings however near: backlash at a reversal, a spike of friction, vibration [mm]. Tens of
+micrometres at a worn machine; calibrated ones stay below ten."""
+
+HALF_WIDTH = float(np.sqrt(3.0))
+"""Half the width of a rectangle by its standard uncertainty [GUM 4.3.7]."""
+
+AGREEING = 3
+"""Readings in a row that agree with each other and not with those before: then it was the bar."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """A reading: its time [s], itself [mm], standard uncertainty of the time [s]."""
+
+    t_s: float
+    length_mm: float
+    t_uncertainty_s: float
+
+
+class Reachable:
+    """Tells lengths that the bar can have from others, from readings in time order.
+
+    Args:
+        circle: as commanded; None: nothing moves the bar, it is on its calibrator.
+    """
+
+    def __init__(self, circle: Circle | None) -> None:
+        self._good: _Seen | None = None
+        self._doubted: _Seen | None = None
+        self._agreeing = 0
+        self._off_turn_mm_s = self._on_turn_mm_s = 0.0
+        if circle is None:
+            return
+        feed_mm_s = OVERRIDE * circle.feed_mm_min / 60.0
+        self._off_turn_mm_s = feed_mm_s
+        across_mm_s = UNDULATIONS * circle.feed_in_mm * float(np.radians(circle.turning_deg_s)) * OVERRIDE
+        self._on_turn_mm_s = min(across_mm_s, feed_mm_s)
+
+    def note(self, t_s: float, length_mm: float, t_uncertainty_s: float = 0.0) -> None:
+        """Take a reading that is held against nothing, while nobody knows how fast the bar is moved.
+
+        Args:
+            t_s: its time [s].
+            length_mm: it [mm].
+            t_uncertainty_s: standard uncertainty of its time, of a rectangle [s].
+        """
+        self._believe(_Seen(t_s, length_mm, t_uncertainty_s))
+
+    @classmethod
+    def standing(cls, lengths_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which readings of a bar that stands can be its length, shape (n,).
+
+        Args:
+            lengths_mm: in time order, shape (n,) [mm].
+        """
+        bar = cls(None)
+        bar.note(0.0, float(np.median(lengths_mm)))
+        return np.array([not bar.doubt(0.0, float(one), on_turn=False) for one in lengths_mm], dtype=np.bool_)
+
+    def doubt(self, t_s: float, length_mm: float, t_uncertainty_s: float = 0.0, *, on_turn: bool) -> str:
+        """Return why a reading cannot be the bar's length; empty where it can.
+
+        Args:
+            t_s: its time [s].
+            length_mm: it [mm].
+            t_uncertainty_s: standard uncertainty of its time, of a rectangle [s].
+            on_turn: the machine is on the full turn, not on its way to the circle or from it.
+        """
+        one, last = _Seen(t_s, length_mm, t_uncertainty_s), self._good
+        if last is None or self._follows(last, one, on_turn=on_turn):
+            self._believe(one)
+            return ""
+        agrees = self._doubted is not None and self._follows(self._doubted, one, on_turn=on_turn)
+        self._agreeing = self._agreeing + 1 if agrees else 1
+        self._doubted = one
+        if self._agreeing >= AGREEING:
+            self._believe(one)
+            return ""
+        return (
+            f"{one.length_mm - last.length_mm:+.4f} mm within {1e3 * (one.t_s - last.t_s):.0f} ms, "
+            f"at the feed {self._limit_mm(last, one, on_turn=on_turn):.4f} mm are possible"
+        )
+
+    def _believe(self, one: _Seen) -> None:
+        self._good, self._doubted, self._agreeing = one, None, 0
+
+    def _follows(self, before: _Seen, one: _Seen, *, on_turn: bool) -> bool:
+        return abs(one.length_mm - before.length_mm) <= self._limit_mm(before, one, on_turn=on_turn)
+
+    def _limit_mm(self, before: _Seen, one: _Seen, *, on_turn: bool) -> float:
+        """Return by how much the length may change from one reading to another [mm]."""
+        longest_s = one.t_s - before.t_s + HALF_WIDTH * (one.t_uncertainty_s + before.t_uncertainty_s)
+        return (self._on_turn_mm_s if on_turn else self._off_turn_mm_s) * max(longest_s, 0.0) + SUDDEN_MM

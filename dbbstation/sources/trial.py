@@ -16,7 +16,7 @@ import numpy as np
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.travel import middle
-from dbbstation.sources.contract import Effect, Motion, Need, Owner, Parameter, Setup, Texts
+from dbbstation.sources.contract import EFFECT_SHAPES, Effect, Motion, Need, Owner, Parameter, Setup, Texts
 from dbbstation.trace.columns import currents, temperatures
 
 if TYPE_CHECKING:
@@ -28,18 +28,6 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
-
-SHAPES: dict[str, tuple[int, ...]] = {
-    "strut_mm": (STRUTS,),
-    "base_joint_mm": (STRUTS, 3),
-    "platform_joint_mm": (STRUTS, 3),
-    "tool_tip_mm": (3,),
-    "fixed_ball_mm": (3,),
-    "reading_mm": (),
-    "load_n": (STRUTS,),
-    "current_a": (STRUTS,),
-}
-"""Axes of each part of an effect, without those of samples and parameters."""
 
 STEP = 1e-4
 """Share of a plausible size by which a derivative is checked."""
@@ -165,7 +153,7 @@ def _circle(machine: Machine) -> Motion:
 
 def _of_shapes(what: str, answer: Effect, samples: int, last: tuple[int, ...]) -> list[str]:
     faults = []
-    for name, axes in SHAPES.items():
+    for name, axes in EFFECT_SHAPES.items():
         array = getattr(answer, name)
         if array is None:
             continue
@@ -192,7 +180,7 @@ def _of_derivative(
         step = np.zeros(len(parameters))
         step[k] = STEP * parameter.plausible
         more, less = (source.effect(motion, machine, values + sign * step) for sign in (1.0, -1.0))
-        for name in SHAPES:
+        for name in EFFECT_SHAPES:
             ends, exact = (getattr(more, name), getattr(less, name)), getattr(derivative, name)
             if (ends[0] is None or ends[1] is None) is not (exact is None):
                 faults.append(f"{name} stands in only one of its effect and its derivative")

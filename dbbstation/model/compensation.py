@@ -16,12 +16,11 @@ from dbbstation.machine.kinematics import forward, strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import Actual, MachineModel, actual_hexapod
 from dbbstation.model.root_search import RootSearch
-from dbbstation.sources.contract import Effect
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.sources.contract import Motion, State
+    from dbbstation.sources.contract import Effect, Motion, State
 
 MOST_ROUNDS = 50
 """An error that hangs on the pose needs three or four: each round leaves the ratio of error to travel, about 1e-4."""
@@ -143,6 +142,39 @@ def shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
     return poses
 
 
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """What comes of driven lengths.
+
+    Attributes:
+        lacking: what they lack of those that lead to the wanted poses, shape (k, 6) [mm].
+        states: of the sources with a history, behind the rows.
+        built_up: how much more has to be driven for errors that build up over rows, shape (k, 6) [mm]; None without such.
+    """
+
+    lacking: NDArray[np.float64]
+    states: tuple[State, ...]
+    built_up: NDArray[np.float64] | None
+
+
+class _Slope:
+    """How what is lacking answers to the command, each strut in each row for itself: a secant through two rounds."""
+
+    def __init__(self) -> None:
+        self._before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+
+    def step(self, driven: NDArray[np.float64], lacking: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What to add to a command, shape (k, 6) [mm]."""
+        slope = np.full(driven.shape, -1.0)
+        if self._before is not None:
+            moved = driven - self._before[0]
+            seen = np.abs(moved) > AGREED_MM
+            slope = np.where(seen, (lacking - self._before[1]) / np.where(seen, moved, 1.0), slope)
+        self._before = driven, lacking
+        found: NDArray[np.float64] = -lacking / np.clip(slope, STEEPEST, FLATTEST)
+        return found
+
+
 class _Stretch:
     """The inversion of one stretch.
 
@@ -201,7 +233,7 @@ class _Stretch:
                 found, states = self._alone(row)
                 met = 1
             elif met < len(found):
-                states = self._lacking(slice(row, row + met), found[:met])[1]
+                states = self._lacking(slice(row, row + met), found[:met]).states
             together = min(2 * together, MOST_TOGETHER) if row + met == rows.stop else max(2 * met, 2)
             driven[row : row + met] = found[:met]
             row += met
@@ -216,23 +248,20 @@ class _Stretch:
             Lengths to drive to, shape (k, 6) [mm], how many rows from the first on are met, and the states behind all of them.
         """
         driven = self.driven[rows] + self._held_back
-        before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
-        met, slope = 0, np.full(driven.shape, -1.0)
+        slope = _Slope()
         for _ in range(TRIES):
-            lacking, states = self._lacking(rows, driven)
-            missed = np.abs(lacking).max(axis=1) > MET_MM
+            tried = self._lacking(rows, driven)
+            missed = np.abs(tried.lacking).max(axis=1) > MET_MM
             met = int(np.argmax(missed)) if missed.any() else len(missed)
             if met == len(missed):
                 break
-            if before is not None:
-                moved = driven - before[0]
-                seen = np.abs(moved) > AGREED_MM
-                slope = np.where(seen, (lacking - before[1]) / np.where(seen, moved, 1.0), slope)
-            before = driven, lacking
-            driven = driven - lacking / np.clip(slope, STEEPEST, FLATTEST)
+            last = driven
+            driven = driven + (
+                slope.step(driven, tried.lacking) if tried.built_up is None else tried.lacking + tried.built_up
+            )
         else:
-            driven = before[0] if before is not None else driven
-        return driven, met, states
+            driven = last
+        return driven, met, tried.states
 
     def _alone(self, row: int) -> tuple[NDArray[np.float64], tuple[State, ...]]:
         """Look for one row.
@@ -246,7 +275,7 @@ class _Stretch:
         rows = slice(row, row + 1)
         search = RootSearch((self.driven[row] + self._held_back), MET_MM)
         while not search.done:
-            search.tell(self._lacking(rows, search.at[None])[0][0])
+            search.tell(self._lacking(rows, search.at[None]).lacking[0])
         if search.lost:
             pose = ", ".join(
                 f"{axis}{value:.3f}" for axis, value in zip("XYZABC", self._wanted.poses[row], strict=True)
@@ -255,19 +284,29 @@ class _Stretch:
                 f"no command leads the machine to the pose {pose}: strut {search.lost} does not come there",
                 remedy="check the model's sources for an effect as large as the motion itself",
             )
-        return search.at[None], self._lacking(rows, search.at[None])[1]
+        return search.at[None], self._lacking(rows, search.at[None]).states
 
-    def _lacking(self, rows: slice, driven: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[State, ...]]:
-        """What driven lengths lack of those that lead to the wanted poses, shape (k, 6) [mm], and the states behind the rows."""
+    def _lacking(self, rows: slice, driven: NDArray[np.float64]) -> _Tried:
+        """What comes of driven lengths, shape (k, 6) [mm]."""
         target = Frames(self._target.position_mm[rows], self._target.rotation[rows])
-        frames = forward(self._nominal, driven, target)
-        motion = self._wanted.stretch(rows).commanded(frames, self._own.machine)
-        effect, states = self._bent.rows(rows) + self._own.together(self._others, motion), []
+        motion = self._driven_to(driven, rows, target)
+        effect = self._bent.rows(rows) + self._own.together(self._others, motion)
+        parts = []
         for fitted, state in zip(self._with_history, self._states, strict=True):
-            own, behind = fitted.source.advance(motion, self._machine, fitted.values, state)
-            effect += own
-            states.append(behind)
-        return self._needed(effect, self._platform(effect, target)) - driven, tuple(states)
+            parts.append(fitted.source.advance(motion, self._machine, fitted.values, state))
+            effect += parts[-1][0]
+        lacking = self._needed(effect, self._platform(effect, target)) - driven
+        built_up: NDArray[np.float64] | None = None
+        for fitted, state, (own, _) in zip(self._with_history, self._states, parts, strict=True):
+            if not fitted.source.builds_up or own.strut_mm is None:
+                continue
+            reached = self._driven_to(driven + lacking + own.strut_mm, rows, target)
+            wanted = fitted.source.undone(motion, reached, self._machine, fitted.values, state)
+            built_up = own.strut_mm - wanted + (0.0 if built_up is None else built_up)
+        return _Tried(lacking, tuple(behind for _, behind in parts), built_up)
+
+    def _driven_to(self, driven: NDArray[np.float64], rows: slice, near: Frames) -> Motion:
+        return self._wanted.stretch(rows).commanded(forward(self._nominal, driven, near), self._own.machine)
 
     def _platform(self, effect: Effect, target: Frames) -> Frames:
         """Where the platform has to be for the tool tip to be there."""

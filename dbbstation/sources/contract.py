@@ -402,6 +402,9 @@ class ErrorSource(ABC):
     looks_ahead: ClassVar[bool] = False
     """True where the effect in a row hangs on rows that follow, as of a reading that is taken late. Such a source is asked
     for whole runs only, and one of the machine's is not compensated: a program is compensated from its beginning on."""
+    builds_up: ClassVar[bool] = False
+    """True where errors build up over many rows, as those of a lag. To find a command for them by trial would take a trial
+    for each row; such a source answers `undone`."""
     candidate: ClassVar[bool] = True
     """Whether a diagnosis may name it; False for what only describes an error and is no cause of one."""
 
@@ -450,6 +453,27 @@ class ErrorSource(ABC):
             return self.effect(motion, machine, values), None
         whole = motion if state is None else motion.after(state)
         return self.effect(whole, machine, values).last(len(motion)), whole
+
+    def undone(
+        self,
+        motion: Motion,  # noqa: ARG002
+        reached: Motion,  # noqa: ARG002
+        machine: Machine,  # noqa: ARG002
+        values: NDArray[np.float64],  # noqa: ARG002
+        state: State,  # noqa: ARG002
+    ) -> NDArray[np.float64]:
+        """Return the strut errors along a stretch in which the struts come to certain lengths, shape (n, 6) [mm].
+
+        Asked of sources that `builds_up`.
+
+        Args:
+            motion: a command that nearly leads there.
+            reached: the stretch as this source alone should let the struts come to it.
+            machine: nominal.
+            values: of the parameters, shape (p,).
+            state: before the stretch.
+        """
+        raise NotImplementedError
 
     def shared_by(self, motion: Motion) -> str:
         """Name of the set of parameter values that this motion takes; motions with one name share the set."""

@@ -9,7 +9,7 @@ import numpy as np
 from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Texts, of_each_strut
-from dbbstation.sources.laws.loop import STANDING, LoopState, driven
+from dbbstation.sources.laws.loop import STANDING, LoopState, driven, undone
 from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ class ServoLag(ErrorSource):
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
+    builds_up = True
     varies_with = "strut-speed"
     form_uncertainty = 0.1  # a drive lags by a filter, not by one time
     texts = Texts(
@@ -95,6 +96,13 @@ class ServoLag(ErrorSource):
         length, time_s = motion.struts(machine).length_mm, np.asarray(motion.time_s)
         lag, _, behind = driven(length, time_s, S_PER_MS * values, state)
         return Effect(strut_mm=lag), behind
+
+    def undone(
+        self, motion: Motion, reached: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
+    ) -> NDArray[np.float64]:
+        """From the speed of what is reached."""
+        lengths = (one.struts(machine).length_mm for one in (motion, reached))
+        return undone(*lengths, np.asarray(motion.time_s), S_PER_MS * values, state)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Each strut answers to its own time.

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.compiled import compiled
+from dbbstation.machine.compiled import compiled, inlined
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.laws.rates import SHORTEST_S
 
@@ -71,6 +71,79 @@ def driven(
     return lag, by_constant, LoopState(int(clock[0]), float(clock[1]), float(clock[2]), memory)
 
 
+def undone(
+    length_mm: NDArray[np.float64],
+    reached_mm: NDArray[np.float64],
+    time_s: NDArray[np.float64],
+    constant_s: NDArray[np.float64],
+    state: LoopState,
+) -> NDArray[np.float64]:
+    """Errors y - x of loops that reach y along a stretch, shape (n, 6) [mm].
+
+    Args:
+        length_mm: a command that nearly leads there, which says where the path bends, shape (n, 6) [mm].
+        reached_mm: y, shape (n, 6) [mm].
+        time_s: of the rows, shape (n,) [s].
+        constant_s: tau, shape (6,) [s].
+        state: before the first row.
+    """
+    error = np.empty_like(length_mm)
+    clock = np.array([state.rows, state.time_s, state.step_s])
+    arrays = (np.ascontiguousarray(array) for array in (length_mm, reached_mm, time_s))
+    _undo(*arrays, constant_s, SHORTEST_S, clock, state.memory.copy(), error)
+    return error
+
+
+@inlined
+def _even(length: NDArray[np.float64], memory: NDArray[np.float64], h: float, clock: NDArray[np.float64]) -> float:
+    """How much of the change of speed counts, w h / (h + h')."""
+    both = new = old = 0.0
+    for i in range(len(length)):
+        speed = (length[i] - memory[INPUT, i]) / h
+        both += speed * memory[INPUT_SPEED, i]
+        new += speed * speed
+        old += memory[INPUT_SPEED, i] * memory[INPUT_SPEED, i]
+    return both / max(new, old) * h / (h + clock[2]) if clock[0] > 1.0 and both > 0.0 else 0.0
+
+
+@compiled
+def _undo(
+    length: NDArray[np.float64],
+    reached: NDArray[np.float64],
+    time: NDArray[np.float64],
+    constant: NDArray[np.float64],
+    shortest: float,
+    clock: NDArray[np.float64],
+    memory: NDArray[np.float64],
+    error: NDArray[np.float64],
+) -> None:
+    count, columns = length.shape
+    needed, needed_speed = memory[INPUT].copy(), memory[INPUT_SPEED].copy()
+    for k in range(count):
+        h = time[k] - clock[1]
+        if clock[0] == 0.0 or h <= shortest:
+            for i in range(columns):
+                error[k, i] = memory[OUTPUT, i] - needed[i]
+                memory[INPUT, i], memory[OUTPUT, i] = length[k, i], reached[k, i]
+                needed[i] = reached[k, i] - error[k, i]
+            if clock[0] == 0.0:
+                clock[0], clock[1] = 1.0, time[k]
+            continue
+        share = _even(length[k], memory, h, clock)
+        gain = (1.0 + share) / h
+        for i in range(columns):
+            tau, y = constant[i], reached[k, i]
+            if tau < 0.0:
+                x = (y - tau * (gain * needed[i] + share * needed_speed[i])) / (1.0 - tau * gain)
+            else:
+                x = y + tau * (gain * (y - memory[OUTPUT, i]) - share * memory[OUTPUT_SPEED, i])
+            error[k, i] = y - x
+            memory[OUTPUT_SPEED, i], memory[OUTPUT, i] = (y - memory[OUTPUT, i]) / h, y
+            needed_speed[i], needed[i] = (x - needed[i]) / h, x
+            memory[INPUT_SPEED, i], memory[INPUT, i] = (length[k, i] - memory[INPUT, i]) / h, length[k, i]
+        clock[0], clock[1], clock[2] = 2.0, time[k], h
+
+
 @compiled
 def _drive(
     length: NDArray[np.float64],
@@ -93,13 +166,7 @@ def _drive(
             if clock[0] == 0.0:
                 clock[0], clock[1] = 1.0, time[k]
             continue
-        both = new = old = 0.0
-        for i in range(columns):
-            speed = (length[k, i] - memory[INPUT, i]) / h
-            both += speed * memory[INPUT_SPEED, i]
-            new += speed * speed
-            old += memory[INPUT_SPEED, i] * memory[INPUT_SPEED, i]
-        share = both / max(new, old) * h / (h + clock[2]) if clock[0] > 1.0 and both > 0.0 else 0.0
+        share = _even(length[k], memory, h, clock)
         for i in range(columns):
             tau, x = constant[i], length[k, i]
             speed = (x - memory[INPUT, i]) / h

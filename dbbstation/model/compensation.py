@@ -16,11 +16,12 @@ from dbbstation.machine.kinematics import forward, strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import Actual, MachineModel, actual_hexapod
 from dbbstation.model.root_search import RootSearch
+from dbbstation.sources.contract import Effect
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.sources.contract import Effect, Motion, State
+    from dbbstation.sources.contract import Fitted, Motion, State
 
 MOST_ROUNDS = 50
 """An error that hangs on the pose needs three or four: each round leaves the ratio of error to travel, about 1e-4."""
@@ -47,7 +48,7 @@ class Passed:
 
     Attributes:
         model: the machine's own sources.
-        states: of the sources with a history, in the model's order.
+        states: of the sources with a history, those first whose errors build up, else in the model's order.
         held_back_mm: what the history added to the driven lengths in the last row, shape (6,) [mm]: where the search begins
             in the next.
     """
@@ -86,18 +87,17 @@ def begun(model: MachineModel, wanted: Motion) -> Passed:
         ModelError: a source needs what the motion does not give, or looks ahead.
     """
     own = model.of_the_machine()
-    motion, states = replace(wanted, straight=True), []
+    motion = replace(wanted, straight=True)
     for fitted in own.acting(motion):
         fitted.source.require(motion)
-        if not fitted.source.has_history:
-            continue
         if fitted.source.looks_ahead:
             raise ModelError(
                 f"the error source {fitted.source.name} cannot be compensated: its effect hangs on what the machine does later",
                 remedy="leave it out of the model, or write its effect from the rows so far and set `looks_ahead` to False",
             )
-        states.append(fitted.source.begin(motion, own.as_found, fitted.values))
-    return Passed(own, tuple(states), np.zeros(6))
+    remembering = _with_history(own, motion)
+    states = tuple(fitted.source.begin(motion, own.as_found, fitted.values) for fitted in remembering)
+    return Passed(own, states, np.zeros(6))
 
 
 def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64], Passed]:
@@ -106,7 +106,8 @@ def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64],
     The controller drives the struts to F(T; nominal). The actual machine needs F(T wanted; actual) less what the
     error sources add, so the command is the pose at which the nominal machine has those lengths. Weights pull where
     the machine will be, at the wanted poses; all other sources act on what is commanded. Those without a history settle in
-    three or four rounds over all rows. What the others do in a row hangs on the commands before, which are known by
+    three or four rounds over all rows, and so do those whose errors build up, which say what leads to the wanted lengths; jumps that
+    the others ask for are not asked of these, for no command makes a late drive jump. What the others do in a row hangs on the commands before, which are known by
     then: rows are tried together from what the history did in the row before; those that are met are kept, and the first that
     is not is looked for alone, strut by strut between bounds [a bisection, as at a reversal, where play makes the command jump].
 
@@ -125,8 +126,6 @@ def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64],
     if len(wanted) == 0:
         return wanted.poses, passed
     stretch = _Stretch(passed, replace(wanted, straight=True))
-    if not passed.states:
-        return stretch.commanded(stretch.driven), passed
     return stretch.commanded(stretch.with_history()), stretch.passed()
 
 
@@ -142,19 +141,10 @@ def shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
     return poses
 
 
-@dataclass(frozen=True, eq=False)
-class _Tried:
-    """What comes of driven lengths.
-
-    Attributes:
-        lacking: what they lack of those that lead to the wanted poses, shape (k, 6) [mm].
-        states: of the sources with a history, behind the rows.
-        built_up: how much more has to be driven for errors that build up over rows, shape (k, 6) [mm]; None without such.
-    """
-
-    lacking: NDArray[np.float64]
-    states: tuple[State, ...]
-    built_up: NDArray[np.float64] | None
+def _with_history(own: MachineModel, motion: Motion) -> tuple[Fitted, ...]:
+    """Sources with a history, those first whose errors build up."""
+    there = (f for f in own.acting(motion) if f.source.has_history)
+    return tuple(sorted(there, key=lambda fitted: not fitted.source.builds_up))
 
 
 class _Slope:
@@ -176,23 +166,22 @@ class _Slope:
 
 
 class _Stretch:
-    """The inversion of one stretch.
-
-    Attributes:
-        driven: what the controller has to drive to if no source had a history, shape (n, 6) [mm].
-    """
+    """The inversion of one stretch."""
 
     def __init__(self, passed: Passed, wanted: Motion) -> None:
-        self._own, self._states, self._held_back = passed.model, passed.states, passed.held_back_mm
+        self._own, self._held_back = passed.model, passed.held_back_mm
         self._machine = self._own.as_found
         self._nominal, self._convention = self._own.machine.hexapod, self._own.machine.hexapod.rotation
         self._wanted = wanted
         self._target = Frames.from_poses(wanted.poses, self._convention)
         acting = self._own.acting(wanted)
-        self._with_history = tuple(f for f in acting if f.source.has_history)
         self._weights = tuple(f for f in acting if f.source.weighs and not f.source.has_history)
         self._others = tuple(f for f in acting if not f.source.weighs and not f.source.has_history)
-        self.driven, self._bent = self._without_history()
+        remembering = _with_history(self._own, wanted)
+        self._building_up = tuple(f for f in remembering if f.source.builds_up)
+        self._searched = remembering[len(self._building_up) :]
+        self._built_up, self._states = passed.states[: len(self._building_up)], passed.states[len(self._building_up) :]
+        self._smooth, self._known = self._without_search()
 
     def commanded(self, driven: NDArray[np.float64]) -> NDArray[np.float64]:
         """Poses at which the nominal machine has these lengths, shape (n, 6) [mm, deg]."""
@@ -200,32 +189,50 @@ class _Stretch:
 
     def passed(self) -> Passed:
         """What is remembered behind the last row."""
-        return Passed(self._own, self._states, self._held_back)
+        return Passed(self._own, (*self._built_up, *self._states), self._held_back)
 
-    def _without_history(self) -> tuple[NDArray[np.float64], Effect]:
-        """Lengths to drive to, shape (n, 6) [mm], and what weights do at the wanted poses."""
-        motion, last, bent = self._wanted, np.full((len(self._wanted), 6), np.inf), None
+    def _without_search(self) -> tuple[NDArray[np.float64], Effect]:
+        """Take into account what needs no search.
+
+        Returns:
+            Lengths to drive to, shape (n, 6) [mm], and the part of the effect that does not change with a jump of the command.
+        """
+        motion, last, bent = self._wanted, np.full((len(self._wanted), 6), np.inf), Effect()
+        built_up = [np.zeros((len(self._wanted), 6)) for _ in self._building_up]
         there: Actual | None = None
         for _ in range(MOST_ROUNDS):
-            if bent is None or there is not None:
-                bent = self._own.together(self._weights, motion, there)
+            bent = self._own.together(self._weights, motion, there)
             effect = bent + self._own.together(self._others, motion)
             platform = self._platform(effect, self._target)
             there = Actual(self._own, motion, actual_hexapod(self._nominal, effect), platform, effect)
-            driven = self._needed(effect, platform)
+            wanted = self._needed(effect, platform)
+            for k, (fitted, state) in enumerate(zip(self._building_up, self._built_up, strict=True)):
+                reached = self._driven_to(wanted - sum(built_up) + built_up[k], slice(None), self._target)
+                built_up[k] = fitted.source.undone(motion, reached, self._machine, fitted.values, state)
+            driven = wanted - sum(built_up)
             change = float(np.abs(driven - last).max())
             if change < AGREED_MM:
-                return driven, bent
-            motion, last = replace(self._wanted, poses=self.commanded(driven)), driven
-        raise ModelError(
-            f"the compensation does not settle: {change:.2e} mm after {MOST_ROUNDS} rounds",
-            remedy="check the model's sources for an effect as large as the motion itself",
+                break
+            motion, last = self._driven_to(driven, slice(None), self._target), driven
+        if change > MET_MM:
+            raise ModelError(
+                f"the compensation does not settle: {change:.2e} mm after {MOST_ROUNDS} rounds",
+                remedy="check the model's sources for an effect as large as the motion itself",
+            )
+        if not built_up:
+            return driven, bent
+        self._built_up = tuple(
+            fitted.source.advance(motion, self._machine, fitted.values, state)[1]
+            for fitted, state in zip(self._building_up, self._built_up, strict=True)
         )
+        return driven, bent + Effect(strut_mm=sum(built_up, np.zeros_like(driven)))
 
     def with_history(self) -> NDArray[np.float64]:
         """Lengths to drive to, shape (n, 6) [mm], row after row with what is remembered by then."""
+        if not self._searched:
+            return self._smooth
         count, row, together = len(self._wanted), 0, MOST_TOGETHER
-        driven = np.empty_like(self.driven)
+        driven = np.empty_like(self._smooth)
         while row < count:
             rows = slice(row, min(row + together, count))
             found, met, states = self._tried(rows)
@@ -233,12 +240,12 @@ class _Stretch:
                 found, states = self._alone(row)
                 met = 1
             elif met < len(found):
-                states = self._lacking(slice(row, row + met), found[:met]).states
+                states = self._lacking(slice(row, row + met), found[:met])[1]
             together = min(2 * together, MOST_TOGETHER) if row + met == rows.stop else max(2 * met, 2)
             driven[row : row + met] = found[:met]
             row += met
             self._states = states
-            self._held_back = driven[row - 1] - self.driven[row - 1]
+            self._held_back = driven[row - 1] - self._smooth[row - 1]
         return driven
 
     def _tried(self, rows: slice) -> tuple[NDArray[np.float64], int, tuple[State, ...]]:
@@ -247,21 +254,19 @@ class _Stretch:
         Returns:
             Lengths to drive to, shape (k, 6) [mm], how many rows from the first on are met, and the states behind all of them.
         """
-        driven = self.driven[rows] + self._held_back
+        driven = self._smooth[rows] + self._held_back
         slope = _Slope()
         for _ in range(TRIES):
-            tried = self._lacking(rows, driven)
-            missed = np.abs(tried.lacking).max(axis=1) > MET_MM
+            lacking, states = self._lacking(rows, driven)
+            missed = np.abs(lacking).max(axis=1) > MET_MM
             met = int(np.argmax(missed)) if missed.any() else len(missed)
             if met == len(missed):
                 break
             last = driven
-            driven = driven + (
-                slope.step(driven, tried.lacking) if tried.built_up is None else tried.lacking + tried.built_up
-            )
+            driven = driven + slope.step(driven, lacking)
         else:
             driven = last
-        return driven, met, tried.states
+        return driven, met, states
 
     def _alone(self, row: int) -> tuple[NDArray[np.float64], tuple[State, ...]]:
         """Look for one row.
@@ -273,9 +278,9 @@ class _Stretch:
             ModelError: there is none.
         """
         rows = slice(row, row + 1)
-        search = RootSearch((self.driven[row] + self._held_back), MET_MM)
+        search = RootSearch((self._smooth[row] + self._held_back), MET_MM)
         while not search.done:
-            search.tell(self._lacking(rows, search.at[None]).lacking[0])
+            search.tell(self._lacking(rows, search.at[None])[0][0])
         if search.lost:
             pose = ", ".join(
                 f"{axis}{value:.3f}" for axis, value in zip("XYZABC", self._wanted.poses[row], strict=True)
@@ -284,26 +289,18 @@ class _Stretch:
                 f"no command leads the machine to the pose {pose}: strut {search.lost} does not come there",
                 remedy="check the model's sources for an effect as large as the motion itself",
             )
-        return search.at[None], self._lacking(rows, search.at[None]).states
+        return search.at[None], self._lacking(rows, search.at[None])[1]
 
-    def _lacking(self, rows: slice, driven: NDArray[np.float64]) -> _Tried:
-        """What comes of driven lengths, shape (k, 6) [mm]."""
+    def _lacking(self, rows: slice, driven: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[State, ...]]:
+        """What driven lengths lack of those that lead to the wanted poses, shape (k, 6) [mm], and the states behind the rows."""
         target = Frames(self._target.position_mm[rows], self._target.rotation[rows])
         motion = self._driven_to(driven, rows, target)
-        effect = self._bent.rows(rows) + self._own.together(self._others, motion)
-        parts = []
-        for fitted, state in zip(self._with_history, self._states, strict=True):
-            parts.append(fitted.source.advance(motion, self._machine, fitted.values, state))
-            effect += parts[-1][0]
-        lacking = self._needed(effect, self._platform(effect, target)) - driven
-        built_up: NDArray[np.float64] | None = None
-        for fitted, state, (own, _) in zip(self._with_history, self._states, parts, strict=True):
-            if not fitted.source.builds_up or own.strut_mm is None:
-                continue
-            reached = self._driven_to(driven + lacking + own.strut_mm, rows, target)
-            wanted = fitted.source.undone(motion, reached, self._machine, fitted.values, state)
-            built_up = own.strut_mm - wanted + (0.0 if built_up is None else built_up)
-        return _Tried(lacking, tuple(behind for _, behind in parts), built_up)
+        effect, states = self._known.rows(rows) + self._own.together(self._others, motion), []
+        for fitted, state in zip(self._searched, self._states, strict=True):
+            own, behind = fitted.source.advance(motion, self._machine, fitted.values, state)
+            effect += own
+            states.append(behind)
+        return self._needed(effect, self._platform(effect, target)) - driven, tuple(states)
 
     def _driven_to(self, driven: NDArray[np.float64], rows: slice, near: Frames) -> Motion:
         return self._wanted.stretch(rows).commanded(forward(self._nominal, driven, near), self._own.machine)

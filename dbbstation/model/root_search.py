@@ -41,7 +41,8 @@ class RootSearch:
         self.at, self.done, self.lost = guess.copy(), False, 0
         self._guess, self._met = guess, met
         self._steps = self._anew = 0
-        self._forget()
+        nothing = np.full(len(guess), np.nan)
+        self._low, self._low_value, self._high, self._high_value, self._step = (nothing.copy() for _ in range(5))
 
     def tell(self, value: NDArray[np.float64]) -> None:
         """Take f at `at`, shape (k,), and say where it is wanted next."""
@@ -61,7 +62,6 @@ class RootSearch:
         if (narrow | ~open_).all():
             if self._anew < ANEW:
                 self._anew += 1
-                self._forget()
                 self._step = np.abs(value) * FIRST_STEP
                 width, held = np.full_like(self.at, np.nan), np.zeros(len(self.at), bool)
                 self._low, self._high = np.where(below, self.at, np.nan), np.where(below, np.nan, self.at)
@@ -86,7 +86,3 @@ class RootSearch:
         with np.errstate(invalid="ignore", divide="ignore"):
             false = self._low + width * self._low_value / (self._low_value - self._high_value)
         return np.where(np.isfinite(false), false, middle)
-
-    def _forget(self) -> None:
-        nothing = np.full(len(self.at), np.nan)
-        self._low = self._high = self._low_value = self._high_value = self._step = nothing

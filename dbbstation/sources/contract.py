@@ -456,11 +456,11 @@ class ErrorSource(ABC):
 
     def undone(
         self,
-        motion: Motion,  # noqa: ARG002
-        reached: Motion,  # noqa: ARG002
-        machine: Machine,  # noqa: ARG002
-        values: NDArray[np.float64],  # noqa: ARG002
-        state: State,  # noqa: ARG002
+        motion: Motion,
+        reached: Motion,
+        machine: Machine,
+        values: NDArray[np.float64],
+        state: State,
     ) -> NDArray[np.float64]:
         """Return the strut errors along a stretch in which the struts come to certain lengths, shape (n, 6) [mm].
 

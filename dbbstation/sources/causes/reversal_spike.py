@@ -213,7 +213,7 @@ def _behind(
 
 
 @compiled
-def _go_on(
+def _go_on(  # noqa: C901 - what is remembered decides in one pass
     travel: NDArray[np.float64],
     height: NDArray[np.float64],
     length: float,

@@ -101,8 +101,8 @@ class ServoLag(ErrorSource):
         self, motion: Motion, reached: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
     ) -> NDArray[np.float64]:
         """From the speed of what is reached."""
-        lengths = (one.struts(machine).length_mm for one in (motion, reached))
-        return undone(*lengths, np.asarray(motion.time_s), S_PER_MS * values, state)
+        commanded, wanted = motion.struts(machine).length_mm, reached.struts(machine).length_mm
+        return undone(commanded, wanted, np.asarray(motion.time_s), S_PER_MS * values, state)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Each strut answers to its own time.

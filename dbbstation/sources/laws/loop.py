@@ -89,8 +89,8 @@ def undone(
     """
     error = np.empty_like(length_mm)
     clock = np.array([state.rows, state.time_s, state.step_s])
-    arrays = (np.ascontiguousarray(array) for array in (length_mm, reached_mm, time_s))
-    _undo(*arrays, constant_s, SHORTEST_S, clock, state.memory.copy(), error)
+    length, reached, time = (np.ascontiguousarray(array) for array in (length_mm, reached_mm, time_s))
+    _undo(length, reached, time, constant_s, SHORTEST_S, clock, state.memory.copy(), error)
     return error
 
 

@@ -15,7 +15,7 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import forward, strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import Actual, MachineModel, actual_hexapod
-from dbbstation.model.root_search import RootSearch
+from dbbstation.model.root_search import MOST_MM, RootSearch
 from dbbstation.sources.contract import Effect
 
 if TYPE_CHECKING:
@@ -35,7 +35,13 @@ MOST_TOGETHER = 512
 """Rows that are tried at once behind the last one that is met."""
 
 TRIES = 8
-"""Rounds for rows together, before the first one that does not settle is looked for alone."""
+"""Most rounds for rows together, before the first one that is not met is looked for alone."""
+
+GETS_ON = 0.5
+"""Share of what the first row lacks that a round may leave of it; a row in which more is left is looked for alone."""
+
+FEWEST_TOGETHER = 16
+"""Rows that are tried at once where few were met: a round over so many costs as much as over one."""
 
 STEEPEST, FLATTEST = -3.0, -0.2
 """Bounds of the slope that is taken from two rounds: of what a strut lacks by what is commanded, -1 where its error does not
@@ -236,17 +242,26 @@ class _Stretch:
         while row < count:
             rows = slice(row, min(row + together, count))
             found, met, states = self._tried(rows)
-            if met == 0:
-                found, states = self._alone(row)
-                met = 1
-            elif met < len(found):
-                states = self._lacking(slice(row, row + met), found[:met])[1]
-            together = min(2 * together, MOST_TOGETHER) if row + met == rows.stop else max(2 * met, 2)
+            if met == len(found):
+                together = min(2 * together, MOST_TOGETHER)
+            else:
+                together = max(2 * met, FEWEST_TOGETHER)
+                if met:
+                    states = self._lacking(slice(row, row + met), found[:met])[1]
             driven[row : row + met] = found[:met]
             row += met
-            self._states = states
-            self._held_back = driven[row - 1] - self._smooth[row - 1]
+            self._go_on(states if met else self._states, driven, row)
+            if met < len(found):
+                driven[row], states = self._alone(row)
+                row += 1
+                self._go_on(states, driven, row)
         return driven
+
+    def _go_on(self, states: tuple[State, ...], driven: NDArray[np.float64], row: int) -> None:
+        """Go on before a row."""
+        self._states = states
+        if row:
+            self._held_back = driven[row - 1] - self._smooth[row - 1]
 
     def _tried(self, rows: slice) -> tuple[NDArray[np.float64], int, tuple[State, ...]]:
         """Try rows together.
@@ -254,16 +269,21 @@ class _Stretch:
         Returns:
             Lengths to drive to, shape (k, 6) [mm], how many rows from the first on are met, and the states behind all of them.
         """
-        driven = self._smooth[rows] + self._held_back
+        smooth = self._smooth[rows]
+        driven = smooth + self._held_back
         slope = _Slope()
+        first, short_mm = -1, np.inf
         for _ in range(TRIES):
             lacking, states = self._lacking(rows, driven)
             missed = np.abs(lacking).max(axis=1) > MET_MM
             met = int(np.argmax(missed)) if missed.any() else len(missed)
             if met == len(missed):
                 break
+            before, (first, short_mm) = (first, short_mm), (met, float(np.abs(lacking[met]).max()))
+            if first == before[0] and short_mm > GETS_ON * before[1]:
+                break
             last = driven
-            driven = driven + slope.step(driven, lacking)
+            driven = np.clip(driven + slope.step(driven, lacking), smooth - MOST_MM, smooth + MOST_MM)
         else:
             driven = last
         return driven, met, states

@@ -23,8 +23,7 @@ ANEW = 3
 class RootSearch:
     """Looks for x_i with f_i(x) = 0, where f_i hangs on x_i and hardly on the others, and falls with it in the large.
 
-    Bounds to either side of each zero are found first, by steps that double, and then narrowed by false position, and by
-    halves where that does not get on. Where the others move f_i, bounds that have become wrong are looked for anew. Where f_i
+    Bounds to either side of each zero are found first, by steps that double, and then narrowed. Where the others move f_i, bounds that have become wrong are looked for anew. Where f_i
     jumps over zero the side with the smaller value is taken.
 
     Args:
@@ -79,10 +78,12 @@ class RootSearch:
             self.done, self.lost = True, 1 + int(np.argmax(away if away.any() else open_))
 
     def _between(self, width: NDArray[np.float64]) -> NDArray[np.float64]:
-        """False position, or the middle in every third step."""
+        """By turns the middle, as far from either bound as f is there, and false position.
+
+        The second is right at once where f falls as its argument rises, as behind a play.
+        """
         middle = self._low + 0.5 * width
-        if self._steps % 3 == 0:
-            return middle
         with np.errstate(invalid="ignore", divide="ignore"):
             false = self._low + width * self._low_value / (self._low_value - self._high_value)
-        return np.where(np.isfinite(false), false, middle)
+        turn = (middle, self._high + self._high_value, self._low + self._low_value, false)[self._steps % 4]
+        return np.where((turn > self._low) & (turn < self._high), turn, middle)

@@ -122,10 +122,8 @@ def _of_history(source: ErrorSource, motion: Motion, machine: Machine, values: N
         found = np.concatenate([getattr(begun, name), getattr(gone_on, name)])
         if np.abs(found - expected).max() > SAME * np.abs(expected).max():
             if type(source).advance is ErrorSource.advance:
-                return [
-                    f"{name} of its effect hangs on rows that follow: write it from the rows so far, or set `looks_ahead = True`, "
-                    "with which it is fitted and predicted but not compensated"
-                ]
+                what = f"{name} of its effect hangs on rows that follow: write it from the rows so far, or set"
+                return [f"{what} `looks_ahead = True`, with which it is fitted and predicted but not compensated"]
             return [f"{name} of its `advance` along two stretches is not its effect along both together"]
     return []
 

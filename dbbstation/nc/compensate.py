@@ -46,7 +46,7 @@ zeros each time. With the middle alone the same lines were 0.27, 0.23 and 0.12 Â
 MOST_PIECES = 1_000_000
 """As many as `rs274.reader.MOST_ROWS`: the path itself is held in memory."""
 
-PIECES_AT_ONCE = 2048
+PIECES_AT_ONCE = 512
 """Pieces, before any is halved, that are split and inverted together: enough for arrays to be quick, and few megabytes."""
 
 SHORTEST_MM, SHORTEST_DEG = 0.05, 0.01

@@ -74,11 +74,7 @@ class Backlash(SourceWithHistory):
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[Effect, PlayState]:
-        """Lag of each strut.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
+        """Lag of each strut."""
         lag, _, behind = self._lag(motion, machine, values, state)
         return Effect(strut_mm=lag), behind
 
@@ -95,6 +91,5 @@ class Backlash(SourceWithHistory):
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
         """Lag [mm] and its derivative by the width [mm/mm], shapes (n, 6), and the state behind the last row."""
-        self.require(motion)
         lag, by_width, behind = followed(motion.struts(machine).length_mm, MM_PER_UM * np.abs(values), state)
         return np.where(values < 0.0, -lag, lag), by_width, behind

@@ -93,10 +93,8 @@ class JointFriction(SourceWithHistory):
         """Stretch of all struts.
 
         Raises:
-            ModelError: the motion is no path.
             KinematicsError: a pose where the struts cannot hold the platform.
         """
-        self.require(motion)
         struts = motion.struts(machine)
         drag, behind = friction_drag(struts, outer_axes(machine.hexapod), state)
         tension = strut_tensions(struts, transverse_load(struts, values[:, None] * drag))

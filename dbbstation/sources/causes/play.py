@@ -96,7 +96,7 @@ class Play(SourceWithHistory):
         """Where each strut lies in its play.
 
         Raises:
-            ModelError: the motion is no path, or the machine file has no masses.
+            ModelError: the machine file has no masses.
             KinematicsError: a pose where the struts cannot hold the platform.
         """
         place, _, behind = self._places(motion, machine, values, state)
@@ -117,7 +117,6 @@ class Play(SourceWithHistory):
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
         """Error of each strut [mm], its derivative by the width [mm/mm], shapes (n, 6), and the state behind the last row."""
-        self.require(motion)
         masses = platform_masses(self.name, machine)
         frames, struts = motion.frames(machine), motion.struts(machine)
         load = platform_weight(frames, masses)

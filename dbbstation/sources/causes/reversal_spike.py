@@ -100,12 +100,7 @@ class ReversalSpike(ErrorSource):
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: NDArray[np.float64]
     ) -> tuple[Effect, NDArray[np.float64]]:
-        """Spikes of each strut along a stretch of a program.
-
-        Raises:
-            ModelError: the motion is no path.
-        """
-        self.require(motion)
+        """Spikes of each strut along a stretch of a program."""
         spike, _, _, behind = _straight(motion.struts(machine).length_mm, values, state)
         return Effect(strut_mm=spike), behind
 

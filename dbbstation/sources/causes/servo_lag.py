@@ -87,12 +87,7 @@ class ServoLag(ErrorSource):
     def advance(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
     ) -> tuple[Effect, LoopState]:
-        """Lag of each strut along a stretch of a program.
-
-        Raises:
-            ModelError: the motion is no path or has no time.
-        """
-        self.require(motion)
+        """Lag of each strut along a stretch of a program."""
         length, time_s = motion.struts(machine).length_mm, np.asarray(motion.time_s)
         lag, _, behind = driven(length, time_s, S_PER_MS * values, state)
         return Effect(strut_mm=lag), behind

@@ -38,10 +38,8 @@ def leaning(travel: NDArray[np.float64]) -> PlayState:
     Args:
         travel: of the run, or of its beginning, shape (n, m).
     """
-    moved = travel != travel[:1]
-    first = np.argmax(moved, axis=0)
-    columns = np.arange(travel.shape[1])
-    side = -0.5 * np.sign(travel[first, columns] - travel[0])
+    side = np.zeros(travel.shape[1])
+    _lean(np.ascontiguousarray(travel), side)
     return PlayState(np.full(travel.shape[1], np.nan), side)
 
 
@@ -62,6 +60,17 @@ def followed(
     place, side = state.place.copy(), state.side.copy()
     _follow(np.ascontiguousarray(travel), width, place, side, lag, by_width)
     return lag, by_width, PlayState(place, side)
+
+
+@compiled
+def _lean(travel: NDArray[np.float64], side: NDArray[np.float64]) -> None:
+    count, columns = travel.shape
+    for i in range(columns):
+        k = 1
+        while k < count and travel[k, i] == travel[0, i]:
+            k += 1
+        if k < count:
+            side[i] = -0.5 if travel[k, i] > travel[0, i] else 0.5
 
 
 @compiled

@@ -1,21 +1,24 @@
-"""Compensation of any toolpath: the machine model inverted over the whole path, long moves split where they bend."""
+"""Compensation of any toolpath: the machine model inverted along the path, long moves split where they bend."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.model.compensation import compensated
+from dbbstation.model.compensation import Passed, begun, compensated_on
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.toolpath import Step, Toolpath, in_pieces, rounded
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
@@ -41,7 +44,10 @@ LOOKED_AT = (0.19, 0.5, 0.73)
 zeros each time. With the middle alone the same lines were 0.27, 0.23 and 0.12 µm off with a period, a half, a quarter."""
 
 MOST_PIECES = 1_000_000
-"""All pieces are inverted at once; so many take some gigabytes and minutes. As many as `rs274.reader.MOST_ROWS`."""
+"""As many as `rs274.reader.MOST_ROWS`: the path itself is held in memory."""
+
+PIECES_AT_ONCE = 512
+"""Pieces, before any is halved, that are split and inverted together: enough for arrays to be quick, and few megabytes."""
 
 SHORTEST_MM, SHORTEST_DEG = 0.05, 0.01
 """Pieces are not halved below this: a step of the correction (backlash at a strut's reversal) has no chord that fits,
@@ -81,8 +87,8 @@ def compensate_toolpath(
 ) -> Compensation:
     """Return the toolpath that takes the actual machine along the given one.
 
-    The whole path is inverted at once, rapids included, so that sources with a history see the one that the machine
-    will have.
+    The path is inverted from its beginning to its end, rapids included, so that sources with a history see the one that the
+    machine will have. Stretches of `PIECES_AT_ONCE` are split and inverted one after the other.
 
     Args:
         toolpath: as it should be.
@@ -97,21 +103,26 @@ def compensate_toolpath(
         StationError: a correction is larger than that, or the path has too many pieces.
         ModelError: a source needs what a program does not give, such as temperatures, or the time where it is None.
     """
-    pieces = _first_pieces(toolpath, chord_mm, model)
-    while True:
-        commanded, off_mm = _inverted(toolpath, pieces, model, started_s)
-        shift_mm = _felt_mm(commanded - toolpath.between(pieces.row, pieces.end))
-        _check_corrections(toolpath, pieces, shift_mm, largest_mm)
-        if chord_mm is None:
-            break
-        bent = (off_mm > chord_mm) & _can_be_halved(toolpath, pieces)
-        if not bent.any():
-            break
-        _check_number(toolpath, len(pieces.row) + int(bent.sum()))
-        pieces = pieces.halved(bent)
+    behind = _Inverted.before(toolpath)
+    parts, number, greatest_mm = [behind], 0, 0.0
+    for first in _first_pieces(toolpath, chord_mm, model):
+        pieces: _Pieces | None = first
+        while pieces is not None:
+            _check_number(toolpath, number + len(pieces.row))
+            inverted = _inverted(toolpath, pieces, behind, model, started_s)
+            shift_mm = _felt_mm(inverted.commanded - toolpath.between(pieces.row, pieces.end))
+            _check_corrections(toolpath, pieces, shift_mm, largest_mm)
+            bent = _can_be_halved(toolpath, pieces) & (chord_mm is not None and inverted.off_mm > chord_mm)
+            pieces = pieces.halved(bent) if bent.any() else None
+        behind = inverted
+        number += len(inverted.pieces.row)
+        greatest_mm = max(greatest_mm, float(shift_mm.max(initial=0.0)))
+        parts.append(inverted)
+    pieces = _Pieces.joined([part.pieces for part in parts])
+    commanded, off_mm = (np.concatenate([getattr(part, name) for part in parts]) for name in ("commanded", "off_mm"))
     return Compensation(
         toolpath=_assembled(toolpath, pieces, commanded, model.machine),
-        greatest_um=1e3 * float(shift_mm.max(initial=0.0)),
+        greatest_um=1e3 * greatest_mm,
         chord_um=None if chord_mm is None else 1e3 * float(off_mm.max(initial=0.0)),
     )
 
@@ -124,6 +135,11 @@ class _Pieces:
     begin: NDArray[np.float64]
     end: NDArray[np.float64]
 
+    @classmethod
+    def joined(cls, parts: Sequence[_Pieces]) -> _Pieces:
+        """Return pieces of stretches that follow each other as those of one."""
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("row", "begin", "end")))
+
     def halved(self, which: NDArray[np.bool_]) -> _Pieces:
         """Return the pieces with some of them cut in two."""
         again = 1 + which.astype(np.int64)
@@ -132,7 +148,8 @@ class _Pieces:
         return _Pieces(self.row[part], begin + width * (share - 1.0 / again[part]), begin + width * share)
 
 
-def _first_pieces(toolpath: Toolpath, chord_mm: float | None, model: MachineModel) -> _Pieces:
+def _first_pieces(toolpath: Toolpath, chord_mm: float | None, model: MachineModel) -> Iterator[_Pieces]:
+    """Pieces before any is halved, by stretches of whole rows with about `PIECES_AT_ONCE` of them."""
     history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
     cutting = np.maximum(toolpath.tip_mm / FIRST_PIECE_MM, toolpath.turn_deg / FIRST_PIECE_DEG)
     cutting = np.maximum(cutting, _way_mm(toolpath, model.machine) / (OF_A_PERIOD * model.shortest_period_mm))
@@ -140,8 +157,14 @@ def _first_pieces(toolpath: Toolpath, chord_mm: float | None, model: MachineMode
         cutting = np.ones(len(toolpath))
     number = np.maximum(np.ceil(np.where(toolpath.kind == Step.RAPID, history, cutting)), 1.0)
     _check_number(toolpath, number.sum())
-    row, end = in_pieces(number.astype(np.int64))
-    return _Pieces(row, end - 1.0 / number[row], end)
+    # A stretch begins with a move: a stop belongs to the move before.
+    moves = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
+    stretch = np.maximum.accumulate(np.where(moves, np.cumsum(number) // PIECES_AT_ONCE, 0.0))
+    edges = [0, *(np.flatnonzero(np.diff(stretch)) + 1), len(number)] if len(number) else []
+    for first, last in pairwise(edges):
+        row, end = in_pieces(number[first:last].astype(np.int64))
+        row += first
+        yield _Pieces(row, end - 1.0 / number[row], end)
 
 
 def _way_mm(toolpath: Toolpath, machine: Machine) -> NDArray[np.float64]:
@@ -173,41 +196,81 @@ def _check_corrections(toolpath: Toolpath, pieces: _Pieces, shift_mm: NDArray[np
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Inverted:
+    """One stretch, inverted.
+
+    Attributes:
+        pieces: k of them.
+        commanded: poses at the ends of all pieces, shape (k, 6) [mm, deg]; NaN before the machine's place is known.
+        off_mm: how far each piece passes the curve, shape (k,) [mm].
+        standing: pose that is commanded last, shape (6,); NaN where the machine's place is not known yet.
+        passed: what the model remembers; None before the machine's place is known.
+    """
+
+    pieces: _Pieces
+    commanded: NDArray[np.float64]
+    off_mm: NDArray[np.float64]
+    standing: NDArray[np.float64]
+    passed: Passed | None
+
+    @classmethod
+    def before(cls, toolpath: Toolpath) -> _Inverted:
+        """Return what is there before the first row."""
+        nothing = np.empty(0)
+        pieces = _Pieces(np.empty(0, dtype=np.int64), nothing, nothing)
+        return cls(pieces, np.empty((0, toolpath.poses.shape[1])), nothing, np.full(6, np.nan), None)
+
+
 def _inverted(
     toolpath: Toolpath,
     pieces: _Pieces,
+    behind: _Inverted,
     model: MachineModel,
     started_s: float | None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Poses to command at the ends of all pieces, shape (k, 6), and how far each passes the curve, shape (k,) [mm].
+) -> _Inverted:
+    """Invert a stretch behind another.
 
-    Rows that do not move take over the pose before them; NaN before the machine's place is known.
+    Rows that do not move take over the pose before them. Of those that last a while the end is inverted as well, and what is
+    commanded for it is commanded for the move before: what acts in time comes to rest there.
     """
     goes_anywhere = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
     known = ~np.isnan(toolpath.before[pieces.row][:, 0])
+    if not known.any():
+        nowhere = np.full((len(known), 6), np.nan)
+        return replace(behind, pieces=pieces, commanded=nowhere, off_mm=np.zeros(len(known)))
     goes = known & goes_anywhere[pieces.row]
+    waits = known & ~goes & (toolpath.duration_s[pieces.row] > 0.0)
     # In time order: where the machine stands first, then the places in every piece that leads somewhere, its end last.
-    first = int(np.argmax(known))
     inside = np.append(LOOKED_AT, 1.0)
     taken = np.repeat(goes, len(inside))
-    share = (pieces.begin[:, None] + (pieces.end - pieces.begin)[:, None] * inside).reshape(-1)[taken]
-    share[len(inside) - 1 :: len(inside)] = pieces.end[goes]
-    row = np.repeat(pieces.row, len(inside))[taken]
-    path = np.vstack([toolpath.before[pieces.row[first]], toolpath.between(row, share)])
-    time_s = None
-    if started_s is not None:
-        begin_s = toolpath.end_s - toolpath.duration_s
-        node_s = begin_s[row] + share * toolpath.duration_s[row]
-        time_s = started_s + np.concatenate([begin_s[pieces.row[first]][None], node_s])
-    inverse = compensated(model, Motion(poses=path, is_path=True, time_s=time_s))
+    taken[len(inside) - 1 :: len(inside)] |= waits
+    share = (pieces.begin[:, None] + (pieces.end - pieces.begin)[:, None] * inside).reshape(-1)
+    share[len(inside) - 1 :: len(inside)] = pieces.end
+    row, share = np.repeat(pieces.row, len(inside))[taken], share[taken]
+    path = toolpath.between(row, share)
+    begin_s = toolpath.end_s - toolpath.duration_s
+    time_s = begin_s[row] + share * toolpath.duration_s[row]
+    if behind.passed is None:
+        first = pieces.row[int(np.argmax(known))]
+        path = np.vstack([toolpath.before[first], path])
+        time_s = np.append(begin_s[first], time_s)
+    wanted = Motion(poses=path, is_path=True, time_s=None if started_s is None else started_s + time_s)
+    inverse, passed = compensated_on(behind.passed or begun(model, wanted), wanted)
+    if behind.passed is not None:
+        inverse = np.vstack([behind.standing, inverse])
     place = np.cumsum(taken).reshape(-1, len(inside))
-    commanded = np.where(known[:, None], inverse[place[:, -1]], np.nan)
+    # The last piece before the next that leads somewhere.
+    numbers = np.arange(len(goes))
+    following = np.minimum.accumulate(np.where(goes, numbers, len(goes))[::-1])[::-1]
+    at_rest = np.append(following[1:], len(goes)) - 1
+    commanded = np.where(known[:, None], inverse[place[at_rest, -1]], np.nan)
     before = inverse[place[:, 0] - 1]
     at_feed = goes & (toolpath.kind[pieces.row] == Step.FEED)
-    passed = [
+    passes = [
         _felt_mm(inverse[place[:, k]] - (before + part * (commanded - before))) for k, part in enumerate(LOOKED_AT)
     ]
-    return commanded, np.where(at_feed, np.max(passed, axis=0), 0.0)
+    return _Inverted(pieces, commanded, np.where(at_feed, np.max(passes, axis=0), 0.0), commanded[-1], passed)
 
 
 def _felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -84,6 +84,21 @@ class Layout:
         """Columns that a tolerance of the machine file bounds, shape (k,)."""
         return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
 
+    def formula_variance(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variance of every column by what the formula of its source may be off by, shape (k,).
+
+        It is that of amplitudes; random effects are no more than what they are stated to be.
+
+        Args:
+            x: values of all columns, shape (k,).
+        """
+        share = [
+            0.0 if parameter.shape else term.source.form_uncertainty
+            for term in self.terms
+            for parameter in term.parameters
+        ]
+        return np.where(self.known.random, 0.0, (np.array(share) * x) ** 2)
+
     @property
     def needs(self) -> frozenset[Need]:
         """What all sources of the bar's reading together must be given."""

@@ -197,7 +197,7 @@ class _Judge:
     def _fitted(self, name: str) -> dict[str, Value]:
         """Values of a cause in the joint fit; what its formula may be off by is part of their uncertainty."""
         after = self._settled.after
-        sigma = uncertainties(after, after.solution.held)
+        variance = uncertainties(after, after.solution.held) ** 2 + after.layout.formula_variance(after.x)
         values: dict[str, Value] = {}
         for term in after.layout.terms:
             if term.source.name != name:
@@ -205,9 +205,7 @@ class _Judge:
             for k, parameter in enumerate(term.parameters):
                 column = term.columns.start + k
                 key = parameter.name if not values.get(parameter.name) else f"{parameter.name} ({term.shared})"
-                found = float(after.x[column])
-                form = 0.0 if parameter.shape else term.source.form_uncertainty * abs(found)
-                values[key] = Value(found, float(np.hypot(sigma[column], form)), parameter.unit)
+                values[key] = Value(float(after.x[column]), float(np.sqrt(variance[column])), parameter.unit)
         return values
 
     def _would_be(self, member: Member) -> dict[str, Value]:

@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from dbbstation.diagnosis.channel import NAMED_ODDS
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
-from dbbstation.diagnosis.held import uncertainties
+from dbbstation.diagnosis.held import uncertainties, unseen
 from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.model_comparison import SCALES
@@ -197,7 +197,7 @@ class _Judge:
     def _fitted(self, name: str) -> dict[str, Value]:
         """Values of a cause in the joint fit; what its formula may be off by is part of their uncertainty."""
         after = self._settled.after
-        variance = uncertainties(after, after.solution.held) ** 2 + after.layout.formula_variance(after.x)
+        variance = uncertainties(after, unseen(after)) ** 2 + after.layout.formula_variance(after.x)
         values: dict[str, Value] = {}
         for term in after.layout.terms:
             if term.source.name != name:

@@ -50,6 +50,28 @@ def position_uncertainty_mm(
     return known_u(np.maximum(variance, 0.0), along)
 
 
+def range_uncertainty_mm(identified: IdentifiedModel, motion: Motion, axis: int) -> float | None:
+    """Standard uncertainty of the greatest less the least deviation along one axis over a motion [mm]; None where not known.
+
+    To first order that of the two poses where these are.
+
+    Args:
+        identified: the model.
+        motion: commanded poses.
+        axis: 0, 1 or 2 for X, Y or Z.
+
+    Raises:
+        KinematicsError: names the first pose that the actual machine cannot take.
+        ModelError: a source needs what the motion does not give.
+    """
+    actual = identified.model.of_the_machine().actual_poses(motion)
+    off = actual[:, axis] - motion.poses[motion.kept][:, axis]
+    ends = motion.poses[motion.kept][[int(np.argmax(off)), int(np.argmin(off))]]
+    # Half of their difference is how far each is from their mean.
+    half = position_uncertainty_mm(identified, Motion(ends), about_mean=True)[0, axis]
+    return None if np.isnan(half) else 2.0 * float(half)
+
+
 ROUNDING_MM = 1e-9
 """Movements of the tool per unit of a parameter that are rounding [mm]."""
 

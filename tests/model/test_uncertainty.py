@@ -10,7 +10,12 @@ import pytest
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.model.uncertainty import position_uncertainty_mm, predicted_poses, prediction_summary
+from dbbstation.model.uncertainty import (
+    position_uncertainty_mm,
+    predicted_poses,
+    prediction_summary,
+    range_uncertainty_mm,
+)
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources
 
@@ -111,6 +116,28 @@ def test_whole_numbers_of_poses_are_not_predicted_in_whole_numbers(known):
     assert np.array_equal(actual, expected)
     assert not np.array_equal(actual, np.round(actual))
     assert np.array_equal(predicted_poses(known, whole.tolist())[0], expected)
+
+
+@pytest.mark.parametrize("axis", [1, 2])
+def test_a_range_of_deviations_scatters_as_stated_over_drawn_machines(known, rng, axis):
+    """Along X the greatest less the least deviation; the base's height is common to both."""
+    line = np.tile([0.0, 0.0, -1008.0, 0.0, 0.0, 0.0], (9, 1))
+    line[:, 0] = np.linspace(-190.0, 190.0, 9)
+    stated = range_uncertainty_mm(known, Motion(line), axis)
+    (fitted,) = known.model.sources
+    off = known.model.actual_poses(Motion(line))[:, axis] - line[:, axis]
+    ends = Motion(line[[int(np.argmax(off)), int(np.argmin(off))]])
+    apart = []
+    for values in rng.multivariate_normal(fitted.values, known.covariance, 1500):
+        at = replace(known.model, sources=(replace(fitted, values=values),)).actual_poses(ends)[:, axis]
+        apart.append(at[0] - at[1])
+    assert stated == pytest.approx(np.std(apart), rel=0.1)
+    # A base that may be turned by a milliradian, about Z or about Y, makes a slope of the line.
+    about = np.eye(3)[2 if axis == 1 else 1]
+    turned = replace(
+        known, null_space=1e-3 * np.cross(about, known.model.machine.hexapod.base_joints_mm).reshape(1, 18)
+    )
+    assert range_uncertainty_mm(turned, Motion(line), axis) is None
 
 
 def test_a_summary_tells_the_common_shift_from_the_rest():

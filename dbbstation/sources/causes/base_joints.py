@@ -24,7 +24,6 @@ class BaseJoints(LinearSource):
     name = "base-joints"
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
-    form_uncertainty = 0.0  # a rigid shift is exact
     texts = Texts(
         what="The centres of the base joints are not where the controller has them.",
         shows="Circles shifted, deformed and differently so at every place and tilt; the same in both directions.",

@@ -22,7 +22,6 @@ class StrutReferenceLength(LinearSource):
     name = "strut-reference-length"
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
-    form_uncertainty = 0.0  # a rigid shift is exact
     texts = Texts(
         what="The length of a strut at its reference mark is not the one the controller assumes.",
         shows="Circles shifted and deformed, more so away from the middle; the same in both directions.",

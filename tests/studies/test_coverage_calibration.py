@@ -10,6 +10,7 @@ from studies.coverage_calibration import CASES, coverage_of_calibration
 from studies.coverage_rows import LEAST, WITHIN, row_of
 
 DRAWS = 8
+"""Too few to show what the whole study does: that u lacks a part of correlated noise (docs/calibration.md)."""
 
 
 @pytest.fixture(scope="module")

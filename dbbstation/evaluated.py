@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.calibration.reporting.evaluation import evaluate, plane_figures
+from dbbstation.calibration.reporting.evaluation import evaluate, plane_figures, plane_uncertainty_um
 from dbbstation.calibration.reporting.prediction import predicted_circles
 from dbbstation.calibration.reporting.summary import evaluation_summary
 
@@ -43,10 +43,16 @@ def evaluated(
         }
     height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
     plane = plane_figures(identified.model, height_mm)
+    flatness_u_um, parallelism_u_um = plane_uncertainty_um(identified, height_mm)
     own, placed = identified.model.of_the_machine().sources, identified.model.anywhere().sources
     return summary | {
         "flatness_um": plane.flatness_um,
+        "flatness_u_um": flatness_u_um,
         "parallelism_um": plane.parallelism_um,
+        "parallelism_u_um": parallelism_u_um,
+        "plane_uncertainty_not_known_because": None
+        if None not in {flatness_u_um, parallelism_u_um}
+        else identified.why_unknown,
         "plane_z_mm": height_mm,
         "plane_without": [f.source.name for f in own if f not in placed and not f.source.of_currents],
     }

@@ -8,8 +8,6 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from dbbstation.circled import load_circles
 from dbbstation.circles.budget import Quantity, budgets
 from dbbstation.circles.path import Filter
@@ -148,14 +146,13 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
     """
     with input_book():
         identified = read_model(path, every_source(source_files))
-    u = dict(zip(identified.covariance_rows, np.sqrt(np.maximum(np.diag(identified.covariance), 0.0)), strict=True))
+    u = identified.uncertainties_between_sessions
     parameters = []
     for fitted in identified.model.sources:
         if fitted.source.belongs_to is not Owner.MACHINE:
             continue
         for parameter, value in zip(fitted.source.parameters(identified.model.machine), fitted.values, strict=True):
-            known = u.get((fitted.source.name, fitted.shared, parameter.name))
-            sure = None if known is None or known == 0.0 else float(known)  # held at nominal
+            sure = u.get((fitted.source.name, fitted.shared, parameter.name)) or None  # zero: held at nominal
             parameters.append(
                 _as_printed(ModelParameter(fitted.source.name, parameter.name, float(value), sure, parameter.unit))
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,12 @@ DRIFT = 0.05
 
 BEFORE = (10, 20, 50, 200)
 """Sessions before a change."""
+
+FEW = (2, 3, 5, 8, 10)
+"""Sessions of histories that are decided by stated uncertainty."""
+
+LATE_STEPS = (3.0, 5.0, 7.0, 10.0, 20.0)
+"""Sizes of steps in the last of a few sessions [stated uncertainties]."""
 
 WAIT = 104
 """Sessions after a change in which it is to be found: two years of weekly ones."""
@@ -89,15 +95,17 @@ def study(size: Size, progress: Callable[[int, int], None] = lambda _done, _of: 
         size: how much of it.
         progress: called with how many of how many parts are done.
     """
-    of = len(SCATTERS) + len(WAYS)
-    rng = np.random.default_rng(size.seed)
-    alarms, delays = [], []
+    of = len(SCATTERS) + len(WAYS) + len(FEW)
+    alarms, delays, few = [], [], []
     for done, scatter in enumerate(SCATTERS):
         progress(done, of)
-        alarms.append(_false_alarms(size, scatter, rng))
+        alarms.append(_false_alarms(size, scatter, np.random.default_rng([size.seed, int(10 * scatter)])))
     for done, way in enumerate(WAYS, start=len(SCATTERS)):
         progress(done, of)
         delays += _delays(size, way, np.random.default_rng(size.seed))
+    for done, sessions in enumerate(FEW, start=len(SCATTERS) + len(WAYS)):
+        progress(done, of)
+        few.append(_few_sessions(size, sessions, np.random.default_rng([size.seed, sessions])))
     progress(of, of)
     return {
         "seed": size.seed,
@@ -108,6 +116,24 @@ def study(size: Size, progress: Callable[[int, int], None] = lambda _done, _of: 
         "false_alarms": alarms,
         "histories_per_change": size.changes,
         "delays": delays,
+        "few_sessions": few,
+    }
+
+
+def _few_sessions(size: Size, sessions: int, rng: np.random.Generator) -> dict[str, Any]:
+    """False alarms of tables of a few sessions, and how often a step in the last one is found."""
+    few = replace(size, sessions=sessions)
+    chart = chart_for(size.false_alarms / size.quantities)
+    found = {}
+    for step in LATE_STEPS:
+        values = rng.standard_normal((size.changes, sessions))
+        values[:, -1] += step
+        seen = [watch(row, np.ones(sessions), chart, COVERAGE_FACTOR).events for row in values]
+        found[f"{step:g}"] = float(np.mean([any(event.found == sessions - 1 for event in events) for events in seen]))
+    return {
+        "sessions": sessions,
+        "false_alarms": [_false_alarms(few, scatter, rng) for scatter in SCATTERS],
+        "found_by_step": found,
     }
 
 
@@ -134,9 +160,9 @@ def stated_share(chart: Chart, quantities: int, sessions: int) -> float:
     Args:
         chart: limits of one quantity.
         quantities: of a table.
-        sessions: of a history, its baseline among them.
+        sessions: of a history; the first is held against nothing.
     """
-    quiet = 1.0 - signalled_within(chart, [0.0] * (sessions - BASELINE))[-1]
+    quiet = 1.0 - signalled_within(chart, [0.0] * (sessions - 1))[-1]
     return float(1.0 - quiet ** (2 * quantities))
 
 

@@ -48,7 +48,7 @@ class Round:
         concealed: share of their signature that the kinematic parameters swallow.
         kinematic_um: true position error over the workspace of the kinematic calibration, rms less its mean [µm].
         joint_um: the same of the joint model [µm].
-        stated_um: what the joint model states of itself [µm].
+        stated_um: what the joint model states of itself, less a common shift [µm]; None where it is not known.
         held_out: of left-out tests in units of the predicted covariance, before and after.
     """
 
@@ -60,7 +60,7 @@ class Round:
     concealed: float
     kinematic_um: float
     joint_um: float
-    stated_um: float
+    stated_um: float | None
     held_out: tuple[float, float]
 
 
@@ -94,7 +94,8 @@ def platform_joints(
         head = f"round {k + 1} of at most {most_rounds + 1}, {len(plan.tests)} tests"
         found = diagnose(machine, runs, usable, _within(head, progress))
         rounds.append(_round(found, truth, len(plan.tests), added))
-        useful = rounds[-1].stated_um < rounds[-1].kinematic_um
+        stated_um = rounds[-1].stated_um
+        useful = stated_um is not None and stated_um < rounds[-1].kinematic_um
         if (rounds[-1].verdict == Verdict.IDENTIFIED and useful) or not found.next_tests:
             break
         plan = replace(plan, tests={**plan.tests, **_planned(plan, found.next_tests, k)})
@@ -144,7 +145,7 @@ def _round(found: Diagnosis, truth: MachineModel, tests: int, added: Sequence[st
         concealed=finding.concealed,
         kinematic_um=_apart_um(found.before.model.of_the_machine(), truth),
         joint_um=_apart_um(found.after.model.of_the_machine(), truth),
-        stated_um=0.0 if found.workspace is None else found.workspace.uncertainty_um,
+        stated_um=None if found.workspace is None else found.workspace.uncertainty_um,
         held_out=(before.normalised, after.normalised),
     )
 

@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import Motion
 
 
+GEOMETRY = frozenset({"strut-reference-length", "base-joints"})
+"""Sources that are where joints stand and how long struts are: there is no formula of it that a machine could depart from. What these
+sources state of theirs is for a change from one session to another."""
+
+
 @dataclass(frozen=True, eq=False)
 class Term:
     """One set of parameters of one source.
@@ -83,6 +88,21 @@ class Layout:
     def bounded(self) -> NDArray[np.bool_]:
         """Columns that a tolerance of the machine file bounds, shape (k,)."""
         return np.array([p.tolerance is not None for term in self.terms for p in term.parameters], dtype=bool)
+
+    def formula_variance(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variance of every column by what the formula of its source may be off by, shape (k,).
+
+        It is that of amplitudes; random effects are no more than what they are stated to be, and the nominal geometry has no formula.
+
+        Args:
+            x: values of all columns, shape (k,).
+        """
+        share = [
+            0.0 if parameter.shape or term.source.name in GEOMETRY else term.source.form_uncertainty
+            for term in self.terms
+            for parameter in term.parameters
+        ]
+        return np.where(self.known.random, 0.0, (np.array(share) * x) ** 2)
 
     @property
     def needs(self) -> frozenset[Need]:

@@ -256,10 +256,13 @@ def _print_parameters(summary: Mapping[str, Any]) -> None:
             continue
         for name, number in source["parameters"].items():
             value, uncertainty, unit = number["value"], number["uncertainty"], number["unit"]
+            each = 1.0
             if unit == "mm" and source["name"] not in IN_MM:
-                value, uncertainty, unit = 1e3 * value, 1e3 * uncertainty, "µm"
-            known = [value, uncertainty, COVERAGE_FACTOR * uncertainty, unit]
-            rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), *known])
+                each, unit = 1e3, "µm"
+            known: list[object] = ["-", "-"]
+            if uncertainty is not None:
+                known = [each * uncertainty, COVERAGE_FACTOR * each * uncertainty]
+            rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), each * value, *known, unit])
     print_table(["source", "parameter", "value", "u", EXPANDED, "unit"], rows)
 
 

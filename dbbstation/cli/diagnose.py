@@ -134,12 +134,7 @@ def _print(summary: Mapping[str, Any]) -> None:
             click.echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
     _print_gain(summary)
     if summary["workspace"]:
-        elsewhere = summary["workspace"]
-        click.echo(
-            "over the workspace, kinematic calibration less joint model: "
-            f"{elsewhere['error_rms_um']:.1f} µm rms, {elsewhere['error_greatest_um']:.1f} µm at most; "
-            f"u of the joint model {elsewhere['uncertainty_rms_um']:.1f} µm rms"
-        )
+        _print_workspace(summary["workspace"])
     if summary["parameter_shift"]:
         click.echo("bias of the kinematic calibration, largest parameters:")
         for shift in summary["parameter_shift"][:4]:
@@ -152,6 +147,26 @@ def _print(summary: Mapping[str, Any]) -> None:
             "A second search came to another set of causes: several explain these recordings, take it with care."
         )
     _print_next_tests(summary)
+
+
+def _print_workspace(elsewhere: Mapping[str, Any]) -> None:
+    """Print how far apart two models put the tool, with and without what they shift it by in common, and how well that is known."""
+    shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", elsewhere["common_shift_um"], strict=True))
+    for which, error, u, more in (
+        ("as a whole", "error_with_shift_rms_um", "uncertainty_with_shift_rms_um", ""),
+        (
+            "about a common shift",
+            "error_rms_um",
+            "uncertainty_rms_um",
+            f", {elsewhere['error_greatest_um']:.1f} µm at most",
+        ),
+    ):
+        known = "not known" if elsewhere[u] is None else f"{elsewhere[u]:.1f} µm rms"
+        click.echo(
+            f"over the workspace, kinematic calibration less joint model, {which}: {elsewhere[error]:.1f} µm rms{more}; u of the joint "
+            f"model {known}"
+        )
+    click.echo(f"  the common shift is {shift} µm; a program whose zero is set on the part does not feel it")
 
 
 STILL_OPEN = frozenset({"ambiguous", "not-testable"})

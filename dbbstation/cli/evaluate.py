@@ -75,8 +75,12 @@ def evaluate(
     click.echo(f"uncompensated at Z {summary['plane_z_mm']:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
     if summary["plane_without"]:
         click.echo(f"(without {', '.join(summary['plane_without'])}: no pose alone says what they do)")
-    click.echo(f"flatness               {summary['flatness_um']:8.1f} µm")
-    click.echo(f"parallelism along X    {summary['parallelism_um']:8.1f} µm")
+    for label, figure in (("flatness           ", "flatness"), ("parallelism along X", "parallelism")):
+        u_um = summary[f"{figure}_u_um"]
+        known = "u not known" if u_um is None else f"u {u_um:.1f} µm"
+        click.echo(f"{label}    {summary[f'{figure}_um']:8.1f} µm   {known}")
+    if summary["plane_uncertainty_not_known_because"]:
+        click.echo(f"  ({summary['plane_uncertainty_not_known_because']})")
     print_tolerances(summary["tolerances"], settings.tolerances_from)
 
 

@@ -55,7 +55,7 @@ def history(
 
     Of every test and direction G, centre X and Y, mean radial error R and centre distance C; parameters of models that lie in
     the folder and come from one of its sessions. Limits are those of the shop's settings. A two-sided CUSUM with a limit for
-    single sessions watches each quantity, from its eleventh session on; the rate of false alarms is that of the whole table.
+    single sessions watches each quantity, from its second session on; the rate of false alarms is that of the whole table.
     No model is fitted. What was read is kept in an index in the user's cache folder.
 
     \b

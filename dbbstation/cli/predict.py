@@ -32,16 +32,15 @@ def predict(
     r"""Predict the actual poses for commanded ones, with standard uncertainties.
 
     Input columns: x_mm,y_mm,z_mm,a_deg,b_deg,c_deg. Output: the same columns with the actual pose, and u_x_mm,u_y_mm,
-    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. Combinations of parameters that the calibration
-    could not identify are not part of the uncertainty; they are named.
+    u_z_mm, the standard uncertainties, always with dots and commas. Further columns are copied. An uncertainty that hangs on what the
+    calibration could not determine is left empty, and u_not_known_because says why; joint_tolerance_mm in the machine file
+    of the calibration bounds it.
 
     \b
     Examples:
       dbbstation predict --model model.yaml --poses commanded.csv --out actual.csv
       dbbstation predict --model model.yaml --poses excel.csv --decimal , --out actual.csv
     """
-    import numpy as np
-
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_json, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
@@ -51,7 +50,7 @@ def predict(
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.machine.travel import check_travel
-    from dbbstation.model.uncertainty import predicted_poses
+    from dbbstation.model.uncertainty import predicted_poses, prediction_summary
 
     refuse_existing_table(out, force=force)
     identified = read_model(model, every_source(source_files))
@@ -65,28 +64,39 @@ def predict(
             identified, table.poses, lambda done, of: progress("predicting pose", done, of)
         )
         progress("writing")
-        write_poses(out, actual, uncertainty_mm, table.others, provenance(), force=force)
-    error_um = 1e3 * np.linalg.norm(actual[:, :3] - table.poses[:, :3], axis=1)
-    worst_u_um = 1e3 * float(np.linalg.norm(uncertainty_mm, axis=1).max())
+        why = identified.why_unknown
+        write_poses(out, actual, uncertainty_mm, table.others, provenance(), why_unknown=why, force=force)
+    told = prediction_summary(table.poses, actual, uncertainty_mm)
+    unknown = [axis for axis, u in told["greatest_uncertainty_by_axis_um"].items() if u is None]
     if as_json:
         print_json(
             {
                 "file": str(out),
                 "poses": len(actual),
-                "greatest_error_um": float(error_um.max()),
-                "greatest_uncertainty_um": worst_u_um,
+                **told,
+                "uncertainty_not_known_because": why if unknown else None,
                 "directions_lost": list(identified.directions_lost),
                 "unknown_causes": unknown_causes(identified.model),
             }
         )
         return
     say(f"{len(actual)} poses written to {out}")
+    shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", told["common_shift_um"], strict=True))
     say(
-        f"greatest position error {error_um.max():.1f} µm; greatest uncertainty u {worst_u_um:.1f} µm, "
-        f"{EXPANDED} {COVERAGE_FACTOR * worst_u_um:.1f} µm"
+        f"position errors {told['error_rms_um']:.1f} µm rms, {told['greatest_error_um']:.1f} µm at most; their mean is {shift} µm, "
+        f"and they are {told['error_about_mean_rms_um']:.1f} µm rms about it"
     )
-    for text in identified.directions_lost:
-        say(f"not known, and not in the uncertainty: {text}")
+    if told["greatest_uncertainty_um"] is not None:
+        u_um = told["greatest_uncertainty_um"]
+        say(f"greatest uncertainty u {u_um:.1f} µm, {EXPANDED} {COVERAGE_FACTOR * u_um:.1f} µm")
+        return
+    known = [f"{axis.upper()} {u:.1f}" for axis, u in told["greatest_uncertainty_by_axis_um"].items() if u is not None]
+    say(
+        f"greatest uncertainty u {', '.join(known) + ' µm; ' if known else ''}"
+        f"u of {', '.join(axis.upper() for axis in unknown)} is not known: {why}"
+    )
+    if identified.null_space is not None:
+        say("  a joint_tolerance_mm in the machine file of the calibration, or tests that show it, would tell")
 
 
 STAGES = {"reading": 0, "travel": 32, "predicting": 48, "writing": 67}

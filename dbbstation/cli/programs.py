@@ -115,6 +115,8 @@ def print_programs(
                     "chord_error_um": each.chord_um,
                     "chord_asked_um": each.chord_asked_um,
                     "model_uncertainty_um": each.uncertainty_um,
+                    "model_uncertainty_by_axis_um": dict(zip("xyz", each.uncertainty_by_axis_um, strict=False)) or None,
+                    "model_uncertainty_not_known_because": each.why_unknown or None,
                 }
                 for path, each in written
             ],
@@ -128,6 +130,8 @@ def _or_empty(value: float | None) -> float | str:
 
 def _say_uncertainty(programs: Sequence[Program]) -> None:
     """Set what the model knows of the path against the chord error that was asked for."""
+    for why in dict.fromkeys(each.why_unknown for each in programs if each.why_unknown):
+        say(f"how well the model knows the path is not known in every coordinate: {why}")
     for each in programs:
         if each.uncertainty_um is not None and each.chord_asked_um is not None:
             knows = f"the model knows the path within {each.uncertainty_um:.2g} µm (standard uncertainty)"

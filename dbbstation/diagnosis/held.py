@@ -46,6 +46,12 @@ def held_variance(calibration: Calibration, held: NDArray[np.float64]) -> NDArra
     return variance
 
 
+def unseen(calibration: Calibration) -> NDArray[np.float64]:
+    """What the runs cannot determine, as the model file has it: orthonormal rows over the fitted columns, shape (h, f)."""
+    fitted = np.flatnonzero(~calibration.layout.known.random)
+    return calibration.null_space[:, fitted] / calibration.layout.known.scale[fitted]
+
+
 def held_beside(before: Calibration, after: Calibration) -> NDArray[np.float64]:
     """Directions that a joint fit holds and the base fit did not have to, orthonormal rows, shape (h, f).
 

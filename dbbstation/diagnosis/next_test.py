@@ -90,7 +90,7 @@ def next_tests(
         elsewhere: what the causes change over the workspace; None where none was found.
     """
     channel, settled = explained.channel, explained.settled
-    known = elsewhere is None or elsewhere.uncertainty_um < elsewhere.rms_um
+    known = elsewhere is None or (elsewhere.uncertainty_um is not None and elsewhere.uncertainty_um < elsewhere.rms_um)
     causes = {cause.name: cause for cause in settled.causes if cause.named}
     found = {m.cause.name: channel.whole(m.cause.name, m.variant) for m in settled.members}
     for finding in findings:

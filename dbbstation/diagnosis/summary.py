@@ -97,6 +97,9 @@ def _workspace(diagnosis: Diagnosis) -> dict[str, Any] | None:
         "error_greatest_um": found.greatest_um,
         "at_pose": list(found.at_pose),
         "uncertainty_rms_um": found.uncertainty_um,
+        "common_shift_um": list(found.shift_um),
+        "error_with_shift_rms_um": found.with_shift_rms_um,
+        "uncertainty_with_shift_rms_um": found.with_shift_uncertainty_um,
     }
 
 

@@ -77,6 +77,8 @@ class Kept:
             model=replace(found.model, sources=sources),
             covariance_rows=(*(found.covariance_rows[k] for k in others), *((name, "", names[k]) for k in used)),
             covariance=(covariance + covariance.T) / 2.0,
+            null_space=None if found.null_space is None else found.null_space @ spread.T,
+            formula_variance=None if found.formula_variance is None else spread**2 @ found.formula_variance,
         )
 
 
@@ -151,6 +153,7 @@ def _part(whole: ErrorSource, to_all: NDArray[np.float64], strut: int | None) ->
         needs = whole.needs
         varies_with = whole.varies_with
         candidate = False
+        form_uncertainty = whole.form_uncertainty
         texts = whole.texts
 
         def parameters(self, machine: Machine) -> tuple[Parameter, ...]:

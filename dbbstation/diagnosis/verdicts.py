@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from dbbstation.diagnosis.channel import NAMED_ODDS
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
-from dbbstation.diagnosis.held import uncertainties
+from dbbstation.diagnosis.held import uncertainties, unseen
 from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.model_comparison import SCALES
@@ -197,7 +197,7 @@ class _Judge:
     def _fitted(self, name: str) -> dict[str, Value]:
         """Values of a cause in the joint fit; what its formula may be off by is part of their uncertainty."""
         after = self._settled.after
-        sigma = uncertainties(after, after.solution.held)
+        variance = uncertainties(after, unseen(after)) ** 2 + after.layout.formula_variance(after.x)
         values: dict[str, Value] = {}
         for term in after.layout.terms:
             if term.source.name != name:
@@ -205,9 +205,7 @@ class _Judge:
             for k, parameter in enumerate(term.parameters):
                 column = term.columns.start + k
                 key = parameter.name if not values.get(parameter.name) else f"{parameter.name} ({term.shared})"
-                found = float(after.x[column])
-                form = 0.0 if parameter.shape else term.source.form_uncertainty * abs(found)
-                values[key] = Value(found, float(np.hypot(sigma[column], form)), parameter.unit)
+                values[key] = Value(float(after.x[column]), float(np.sqrt(variance[column])), parameter.unit)
         return values
 
     def _would_be(self, member: Member) -> dict[str, Value]:

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.calibration.reporting.summary import identified_model
 from dbbstation.errors import MachineError
 from dbbstation.machine.travel import check_travel
-from dbbstation.model.uncertainty import position_uncertainty_mm
+from dbbstation.model.uncertainty import position_uncertainty_mm, rms_length
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
@@ -30,26 +30,32 @@ STEPS = 5
 
 @dataclass(frozen=True)
 class WorkspaceError:
-    """Errors over the workspace, lengths of position errors.
+    """How far the earlier calibration put the tool from where the joint model puts it, over the workspace.
 
     Attributes:
-        rms_um: how far the earlier calibration put the tool from where the joint model puts it [µm].
-        greatest_um: the greatest of these [µm].
+        shift_um: mean of that along X, Y and Z: a common shift, which a program's zero on the part takes away [µm].
+        with_shift_rms_um: root mean square length of it all [µm].
+        rms_um: the same about the common shift [µm].
+        greatest_um: greatest length about the common shift [µm].
         at_pose: where that is, X, Y, Z, A, B, C [mm, deg].
-        uncertainty_um: root mean square of the joint model's own standard uncertainty [µm].
+        uncertainty_um: root mean square of the joint model's own standard uncertainty about a common shift [µm]; None where it is not
+            known.
+        with_shift_uncertainty_um: the same with it.
     """
 
+    shift_um: tuple[float, ...]
+    with_shift_rms_um: float
     rms_um: float
     greatest_um: float
     at_pose: tuple[float, ...]
-    uncertainty_um: float
+    uncertainty_um: float | None
+    with_shift_uncertainty_um: float | None
 
 
 def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError | None:
     """Compare two calibrations of one machine over the workspace; None where no place is within travel.
 
-    Only sources that need no more than the pose are looked at: drift and backlash have no place of their own. A common
-    shift is left out, since a program's zero is set on the part.
+    Only sources that need no more than the pose are looked at: drift and backlash have no place of their own.
     """
     machine = before.layout.machine
     poses = workspace(machine)
@@ -57,18 +63,23 @@ def workspace_error(before: Calibration, after: Calibration) -> WorkspaceError |
         return None
     motion = Motion(poses)
     was, now = (c.model.anywhere().actual_poses(motion)[:, :3] for c in (before, after))
-    apart = was - now
-    apart = apart - apart.mean(axis=0)
-    length = np.linalg.norm(apart, axis=1)
-    worst = int(np.argmax(length))
+    apart_um = 1e3 * (was - now)
+    shift_um = apart_um.mean(axis=0)
+    length_um = np.linalg.norm(apart_um - shift_um, axis=1)
+    worst = int(np.argmax(length_um))
     identified = identified_model(after, {}, {})
     identified = replace(identified, model=identified.model.anywhere())
-    own = np.linalg.norm(position_uncertainty_mm(identified, motion), axis=1)
+    own_um, own_with_shift_um = (
+        1e3 * rms_length(position_uncertainty_mm(identified, motion, about_mean=about)) for about in (True, False)
+    )
     return WorkspaceError(
-        rms_um=1e3 * _rms(length),
-        greatest_um=1e3 * float(length[worst]),
+        shift_um=tuple(shift_um.tolist()),
+        with_shift_rms_um=rms_length(apart_um),
+        rms_um=rms_length(apart_um - shift_um),
+        greatest_um=float(length_um[worst]),
         at_pose=tuple(poses[worst].tolist()),
-        uncertainty_um=1e3 * _rms(own),
+        uncertainty_um=None if np.isnan(own_um) else own_um,
+        with_shift_uncertainty_um=None if np.isnan(own_with_shift_um) else own_with_shift_um,
     )
 
 
@@ -91,7 +102,3 @@ def _reachable(machine: Machine, pose: NDArray[np.float64]) -> bool:
     except MachineError:
         return False
     return True
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))

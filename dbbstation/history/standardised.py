@@ -1,28 +1,61 @@
 """Values of one quantity, each held against those before it: independent standard normal numbers where nothing changes.
 
-The level is estimated from the values before, and so is their scatter beyond the stated uncertainties. Both estimates are
-uncertain, and are taken for that: a residual from the level before is independent of all residuals before it [Brown, Durbin and
-Evans 1975, J. R. Stat. Soc. B 37, 149], and over their scatter it follows Student's t, which its probability turns into a
-standard normal number [Hawkins 1987, The Statistician 36, 299].
+The level is estimated from the values before, and from some number of values on so is their scatter beyond the stated
+uncertainties. Both estimates are uncertain, and are taken for that: a residual from the level before is independent of all
+residuals before it [Brown, Durbin and Evans 1975, J. R. Stat. Soc. B 37, 149], and over their scatter it follows Student's t, which
+its probability turns into a standard normal number [Hawkins 1987, The Statistician 36, 299]. Before that the stated uncertainty
+is the scale: the residual over it is the number.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ndtri, stdtr
+from scipy.special import chdtrc, ndtri, stdtr
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 BASELINE = 10
-"""Values from which level and scatter are known well enough to watch the next ones: the level to u / 3, the scatter to 24 %.
-`dbbstation study history` shows what 5 and 20 would bring."""
+"""Values from which level and scatter are known well enough to stand for the stated uncertainty: the level to u / 3, the scatter
+to 24 %. `dbbstation study history` shows what 5 and 20 would bring."""
+
+CONTRADICTS = 0.05
+"""Probability below which a scatter contradicts the stated uncertainties. One quantity in twenty that scatters as stated is held
+against somewhat more than that for a few sessions."""
 
 _SMALLEST = 1e-300
 """Probabilities below it are taken for it: the number that belongs to it is 37, far beyond every limit."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Scatter of values about their level, in stated uncertainties.
+
+    Attributes:
+        freedom: degrees of freedom; one fewer than values for each level.
+        square: sum of squares.
+    """
+
+    freedom: int = 0
+    square: float = 0.0
+
+    @property
+    def size(self) -> float:
+        """Standard deviation; NaN where nothing is known of it."""
+        return sqrt(self.square / self.freedom) if self.freedom else nan
+
+    @property
+    def more_than_stated(self) -> bool:
+        """Whether it contradicts the stated uncertainties."""
+        return self.freedom > 0 and bool(chdtrc(self.freedom, self.square) < CONTRADICTS)
+
+    def with_residuals(self, residual: NDArray[np.float64]) -> Scatter:
+        """Return it with further residuals, each from the level before it, in their standard uncertainties."""
+        return Scatter(self.freedom + len(residual), self.square + float(residual @ residual))
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,19 +63,29 @@ class Standardised:
     """Values held against those before them; arrays have shape (n,).
 
     Attributes:
-        z: standard normal where nothing changes; NaN in the baseline.
+        z: standard normal where nothing changes; NaN for the first.
+        by_stated: where z rests on the stated uncertainties alone.
+        residual: from the level before, in stated uncertainties; NaN for the first.
         level: weighted mean of the values before; NaN for the first.
         u_level: its standard uncertainty by the stated ones alone; NaN for the first.
-        scatter: standard deviation of the values before, in stated uncertainties; NaN for the first two.
+        scatter: standard deviation of the values before, in stated uncertainties; NaN where nothing is known of it.
     """
 
     z: NDArray[np.float64]
+    by_stated: NDArray[np.bool_]
+    residual: NDArray[np.float64]
     level: NDArray[np.float64]
     u_level: NDArray[np.float64]
     scatter: NDArray[np.float64]
 
 
-def standardised(values: NDArray[np.float64], u: NDArray[np.float64], baseline: int = BASELINE) -> Standardised:
+def standardised(
+    values: NDArray[np.float64],
+    u: NDArray[np.float64],
+    baseline: int = BASELINE,
+    before: Scatter = Scatter(),
+    hindsight: Scatter | None = None,
+) -> Standardised:
     """Hold each value against those before it, weighted by their stated uncertainties.
 
     The scatter is a factor common to all uncertainties. It may be below one: what is stated for every session may hold parts
@@ -51,26 +94,42 @@ def standardised(values: NDArray[np.float64], u: NDArray[np.float64], baseline: 
     Args:
         values: in time order, shape (n,).
         u: standard uncertainty of each, positive, in the same unit, shape (n,).
-        baseline: values that are not held against anything, at least 3.
+        baseline: values from which their scatter takes the place of the stated uncertainty, at least 3.
+        before: scatter of earlier values about other levels.
+        hindsight: scatter that is to be taken where that of the values before is not known yet; None for the stated uncertainties.
     """
     count = len(values)
-    level, u_level, scatter = (np.full(count, np.nan) for _ in range(3))
-    z = np.full(count, np.nan)
+    level, u_level, residual, z = (np.full(count, np.nan) for _ in range(4))
     if count:
         about = values - values[0]  # sums of small numbers lose no digits
         weight = 1.0 / u**2
         sums = np.cumsum(weight)[:-1]
         level[1:] = values[0] + np.cumsum(weight * about)[:-1] / sums
         u_level[1:] = 1.0 / np.sqrt(sums)
-    residual = (values[1:] - level[1:]) / np.hypot(u[1:], u_level[1:])
-    freedom = np.arange(1, count - 1)
-    scatter[2:] = np.sqrt(np.cumsum(residual**2)[:-1] / freedom)
-    watched = np.arange(count) >= baseline
-    off = np.zeros(count)
-    off[1:] = residual
+    residual[1:] = (values[1:] - level[1:]) / np.hypot(u[1:], u_level[1:])
+    held = np.isfinite(residual)
+    freedom = before.freedom + np.arange(count) - 1
+    square = before.square + np.concatenate([np.zeros(min(count, 2)), np.cumsum(residual[1:-1] ** 2)])[:count]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scatter = np.where(held & (freedom > 0), np.sqrt(square / np.maximum(freedom, 1)), np.nan)
+    known = held & (freedom >= baseline - 1)
+    z[known] = _normal(residual[known], scatter[known], freedom[known])
+    early = held & ~known
+    z[early] = residual[early]
+    if hindsight is not None and hindsight.freedom >= baseline - 1:
+        of_all = np.full(int(early.sum()), hindsight.size)
+        z[early] = _normal(residual[early], of_all, np.full(len(of_all), hindsight.freedom))
+    elif hindsight is not None:  # Student's t of one or two degrees of freedom would find nothing, however large
+        z[early] = residual[early] / hindsight.size
+    return Standardised(z, early & (hindsight is None), residual, level, u_level, scatter)
+
+
+def _normal(
+    residual: NDArray[np.float64], scatter: NDArray[np.float64], freedom: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Return the normal numbers of the same probability as Student's t of residuals over their scatter."""
     # Values that are all alike have no scatter: the smallest departure is then beyond it, and none is none.
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(off[watched] == 0.0, 0.0, off[watched] / scatter[watched])
-    beyond = stdtr(np.arange(count)[watched] - 1.0, -np.abs(ratio))
-    z[watched] = -np.sign(ratio) * ndtri(np.maximum(beyond, _SMALLEST))
-    return Standardised(z, level, u_level, scatter)
+        ratio = np.where(residual == 0.0, 0.0, residual / scatter)
+    beyond = stdtr(freedom.astype(np.float64), -np.abs(ratio))
+    return np.asarray(-np.sign(ratio) * ndtri(np.maximum(beyond, _SMALLEST)), dtype=np.float64)

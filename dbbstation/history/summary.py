@@ -30,6 +30,10 @@ FIGURES = {
 """What the figures of circles mean."""
 
 
+DECIDED_BY = {True: "stated-uncertainty", False: "control-chart"}
+"""What a verdict rests on: the stated uncertainties alone, or a chart that knows how the sessions scatter."""
+
+
 def history_summary(machines: Sequence[MachineHistory], asked: Asked) -> dict[str, Any]:
     """Return histories as plain numbers; None where something is not known.
 
@@ -133,6 +137,7 @@ def _trend(trend: Trend, sessions: Sequence[Mapping[str, Any]], coverage_factor:
         "u_level": None if watched is None else _number(watched.u_level[-1]),
         "scatter_in_u": None if watched is None else _number(watched.scatter),
         "sessions_lacking": None if watched is None else watched.lacking,
+        "decided_by": None if watched is None or not watched.watched else DECIDED_BY[watched.by_stated],
         "watched_sessions": 0 if watched is None else watched.watched,
         "events": [] if watched is None else [_event(event, trend, sessions) for event in watched.events],
         "values": _values(trend, sessions),
@@ -146,6 +151,7 @@ def _event(event: Event, trend: Trend, sessions: Sequence[Mapping[str, Any]]) ->
         "found": sessions[trend.at[event.found]]["name"],
         "difference": event.difference,
         "u_difference": event.u_difference,
+        "decided_by": DECIDED_BY[event.by_stated],
     }
 
 

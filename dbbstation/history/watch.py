@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.history.standardised import BASELINE, standardised
+from dbbstation.history.standardised import BASELINE, Scatter, standardised
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class Verdict(StrEnum):
     CHANGED = "changed"
     """From some session on it is another."""
     CANNOT_TELL = "cannot tell"
-    """Too few sessions, or no stated uncertainty."""
+    """One session, or no stated uncertainty."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,7 @@ class Event:
         difference: values from `since` to `found` less the level before; of a change that is a baseline's length ago: the level
             after it less the level before.
         u_difference: its standard uncertainty, by the larger of stated uncertainty and scatter.
+        by_stated: whether only the stated uncertainties say so: the scatter of the sessions is not known yet.
     """
 
     verdict: Verdict
@@ -48,6 +49,7 @@ class Event:
     found: int
     difference: float
     u_difference: float
+    by_stated: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,8 @@ class Watched:
         level: level from a change to the next, the latest known one of each stretch.
         u_level: its standard uncertainty, by the larger of stated uncertainty and scatter.
         scatter: of the last stretch, in stated uncertainties; NaN where too few values.
-        lacking: values that the last stretch needs until it is watched; 0 where it is.
+        lacking: values that the last stretch needs until the next one can be held against it: one just after a change, else none.
+        by_stated: whether what is said of the last value rests on the stated uncertainties alone.
     """
 
     events: tuple[Event, ...]
@@ -73,6 +76,7 @@ class Watched:
     u_level: NDArray[np.float64]
     scatter: float
     lacking: int
+    by_stated: bool = False
 
     @property
     def watched(self) -> int:
@@ -97,29 +101,64 @@ def watch(
 ) -> Watched:
     """Look for changes beyond scatter and beyond stated uncertainty.
 
-    A change is reported where the chart signals and the difference is more than k u besides. After a change a new baseline begins
+    A change is reported where the chart signals and the difference is more than k u besides. After a change a new level begins
     with the next value: those that showed the change were chosen by it, and would make the new level look off. A single value
     beyond its limit counts for a change where the next one lies beyond on the same side; otherwise it stands out, and is left out of
     the level.
+
+    The chart's scale is the stated uncertainty until the scatter of as many values as a baseline has is known, and that scatter from
+    there on. Where the values about their levels scatter by more than stated, beyond chance, the first ones are held against that
+    scatter too.
 
     Args:
         values: in time order, shape (n,).
         u: standard uncertainty of each, positive, shape (n,).
         chart: its limits.
         coverage_factor: k of U = k u.
-        baseline: values before the first that is watched, after each change again.
+        baseline: values from which their scatter is the scale.
     """
+    looked, scatter = _look(values, u, chart, coverage_factor, baseline, None)
+    if not any(event.by_stated for event in looked.events):
+        return looked
+    # With fewer changes called there is more scatter: it grows until the same changes are called again.
+    taken = Scatter()
+    while scatter.more_than_stated and scatter.freedom > taken.freedom:
+        taken = scatter
+        looked, scatter = _look(values, u, chart, coverage_factor, baseline, taken)
+    return looked
+
+
+AT_FIRST = 32
+"""Values of a level that are looked at first."""
+
+
+def _look(
+    values: NDArray[np.float64],
+    u: NDArray[np.float64],
+    chart: Chart,
+    coverage_factor: float,
+    baseline: int,
+    hindsight: Scatter | None,
+) -> tuple[Watched, Scatter]:
+    """Look once, with the scatter that early values are held against, or their stated uncertainties; and return that found."""
     count = len(values)
     z, high, low, level, u_level = (np.full(count, np.nan) for _ in range(5))
+    by_stated = np.zeros(count, dtype=bool)
     events: list[Event] = []
-    start, out = 0, list[int]()
+    start, out, pooled = 0, list[int](), Scatter()
     while True:
         at = np.array([k for k in range(start, count) if k not in out], dtype=np.intp)
-        stretch = _Stretch(at, standardised(values[at], u[at], baseline), values[at], u[at], chart, coverage_factor)
-        found = stretch.first_event()
+        for some in (at[:AT_FIRST], at):  # a change among the first is found without the work for all
+            held = standardised(values[some], u[some], baseline, pooled, hindsight)
+            stretch = _Stretch(some, held, values[some], u[some], chart, coverage_factor)
+            found = stretch.first_event()
+            if found is not None or len(some) == len(at):
+                at = some
+                break
         end = count if found is None else found.found + 1
         inside = at < end
-        z[at[inside]], high[at[inside]], low[at[inside]] = (x[inside] for x in (stretch.of.z, *stretch.sums))
+        z[at[inside]], high[at[inside]], low[at[inside]] = (x[inside] for x in (held.z, *stretch.sums))
+        by_stated[at[inside]] = held.by_stated[inside]
         if found is not None:
             alike = _leads_to(found, events, start)
             if found.verdict is Verdict.STANDS_OUT and not alike:
@@ -128,8 +167,11 @@ def watch(
                 continue
             if alike:
                 events = [event for event in events if event not in alike]
-                found = _change(min(found.since, alike[0].since), found.found, at, values, u)
+                found = replace(
+                    _change(min(found.since, alike[0].since), found.found, at, values, u), by_stated=found.by_stated
+                )
         stays = at[inside] if found is None else at[at < found.since]
+        pooled = pooled.with_residuals(held.residual[1 : len(stays)])
         until = count if found is None else found.since
         level[start:until], u_level[start:until] = stretch.final(len(stays))
         if start and len(stays) >= baseline:
@@ -142,9 +184,10 @@ def watch(
         if start >= count:
             at = at[:0]
             break
-    left = len(at)
     scatter = float(_scatter(values[at], u[at]))
-    return Watched(tuple(events), z, high, low, level, u_level, scatter, max(baseline - left, 0))
+    last = np.flatnonzero(np.isfinite(z))
+    stated = bool(len(last)) and bool(by_stated[last[-1]])
+    return Watched(tuple(events), z, high, low, level, u_level, scatter, max(1 - len(at), 0), stated), pooled
 
 
 def _settled(event: Event, level: NDArray[np.float64], u_level: NDArray[np.float64], start: int) -> Event:
@@ -207,7 +250,7 @@ class _Stretch:
 
     Attributes:
         at: their numbers.
-        of: held against those before.
+        of: held against those before them.
         values: themselves.
         u: their standard uncertainties.
         chart: its limits.
@@ -223,7 +266,7 @@ class _Stretch:
 
     @property
     def sums(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """CUSUM upwards and downwards; NaN in the baseline."""
+        """CUSUM upwards and downwards; NaN for the first value."""
         return tuple(self._sum(side) for side in (1.0, -1.0))  # type: ignore[return-value]  # two of them
 
     def _sum(self, side: float) -> NDArray[np.float64]:
@@ -255,7 +298,7 @@ class _Stretch:
         Biometrika 57, 1].
         """
         sums = np.nan_to_num(self._sum(side))
-        first = int(np.flatnonzero(sums[:k] <= 0.0)[-1]) + 1  # those of the baseline are zero
+        first = int(np.flatnonzero(sums[:k] <= 0.0)[-1]) + 1  # that of the first value is zero
         behind = np.cumsum(side * self.of.z[first : k + 1][::-1])[::-1]
         return first + int(np.argmax(behind / np.sqrt(np.arange(len(behind), 0, -1))))
 
@@ -270,7 +313,8 @@ class _Stretch:
     def _event(self, verdict: Verdict, since: int, k: int) -> Event:
         after, u_after = _mean(self.values[since : k + 1], self.u[since : k + 1])
         u_both = self._spread(since) * float(np.hypot(u_after, self.of.u_level[since]))
-        return Event(verdict, int(self.at[since]), int(self.at[k]), after - float(self.of.level[since]), u_both)
+        difference = after - float(self.of.level[since])
+        return Event(verdict, int(self.at[since]), int(self.at[k]), difference, u_both, bool(self.of.by_stated[k]))
 
     def _stated(self, event: Event) -> float:
         """Standard uncertainty of an event's difference by the stated ones alone."""

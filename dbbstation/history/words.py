@@ -48,7 +48,8 @@ def verdict_in_words(one: Mapping[str, Any]) -> str:
     if not one["watched_sessions"]:
         more = (lacking or 0) + 1
         return f"{one['verdict']}: needs {more} more session{'s' if more > 1 else ''}"
-    return one["verdict"] + (f", watched again after {lacking} more" if lacking else "")
+    by = ", by stated U" if one["decided_by"] == "stated-uncertainty" else ""
+    return one["verdict"] + by + (f", watched again after {lacking} more" if lacking else "")
 
 
 def headline(machine: Mapping[str, Any]) -> str:
@@ -56,7 +57,7 @@ def headline(machine: Mapping[str, Any]) -> str:
     if not machine["changes"]:
         if any(one["watched_sessions"] for one in machine["quantities"]):
             return "Nothing changed beyond scatter and uncertainty"
-        return "Cannot tell whether anything changed: there are too few sessions"
+        return "Cannot tell whether anything changed: there is one session of each quantity"
     counts = Counter(change["verdict"] for change in machine["changes"])
     changed, single = counts["changed"], counts["stands out"]
     counted = [f"{changed} change{'s' if changed > 1 else ''}"] if changed else []

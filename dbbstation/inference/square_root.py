@@ -218,6 +218,32 @@ def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> ND
     return directions.vectors[directions.singular < 1.0 - ROUNDING]
 
 
+def unseen_combinations(
+    blocks: Sequence[Block], known: Columns, noise: float, held: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Combinations of the columns that the blocks cannot determine, each as large as its scales, shape (h, k).
+
+    A direction that is lost where a problem is linearised first is not quite the one that is lost at the solution. Here it is
+    what the other columns do, by least squares, where a held direction moves. The combinations are orthonormal in units of the
+    scales, so that each is one standard deviation of a prior as wide as the scales. Random effects are zero in them.
+
+    Args:
+        blocks: compressed runs, linearised at the solution.
+        known: priors and scales.
+        noise: standard deviation of one measurement, where a block does not state its own.
+        held: orthonormal rows of fitted directions that were kept at zero, in units of the scales, shape (h, f).
+    """
+    random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
+    combinations = np.zeros((len(held), len(known.prior)))
+    if len(held):
+        root, _, _ = _stacked(blocks, known, noise, np.concatenate([random, fitted]))
+        seen, free = root[len(random) :, len(random) :] * known.scale[fitted], complement(held)
+        follow, *_ = np.linalg.lstsq(seen @ free.T, -seen @ held.T, rcond=None)
+        orthonormal, _ = np.linalg.qr(held.T + free.T @ follow)
+        combinations[:, fitted] = orthonormal.T * known.scale[fitted]
+    return combinations
+
+
 def directions_of(seen: NDArray[np.float64]) -> Directions:
     """Singular directions of a scaled information root, shape (r, f), best seen first."""
     _, singular, vectors = np.linalg.svd(seen, full_matrices=True)

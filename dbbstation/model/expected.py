@@ -119,7 +119,12 @@ def _of_model(
         columns.append(reading.by_fitted(fitted)[:, known])
         rows += [row_of[names[k]] for k in known]
     if rows:
-        yield np.hstack(columns), identified.covariance[np.ix_(rows, rows)]
+        covariance = identified.covariance[np.ix_(rows, rows)]
+        if (
+            identified.unseen is not None
+        ):  # what was held at nominal has its usual size, as of a machine that nobody calibrated
+            covariance = covariance + identified.unseen[:, rows].T @ identified.unseen[:, rows]
+        yield np.hstack(columns), covariance
 
 
 def _reversals_deg(observation: Observation, model: MachineModel) -> tuple[float, ...]:

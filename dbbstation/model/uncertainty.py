@@ -2,49 +2,102 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dbbstation.errors import KinematicsError
 from dbbstation.machine.kinematics import position_responses
+from dbbstation.model.identified import known_u
 from dbbstation.model.machine_model import by_parameters
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from dbbstation.model.identified import IdentifiedModel
 
 
-def position_uncertainty_mm(identified: IdentifiedModel, motion: Motion) -> NDArray[np.float64]:
-    """Standard uncertainty of the predicted X, Y and Z at the rows that count, shape (n, 3) [mm].
+def position_uncertainty_mm(
+    identified: IdentifiedModel, motion: Motion, *, about_mean: bool = False
+) -> NDArray[np.float64]:
+    """Standard uncertainty of the predicted X, Y and Z at the rows that count, shape (n, 3) [mm]; NaN where not known.
 
-    First-order propagation of the identified covariance. Directions that were held at nominal add nothing: what they
-    would do stands in the model's `directions_lost`.
+    First-order propagation of the identified covariance. It is not known where the model states nothing of a source that acts,
+    and where what the recordings could not determine would be the greater part of it (`known_u`).
+
+    Args:
+        identified: the model.
+        motion: commanded poses.
+        about_mean: of positions less their mean over the motion, which a common shift does not change.
 
     Raises:
         KinematicsError: names the first pose that the actual machine cannot take.
         ModelError: a source needs what the motion does not give.
     """
+    sensitivity, silent = _sensitivity(identified, motion)
+    unseen = identified.unseen
+    if about_mean:
+        sensitivity, silent = (one - one.mean(axis=1, keepdims=True) for one in (sensitivity, silent))
+    variance = np.einsum("aij,jk,aik->ia", sensitivity, identified.covariance, sensitivity)
+    along = np.where(np.any(np.abs(silent) > ROUNDING_MM, axis=2), np.inf, 0.0).T
+    if unseen is None or not identified.covariance_rows:
+        along += np.inf
+    else:
+        along += np.sum((sensitivity @ unseen.T) ** 2, axis=2).T
+    return known_u(np.maximum(variance, 0.0), along)
+
+
+def range_uncertainty_mm(identified: IdentifiedModel, motion: Motion, axis: int) -> float | None:
+    """Standard uncertainty of the greatest less the least deviation along one axis over a motion [mm]; None where not known.
+
+    To first order that of the two poses where these are.
+
+    Args:
+        identified: the model.
+        motion: commanded poses.
+        axis: 0, 1 or 2 for X, Y or Z.
+
+    Raises:
+        KinematicsError: names the first pose that the actual machine cannot take.
+        ModelError: a source needs what the motion does not give.
+    """
+    actual = identified.model.of_the_machine().actual_poses(motion)
+    off = actual[:, axis] - motion.poses[motion.kept][:, axis]
+    ends = motion.poses[motion.kept][[int(np.argmax(off)), int(np.argmin(off))]]
+    # Half of their difference is how far each is from their mean.
+    half = position_uncertainty_mm(identified, Motion(ends), about_mean=True)[0, axis]
+    return None if np.isnan(half) else 2.0 * float(half)
+
+
+ROUNDING_MM = 1e-9
+"""Movements of the tool per unit of a parameter that are rounding [mm]."""
+
+
+def _sensitivity(identified: IdentifiedModel, motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How X, Y and Z answer to the rows of the covariance, shape (3, n, k), and to parameters of sources that have none."""
     model = identified.model.of_the_machine()
     actual = model.actual(motion)
     row_of = {row: k for k, row in enumerate(identified.covariance_rows)}
+    stated = {(source, shared) for source, shared, _ in row_of}
     responses = position_responses(actual.hexapod, actual.frames)
     count = len(motion.poses[motion.kept])
     sensitivity = np.zeros((3, count, len(row_of)))
+    silent = [np.zeros((3, count, 0))]
     for fitted in model.acting(motion):
         derivative = actual.derivative(fitted)
         names = [(fitted.source.name, fitted.shared, p.name) for p in fitted.source.parameters(model.machine)]
         columns = [row_of[name] for name in names if name in row_of]
         known = [k for k, name in enumerate(names) if name in row_of]
-        for axis, response in enumerate(responses):
-            whole = np.broadcast_to(by_parameters(derivative, response, motion.kept), (count, len(names)))
-            sensitivity[axis][:, columns] = whole[:, known]
-    variance = np.einsum("aij,jk,aik->ia", sensitivity, identified.covariance, sensitivity)
-    return np.sqrt(np.maximum(variance, 0.0))
+        whole = np.array(
+            [np.broadcast_to(by_parameters(derivative, r, motion.kept), (count, len(names))) for r in responses]
+        )
+        sensitivity[:, :, columns] = whole[:, :, known]
+        if (fitted.source.name, fitted.shared) not in stated:
+            silent.append(whole)
+    return sensitivity, np.concatenate(silent, axis=2)
 
 
 POSES_AT_ONCE = 5_000
@@ -53,34 +106,68 @@ POSES_AT_ONCE = 5_000
 
 def predicted_poses(
     identified: IdentifiedModel,
-    poses: NDArray[np.float64],
+    poses: ArrayLike,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the actual poses for commanded ones, each by itself, and how well their positions are known.
 
     Args:
         identified: model with its covariance.
-        poses: commanded, shape (n, 6) [mm, deg].
+        poses: commanded, shape (n, 6) [mm, deg], numbers of any type.
         progress: told how many of how many are done.
 
     Returns:
-        Actual poses, shape (n, 6) [mm, deg], and standard uncertainties of X, Y and Z, shape (n, 3) [mm].
+        Actual poses, shape (n, 6) [mm, deg], and standard uncertainties of X, Y and Z, shape (n, 3) [mm], NaN where not known.
 
     Raises:
         KinematicsError: names a pose that the actual machine cannot take.
         ModelError: a source needs more than poses.
     """
-    actual, known = np.empty_like(poses), np.empty((len(poses), 3))
+    commanded = np.array(poses, dtype=np.float64)
+    actual, known = np.empty_like(commanded), np.empty((len(commanded), 3))
     model = identified.model.of_the_machine()
-    for first in range(0, len(poses), POSES_AT_ONCE):
-        progress(first, len(poses))
+    for first in range(0, len(commanded), POSES_AT_ONCE):
+        progress(first, len(commanded))
         some = slice(first, first + POSES_AT_ONCE)
-        motion = Motion(poses[some])
+        motion = Motion(commanded[some])
         try:
             actual[some] = model.actual_poses(motion)
         except KinematicsError:
-            model.actual_poses(Motion(poses))  # fails as well, and counts the pose among all
+            model.actual_poses(Motion(commanded))  # fails as well, and counts the pose among all
             raise
         known[some] = position_uncertainty_mm(identified, motion)
-    progress(len(poses), len(poses))
+    progress(len(commanded), len(commanded))
     return actual, known
+
+
+def prediction_summary(
+    commanded: NDArray[np.float64], actual: NDArray[np.float64], uncertainty_mm: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Position errors of predicted poses, and how well they are known, as plain numbers.
+
+    A common shift is part of an error, and a program whose zero is set on the part does not feel it: both are given.
+
+    Args:
+        commanded: shape (n, 6) [mm, deg].
+        actual: as predicted, shape (n, 6) [mm, deg].
+        uncertainty_mm: standard uncertainties of X, Y and Z, shape (n, 3) [mm]; NaN where not known.
+    """
+    off_um = 1e3 * (actual[:, :3] - commanded[:, :3])
+    shift_um = off_um.mean(axis=0)
+    greatest_um = 1e3 * uncertainty_mm.max(axis=0)
+    whole_um = 1e3 * float(np.linalg.norm(uncertainty_mm, axis=1).max())
+    return {
+        "greatest_error_um": float(np.linalg.norm(off_um, axis=1).max()),
+        "error_rms_um": rms_length(off_um),
+        "common_shift_um": shift_um.tolist(),
+        "error_about_mean_rms_um": rms_length(off_um - shift_um),
+        "greatest_uncertainty_um": None if np.isnan(whole_um) else whole_um,
+        "greatest_uncertainty_by_axis_um": {
+            axis: None if np.isnan(u) else u for axis, u in zip("xyz", greatest_um.tolist(), strict=True)
+        },
+    }
+
+
+def rms_length(vectors: NDArray[np.float64]) -> float:
+    """Root mean square length of vectors, shape (n, 3), in their unit."""
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))

@@ -62,7 +62,10 @@ class Program:
         greatest_um: largest correction of a programmed point [µm]; None in a nominal program.
         chord_um: largest chord error that splitting left [µm]; None where nothing was split.
         chord_asked_um: chord error that was asked for [µm]; None where nothing was split.
-        uncertainty_um: greatest standard uncertainty of the model's tool tip along the path [µm]; None where not known.
+        uncertainty_um: greatest standard uncertainty of the model's tool tip along the path, all three coordinates together [µm];
+            None where not known.
+        uncertainty_by_axis_um: the same of X, Y and Z each; None where not known, empty where no model is.
+        why_unknown: why one of them is not known; empty where all are.
     """
 
     name: str
@@ -72,6 +75,8 @@ class Program:
     chord_um: float | None = None
     chord_asked_um: float | None = None
     uncertainty_um: float | None = None
+    uncertainty_by_axis_um: tuple[float | None, ...] = ()
+    why_unknown: str = ""
 
 
 def circle_programs(
@@ -206,22 +211,33 @@ def _program(
     asked_um = None if chord_mm is None else 1e3 * chord_mm
     if asked_um is not None:
         header.append(f"moves split to keep a chord error of {asked_um:g} um")
-    uncertainty_um = _uncertainty_um(path, inverse)
-    if uncertainty_um is not None:
-        header.append(f"standard uncertainty of the model along the path {uncertainty_um:.3f} um at most")
+    together_um, by_axis_um, why = _uncertainty_um(path, inverse)
+    if together_um is not None:
+        header.append(f"standard uncertainty of the model along the path {together_um:.3f} um at most")
+    elif by_axis_um:
+        each = (
+            f"{axis} {'not known' if um is None else f'{um:.3f} um'}"
+            for axis, um in zip("XYZ", by_axis_um, strict=True)
+        )
+        header += [
+            f"standard uncertainty of the model along the path at most: {', '.join(each)}",
+            f"not known because {why}",
+        ]
     mark = checksum(done.toolpath)
     text = dialect.write(replace(done.toolpath, numbers=(mark, mark)), header)
-    return Program(name, text, _points(done.toolpath), done.greatest_um, done.chord_um, asked_um, uncertainty_um)
+    return Program(
+        name, text, _points(done.toolpath), done.greatest_um, done.chord_um, asked_um, together_um, by_axis_um, why
+    )
 
 
 UNCERTAIN_AT = 2000
 """Poses at which the model's uncertainty is taken, spread over the path: it changes over decimetres."""
 
 
-def _uncertainty_um(path: Toolpath, inverse: Inverse) -> float | None:
-    """Greatest standard uncertainty of the tool tip along the path, all three coordinates together [µm]."""
-    if inverse.identified is None or not inverse.identified.covariance_rows:
-        return None
+def _uncertainty_um(path: Toolpath, inverse: Inverse) -> tuple[float | None, tuple[float | None, ...], str]:
+    """Greatest standard uncertainty of the tool tip along the path, of all coordinates together and of each [µm], why one is None."""
+    if inverse.identified is None:
+        return None, (), ""
     row, share = path.subdivided(REACH_MM, REACH_DEG)
     known = ~np.isnan(path.poses[row, 0]) & path.is_move[row]
     row, share = row[known], share[known]
@@ -231,8 +247,12 @@ def _uncertainty_um(path: Toolpath, inverse: Inverse) -> float | None:
     if inverse.started_s is not None:
         time_s = inverse.started_s + path.end_s[row] - (1.0 - share) * path.duration_s[row]
     motion = Motion(poses=path.between(row, share), is_path=True, time_s=time_s)
-    per_axis_mm = position_uncertainty_mm(inverse.identified, motion)
-    return 1e3 * float(np.linalg.norm(per_axis_mm, axis=1).max())
+    per_axis_um = 1e3 * position_uncertainty_mm(inverse.identified, motion)
+    together_um = float(np.linalg.norm(per_axis_um, axis=1).max())
+    by_axis_um = tuple(None if np.isnan(um) else um for um in per_axis_um.max(axis=0).tolist())
+    if None in by_axis_um:
+        return None, by_axis_um, inverse.identified.why_unknown
+    return together_um, by_axis_um, ""
 
 
 def _circle_header(name: str, circle: Circle, step_deg: float, names: Mapping[str, str]) -> list[str]:

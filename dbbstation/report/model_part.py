@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
@@ -20,7 +18,7 @@ def parameters(identified: IdentifiedModel, coverage_factor: float) -> tuple[tup
         identified: the model.
         coverage_factor: k of U = k u.
     """
-    u = dict(zip(identified.covariance_rows, np.sqrt(np.maximum(np.diag(identified.covariance), 0.0)), strict=True))
+    u = identified.uncertainties
     rows = []
     for fitted in identified.model.sources:
         if fitted.source.belongs_to is not Owner.MACHINE:

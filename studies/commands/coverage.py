@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from studies.coverage_rows import Row
 
 PLANS = {"elevated": "table2-elevated", "level": "table2"}
 
@@ -14,18 +17,28 @@ PLANS = {"elevated": "table2-elevated", "level": "table2"}
     "--machines", default=500, show_default=True, type=click.IntRange(min=10), help="Random machines per plan."
 )
 @click.option("--plan", type=click.Choice(sorted(PLANS)), help="One of the two plans only.")
+@click.option(
+    "--draws", default=250, show_default=True, type=click.IntRange(min=2), help="Sessions for each row of the table."
+)
+@click.option(
+    "--only", type=click.Choice(["machines", "calibration"]), help="Only the machines per plan, or only the table."
+)
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
-def coverage(*, machines: int, plan: str | None, seed: int, as_json: bool) -> None:
+def coverage(*, machines: int, plan: str | None, draws: int, only: str | None, seed: int, as_json: bool) -> None:
     r"""Calibrate many random machines and count how often the 95 % intervals contain the truth.
 
     On the plan with five raised bars all 24 parameters; on the level plan those combinations that level bars see, on
     machines without a common height of their base joints. Mountings, CMM, bar and noise scatter as plan and session
     state. Predicted positions are looked at 150 mm and 10 degrees about the middle of the travel.
 
+    The table has a row for each figure of calibration and prediction, with and without a stated tolerance of joints, from sessions of
+    the independent virtual machine in tests/plant.
+
     \b
     Examples:
       dbbstation study coverage
+      dbbstation study coverage --only calibration --draws 20
       dbbstation study coverage --machines 100 --plan elevated --json
     """
     from dbbstation.cli.output import print_json
@@ -37,15 +50,51 @@ def coverage(*, machines: int, plan: str | None, seed: int, as_json: bool) -> No
 
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     found: dict[str, Any] = {"seed": seed}
-    for name in sorted(PLANS) if plan is None else [plan]:
+    for name in _plans(plan, only):
         what = read_plan(shipped_folder("protocols") / "plans" / f"{PLANS[name]}.yaml")
         with progress_bar(f"{name} plan", machines) as advance:
             covered = experiment(machine, what, range(seed, seed + machines), advance, level=name == "level")
         found[name] = covered.numbers()
         if not as_json:
             _print(name, found[name])
+    if only != "machines":
+        rows = _calibration(draws, seed)
+        found["calibration"] = [row.plain() for row in rows]
+        found["faults"] = [row.fault for row in rows if row.fault]
+        if not as_json:
+            _print_rows(rows)
     if as_json:
         print_json(found)
+
+
+def _plans(plan: str | None, only: str | None) -> list[str]:
+    if only == "calibration":
+        return []
+    return sorted(PLANS) if plan is None else [plan]
+
+
+def _calibration(draws: int, seed: int) -> list[Row]:
+    from dbbstation.cli.progress import progress_bar
+    from studies.coverage_calibration import CASES, coverage_of_calibration
+
+    with progress_bar("sessions", draws * len(CASES)) as advance:
+        return coverage_of_calibration(CASES, range(seed, seed + draws), advance)
+
+
+def _print_rows(rows: list[Row]) -> None:
+    from dbbstation.cli.output import print_table
+
+    lines: list[list[object]] = []
+    for row in rows:
+        known = ["-", "-", "-"]
+        if row.inside is not None and row.error is not None:
+            known = [f"{100 * row.inside:.1f}", f"{196 * row.error:.1f}", f"{row.u:.2g} {row.unit}"]
+        lines.append([row.case, row.figure, row.draws, row.values, f"{100 * row.stated:.0f}", *known, row.reason])
+    titles = ["case", "figure", "draws", "values", "u stated [%]", "inside [%]", "±", "median u", "why more than 97 %"]
+    print_table(titles, lines)
+    for row in rows:
+        if row.fault:
+            click.echo(f"NOT as promised: {row.fault}")
 
 
 def _print(name: str, numbers: dict[str, Any]) -> None:

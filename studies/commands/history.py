@@ -68,6 +68,34 @@ def _print(found: dict[str, Any]) -> None:
             cells = {one["sessions_before"]: _cell(one) for one in of if one["change"] == change}
             rows.append([way, change, *(cells[count] for count in before)])
     print_table(["way", "change", *(f"after {count}" for count in before)], rows)
+    _print_few(found)
+
+
+def _print_few(found: dict[str, Any]) -> None:
+    from dbbstation.cli.output import print_table
+
+    few = found["few_sessions"]
+    click.echo(
+        "\nfew sessions, decided by stated uncertainty: tables with a false alarm [%], by what sessions scatter by"
+    )
+    scatters = [one["scatter_in_u"] for one in few[0]["false_alarms"]]
+    rows: list[list[object]] = [
+        [
+            one["sessions"],
+            *(_share(alarms["found"]) for alarms in one["false_alarms"]),
+            _share(one["false_alarms"][0]["stated"]),
+        ]
+        for one in few
+    ]
+    print_table(["sessions", *(f"{scatter:g} u" for scatter in scatters), "stated"], rows)
+    click.echo("\na step in the last of them, in u: found at once [%]")
+    steps = list(few[0]["found_by_step"])
+    rows = [[one["sessions"], *(_share(one["found_by_step"][step]) for step in steps)] for one in few]
+    print_table(["sessions", *steps], rows)
+
+
+def _share(share: float) -> str:
+    return f"{100 * share:.2g}"
 
 
 def _cell(one: dict[str, Any]) -> str:

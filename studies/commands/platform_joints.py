@@ -73,7 +73,7 @@ def _print(found: Mapping[str, Any]) -> None:
                 f"{100 * one['concealed']:.1f} %",
                 error["kinematic"],
                 error["joint"],
-                error["stated"],
+                "-" if error["stated"] is None else error["stated"],
                 f"{predicted['before']:.2f} -> {predicted['after']:.2f}",
             ]
         )

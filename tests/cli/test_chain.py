@@ -139,7 +139,8 @@ def test_predict_adds_uncertainties_and_keeps_other_columns(run, tmp_path, model
     assert outcome.code == DONE
     with (tmp_path / "out.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    names = ["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg", "u_x_mm", "u_y_mm", "u_z_mm", "name"]
+    names = ["x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg"]
+    names += ["u_x_mm", "u_y_mm", "u_z_mm", "u_not_known_because", "name"]
     assert list(rows[0]) == names
     assert [row["name"] for row in rows] == ["middle", "corner"]
     commanded = np.array([[0, 0, -1008], [100, 100, -1150]])

@@ -25,6 +25,7 @@ STORED = {
     "dbb-model/1": FIXTURES / "models" / "small.yaml",
     "dbb-model/2": FIXTURES / "models" / "greatest-feed.yaml",
     "dbb-model/3": FIXTURES / "models" / "provenance.yaml",
+    "dbb-model/4": FIXTURES / "models" / "null-space.yaml",
     "dbb-settings/1": FIXTURES / "settings" / "version-1.yaml",
     "dbb-settings/2": FIXTURES / "settings" / "every-key.yaml",
     "dbb-bar/1": FIXTURES / "bars" / "zerodur.yaml",

@@ -216,10 +216,25 @@ def test_the_shops_limits_are_held_against_the_last_session(few):
     assert quantity(data, "G a cw")["conformity"] == "within"
 
 
-def test_too_few_sessions_cannot_tell(few):
+def test_a_few_sessions_are_decided_by_stated_uncertainty(few):
     outcome = call("history", few)
-    assert "Cannot tell whether anything changed: there are too few sessions" in outcome.out
-    assert "cannot tell: needs 7 more sessions" in outcome.out
+    assert "Nothing changed beyond scatter and uncertainty" in outcome.out
+    assert "steady, by stated U" in outcome.out
+    assert quantity(call("history", few, "--json").data, "X a cw")["decided_by"] == "stated-uncertainty"
+
+
+def test_the_last_of_eight_sessions_is_seen_to_be_a_tenth_of_a_millimetre_off(tmp_path):
+    sessions_over_time(tmp_path / "eight", 8, seed=4, step_at=7, step_um=100.0)
+    outcome = call("history", tmp_path / "eight")
+    assert "1 session stands out" in outcome.out
+    assert re.search(r"stands out: w008 .*X a c?cw \+100", outcome.out)
+
+
+def test_one_session_cannot_tell(tmp_path):
+    sessions_over_time(tmp_path / "one", 1, seed=4, step_at=1, step_um=0.0)
+    outcome = call("history", tmp_path / "one")
+    assert "Cannot tell whether anything changed: there is one session of each quantity" in outcome.out
+    assert "cannot tell: needs 1 more session" in outcome.out
 
 
 def test_a_damaged_session_is_named_and_left_out(few):

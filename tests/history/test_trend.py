@@ -47,7 +47,7 @@ def test_the_rate_is_that_of_all_watched_quantities_of_a_machine():
     runs = (run(), run(test="b"))
     (machine,) = histories([session(k, *runs) for k in range(30)], {}, Asked(2.0, false_alarms=0.01))
     assert average_run_length(machine.chart) == pytest.approx(4 / 0.01, rel=1e-4)
-    assert machine.expected == pytest.approx(0.01 * 20)
+    assert machine.expected == pytest.approx(0.01 * 29)
 
 
 def test_machines_are_apart_and_in_the_order_of_their_names():

@@ -33,15 +33,15 @@ def test_a_table_gives_as_many_false_alarms_as_stated(rng, scatter):
     found, chart = tables_with_an_alarm(
         rng, tables=tables, quantities=quantities, sessions=sessions, rate=rate, scatter=scatter
     )
-    quiet = 1.0 - signalled_within(chart, [0.0] * (sessions - BASELINE))[-1]
+    quiet = 1.0 - signalled_within(chart, [0.0] * (sessions - 1))[-1]
     low, high = stats.binom.interval(0.999, tables, 1.0 - quiet ** (2 * quantities))
     assert low <= found <= high
-    assert 1.0 - quiet ** (2 * quantities) == pytest.approx(1.0 - np.exp(-rate * (sessions - BASELINE)), abs=0.02)
+    assert 1.0 - quiet ** (2 * quantities) == pytest.approx(1.0 - np.exp(-rate * (sessions - 1)), abs=0.02)
 
 
 def test_uncertainties_that_are_stated_too_large_give_fewer(rng):
     found, chart = tables_with_an_alarm(rng, tables=200, quantities=6, sessions=110, rate=0.01, scatter=0.4)
-    quiet = 1.0 - signalled_within(chart, [0.0] * 100)[-1]
+    quiet = 1.0 - signalled_within(chart, [0.0] * 109)[-1]
     assert found < stats.binom.interval(0.999, 200, 1.0 - quiet**12)[0]
 
 
@@ -72,7 +72,7 @@ def test_a_step_is_found_as_soon_as_theory_says(rng, step):
     j = np.arange(after)
     off = step * before / (before + j)
     widened = np.sqrt(1.0 + step**2 * before * j / (before + j) ** 2)
-    quiet = 1.0 - signalled_within(ONE, [0.0] * (before - BASELINE) + (off / widened).tolist())[before - BASELINE - 1 :]
+    quiet = 1.0 - signalled_within(ONE, [0.0] * (before - 1) + (off / widened).tolist())[before - 2 :]
     theory = np.sum(quiet[:-1]) / quiet[0]
     assert np.isfinite(delays).mean() > 0.95
     delays = np.minimum(delays, after)  # as the chain has it
@@ -132,20 +132,77 @@ def test_the_size_of_a_change_is_right_on_average(rng):
     assert 0.8 < np.std(sizes) < 1.2
 
 
-def test_after_a_late_change_it_is_said_how_many_sessions_are_lacking(rng):
-    values = rng.standard_normal(40)
+@pytest.mark.parametrize(("count", "lacking"), [(36, 1), (37, 0), (40, 0)])
+def test_after_a_change_the_next_session_begins_the_level_and_the_one_after_is_watched(rng, count, lacking):
+    values = rng.standard_normal(count)
     values[34:] += 20.0
-    found = watch(values, np.ones(40), ONE, K)
+    found = watch(values, np.ones(count), ONE, K)
     assert found.events[-1].found == 35
-    assert found.lacking == BASELINE - 4
+    assert found.lacking == lacking
+    assert found.watched == count - 1 - (count > 36)
     assert found.verdict is Verdict.CHANGED
+    assert not found.by_stated
 
 
-@pytest.mark.parametrize("count", [1, 2, BASELINE])
-def test_too_few_sessions_cannot_tell(rng, count):
-    found = watch(rng.standard_normal(count), np.ones(count), ONE, K)
+def test_after_a_change_the_scatter_of_before_is_still_known(rng):
+    """Thrice the stated scatter: a second step soon after the first is held against that, not against the stated one."""
+    values = 3.0 * rng.standard_normal(50)
+    values[30:] += 60.0
+    values[36:] += 60.0
+    found = watch(values, np.ones(50), ONE, K)
+    assert [(e.verdict, e.since, e.by_stated) for e in found.events] == [
+        (Verdict.CHANGED, 30, False),
+        (Verdict.CHANGED, 36, False),
+    ]
+
+
+def test_one_session_cannot_tell(rng):
+    found = watch(rng.standard_normal(1), np.ones(1), ONE, K)
     assert found.verdict is Verdict.CANNOT_TELL
-    assert found.lacking == BASELINE - count
+    assert found.lacking == 0
+
+
+@pytest.mark.parametrize("count", range(2, BASELINE + 1))
+def test_from_the_second_session_on_a_large_step_is_seen_by_stated_uncertainty(rng, count):
+    values = rng.standard_normal(count)
+    assert watch(values, np.ones(count), ONE, K).verdict is Verdict.STEADY
+    values[-1] += 20.0
+    found = watch(values, np.ones(count), ONE, K)
+    assert [(e.verdict, e.found, e.by_stated) for e in found.events] == [(Verdict.STANDS_OUT, count - 1, True)]
+    assert found.by_stated
+
+
+def test_a_scatter_that_contradicts_by_chance_hides_no_large_step(rng):
+    """Of three sessions: two that lie apart by chance say nothing of the third, twenty times further off."""
+    values = rng.standard_normal((400, 3))
+    values[:, -1] += 20.0
+    assert np.mean([bool(watch(row, np.ones(3), ONE, K).events) for row in values]) > 0.99
+
+
+def test_a_change_in_the_first_sessions_stays_when_the_chart_takes_over(rng):
+    values = rng.standard_normal(60)
+    values[5:] += 20.0
+    for count in (7, 10, 11, 12, 30, 60):
+        found = watch(values[:count], np.ones(count), ONE, K)
+        assert [(e.verdict, e.since) for e in found.events] == [(Verdict.CHANGED, 5)], count
+
+
+def test_a_few_sessions_give_as_many_false_alarms_as_stated(rng):
+    """From two to ten sessions that scatter as stated; the 99.9 % binomial interval of the chain's share."""
+    for sessions in (2, 5, 10):
+        found, chart = tables_with_an_alarm(rng, tables=300, quantities=6, sessions=sessions, rate=0.01, scatter=1.0)
+        quiet = 1.0 - signalled_within(chart, [0.0] * (sessions - 1))[-1]
+        low, high = stats.binom.interval(0.999, 300, 1.0 - quiet**12)
+        assert low <= found <= high
+
+
+def test_sessions_that_scatter_by_more_than_stated_are_steady_once_that_is_seen(rng):
+    """Four times the stated scatter: each of eight values is beyond its limit with a probability of a quarter."""
+    values = 4.0 * rng.standard_normal((40, 50))
+    early = [watch(row[:8], np.ones(8), ONE, K).verdict is not Verdict.STEADY for row in values]
+    late = [watch(row, np.ones(50), ONE, K).verdict is not Verdict.STEADY for row in values]
+    assert np.mean(early) < 0.4
+    assert np.mean(late) < 0.05
 
 
 def test_a_change_within_its_stated_uncertainty_is_none(rng):

@@ -242,3 +242,23 @@ def test_a_law_that_is_not_proportional_to_its_amplitude_is_laid_out_about_it() 
     law = Law("saturation", lambda _: 0.3 * share[:, None], np.array([1.0]), ("size",), ("",), at=about)
     found = there(read_off(settle(channel(data, (law,)), look=False, static=False)))["saturation"]
     assert found.values["size"].value == pytest.approx(2.0, rel=0.1)
+
+
+@pytest.mark.parametrize("form_uncertainty", [0.0, 0.1])
+def test_the_uncertainty_of_a_law_holds_what_its_formula_may_be_off_by(form_uncertainty: float) -> None:
+    """A slope of least squares and a tenth of itself, in squares; the rest of the numbers is that of the exact formula."""
+    data = table(2, EFFECTS["linear in q"])
+    law = Law(
+        "slope",
+        lambda _shape: data.q[:, None],
+        np.array([0.01]),
+        ("slope",),
+        ("mm/mm",),
+        form_uncertainty=form_uncertainty,
+    )
+    finding = there(read_off(settle(channel(data, (law,)))))["slope"]
+    value = finding.values["slope"]
+    columns = np.column_stack([np.ones(len(data.q)), data.q])
+    exact = 0.1 * np.sqrt(np.linalg.inv(columns.T @ columns)[1, 1])
+    assert value.value == pytest.approx(0.003, abs=4.0 * exact)
+    assert value.uncertainty == pytest.approx(np.hypot(exact, form_uncertainty * value.value), rel=0.1)

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from dbbstation.inference.noise import noise_of
-from dbbstation.inference.square_root import Columns, compress, joined, lost_directions, solve, spread
+from dbbstation.inference.square_root import (
+    Columns,
+    compress,
+    joined,
+    lost_directions,
+    solve,
+    spread,
+    unseen_combinations,
+)
 
 NOISE = 0.3
 
@@ -182,3 +190,24 @@ def test_a_block_of_its_own_noise_cannot_be_joined(problem):
     blocks = blocks_of(jacobians, columns, targets)
     with pytest.raises(ValueError, match="noise of their own"):
         joined([blocks[0], replace(blocks[1], noise=0.1)], len(known.prior))
+
+
+@pytest.mark.parametrize("held", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.8, -0.6, 0.0]])
+def test_what_is_unseen_is_the_same_whatever_is_held_in_its_place(problem, held):
+    """The second column is three times the first: only their sum 1 : 3 is seen, and 3 : -1 is not, whatever is held."""
+    jacobians, columns, targets, known, _ = problem
+    for j in jacobians:
+        j[:, 1] = 3.0 * j[:, 0]
+    known = replace(known, scale=np.r_[2.0, 0.5, 1.0, known.scale[3:]])
+    found = unseen_combinations(blocks_of(jacobians, columns, targets), known, NOISE, np.array([held]))
+    # As large as a prior of the scales allows along it: a size s with (3 s / 2)² + (s / 0.5)² = 1.
+    size = 1.0 / np.hypot(3.0 / 2.0, 1.0 / 0.5)
+    expected = np.zeros(8)
+    expected[:2] = [3.0 * size, -size]
+    assert np.allclose(found * np.sign(found[0, 0]), expected, atol=1e-9)
+
+
+def test_nothing_is_unseen_where_nothing_is_held(problem):
+    jacobians, columns, targets, known, _ = problem
+    found = unseen_combinations(blocks_of(jacobians, columns, targets), known, NOISE, np.zeros((0, 3)))
+    assert found.shape == (0, 8)

@@ -20,6 +20,9 @@ def test_a_small_study_finds_what_is_large():
     delays = {(d["way"], d["change"], d["sessions_before"]): d for d in found["delays"]}
     assert delays["as it is", "step of 10", 200]["found"] == 1.0
     assert delays["as it is", "step of 10", 200]["median_delay"] <= 2.0
+    few = {one["sessions"]: one for one in found["few_sessions"]}
+    assert few[8]["found_by_step"]["20"] == few[2]["found_by_step"]["20"] == 1.0
+    assert few[8]["found_by_step"]["3"] < 0.6
     assert {one["scatter_in_u"] for one in found["false_alarms"]} == {0.5, 1.0, 1.5, 4.0}
 
 

@@ -15,7 +15,7 @@ from dbbstation.calibration.fit.prescription import Name, names_of, prescribed
 from dbbstation.calibration.layout import Layout, lay_out
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.noise import Noise, noise_of
-from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve
+from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve, unseen_combinations
 from dbbstation.machine.compiled import in_parallel
 from dbbstation.sources.contract import Need, Owner
 from dbbstation.sources.registry import sources_named
@@ -106,6 +106,11 @@ class Calibration:
     def circle_blocks(self) -> tuple[Block, ...]:
         """What the circles say of the columns, one block for each run."""
         return self.blocks[: len(self.observations)]
+
+    @property
+    def null_space(self) -> NDArray[np.float64]:
+        """Combinations of the columns that the runs cannot determine, each at its plausible size, shape (h, k)."""
+        return unseen_combinations(self.blocks, self.layout.known, self.noise.effective, self.solution.held)
 
     @property
     def parameters_identified(self) -> int:

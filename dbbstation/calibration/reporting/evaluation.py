@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import residuals
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.model.uncertainty import range_uncertainty_mm
 from dbbstation.sources.contract import Motion
 from dbbstation.trace.analysis import CircleFigures, figures
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.model.identified import IdentifiedModel
     from dbbstation.model.observation import Observation
 
 PLANE_HALF_WIDTH_MM = 190.0
@@ -24,6 +26,14 @@ PLANE_HALF_WIDTH_MM = 190.0
 
 STRAIGHT_POINTS = 39
 """Points along X at which parallelism is looked at: every 10 mm."""
+
+_RING = PLANE_HALF_WIDTH_MM * np.array([(-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0)])
+"""X and Y of the points over which flatness is taken [mm]."""
+
+_ALONG = np.column_stack(
+    [np.linspace(-PLANE_HALF_WIDTH_MM, PLANE_HALF_WIDTH_MM, STRAIGHT_POINTS), np.zeros(STRAIGHT_POINTS)]
+)
+"""X and Y of the move along X whose sideways deviation is parallelism [mm]."""
 
 
 @dataclass(frozen=True)
@@ -126,20 +136,33 @@ def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel
     Raises:
         KinematicsError: the plane lies outside the workspace.
     """
-    w = PLANE_HALF_WIDTH_MM
-    ring = np.array([(-w, -w), (0, -w), (w, -w), (w, 0), (w, w), (0, w), (-w, w), (-w, 0)])
-    along = np.column_stack([np.linspace(-w, w, STRAIGHT_POINTS), np.zeros(STRAIGHT_POINTS)])
-    heights = _error_mm(model, ring, height_mm, corrected)[:, 2]
-    sideways = _error_mm(model, along, height_mm, corrected)[:, 1]
+    heights = _error_mm(model, _RING, height_mm, corrected)[:, 2]
+    sideways = _error_mm(model, _ALONG, height_mm, corrected)[:, 1]
     return PlaneFigures(1e3 * float(np.ptp(heights)), 1e3 * float(np.ptp(sideways)))
+
+
+def plane_uncertainty_um(identified: IdentifiedModel, height_mm: float) -> tuple[float | None, float | None]:
+    """Standard uncertainties of flatness and parallelism as a model predicts them [µm]; None where not known."""
+    identified = replace(identified, model=identified.model.anywhere())
+    found = [
+        range_uncertainty_mm(identified, Motion(_level(points, height_mm)), axis)
+        for points, axis in ((_RING, 2), (_ALONG, 1))
+    ]
+    flatness_um, parallelism_um = (None if u_mm is None else 1e3 * u_mm for u_mm in found)
+    return flatness_um, parallelism_um
+
+
+def _level(xy_mm: NDArray[np.float64], height_mm: float) -> NDArray[np.float64]:
+    poses = np.zeros((len(xy_mm), 6))
+    poses[:, :2], poses[:, 2] = xy_mm, height_mm
+    return poses
 
 
 def _error_mm(
     model: MachineModel, xy_mm: NDArray[np.float64], height_mm: float, corrected: MachineModel | None
 ) -> NDArray[np.float64]:
     """Actual minus wanted position at points, shape (n, 3) [mm]."""
-    poses = np.zeros((len(xy_mm), 6))
-    poses[:, :2], poses[:, 2] = xy_mm, height_mm
+    poses = _level(xy_mm, height_mm)
     motion = Motion(poses)
     actual = model.anywhere().actual_poses(motion)
     believed = poses if corrected is None else corrected.anywhere().actual_poses(motion)

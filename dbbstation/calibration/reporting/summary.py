@@ -15,12 +15,14 @@ from dbbstation.calibration.checks.scatter import ScatterVerdict, check_scatter,
 from dbbstation.calibration.checks.visibility import visibility
 from dbbstation.calibration.reporting.currents import currents_summary
 from dbbstation.calibration.reporting.evaluation import Evaluation, RunFigures, rms_um
-from dbbstation.model.identified import IdentifiedModel
+from dbbstation.model.identified import IdentifiedModel, known_u
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Owner
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from dbbstation.calibration.checks.scatter import ScatterCheck
     from dbbstation.calibration.checks.visibility import Visibility
@@ -44,6 +46,7 @@ def calibration_summary(
     calibration: Calibration, evaluation: Evaluation, outliers: Sequence[Outlier] = ()
 ) -> dict[str, Any]:
     """Everything that a fit says, and what was kept from pulling it."""
+    u = _uncertainties(calibration)
     return {
         **evaluation_summary(evaluation),
         "residual_within_mounting_rms_um": rms_um(calibration.residual_mm),
@@ -59,9 +62,9 @@ def calibration_summary(
         "outliers": [outlier_summary(outlier) for outlier in outliers],
         "scatter": [_scatter(check) for check in check_scatter(seats_of(calibration))],
         "observability": _visibility(visibility(calibration)),
-        "sources": [_term(calibration, term) for term in calibration.layout.terms if _is_machines(term)],
+        "sources": [_term(calibration, term, u) for term in calibration.layout.terms if _is_machines(term)],
         "measurement_effects": [
-            _term(calibration, term) for term in calibration.layout.terms if not _is_machines(term)
+            _term(calibration, term, u) for term in calibration.layout.terms if not _is_machines(term)
         ],
         **currents_summary(calibration),
     }
@@ -73,7 +76,8 @@ def identified_model(
     """Return the model to keep: values with the covariance of what belongs to the machine, and where it comes from."""
     rows = np.concatenate([np.r_[term.columns] for term in calibration.layout.terms if _is_machines(term)])
     names = calibration.layout.names
-    covariance = calibration.solution.covariance[np.ix_(rows, rows)]
+    of_formulas = calibration.layout.formula_variance(calibration.x)[rows]
+    covariance = calibration.solution.covariance[np.ix_(rows, rows)] + np.diag(of_formulas)
     return IdentifiedModel(
         model=MachineModel(calibration.layout.machine, calibration.model.sources),
         covariance_rows=tuple(names[row] for row in rows),
@@ -81,6 +85,8 @@ def identified_model(
         directions_lost=calibration.directions_lost,
         report=report,
         sessions=sessions,
+        null_space=calibration.null_space[:, rows],
+        formula_variance=of_formulas,
     )
 
 
@@ -88,12 +94,23 @@ def _is_machines(term: Term) -> bool:
     return term.source.belongs_to is Owner.MACHINE
 
 
-def _term(calibration: Calibration, term: Term) -> dict[str, Any]:
-    values = calibration.x[term.columns]
-    sigma = np.sqrt(np.maximum(np.diag(calibration.solution.covariance)[term.columns], 0.0))
+def _uncertainties(calibration: Calibration) -> NDArray[np.float64]:
+    """Standard uncertainty of every column, as the model file has it, shape (k,); NaN where not known."""
+    variance = np.maximum(np.diag(calibration.solution.covariance), 0.0)
+    variance += calibration.layout.formula_variance(calibration.x)
+    if calibration.prescribed:  # they define coordinates, and all parameters are known in these
+        return np.sqrt(variance)
+    return known_u(variance, np.sum(calibration.null_space**2, axis=0))
+
+
+def _term(calibration: Calibration, term: Term, u: NDArray[np.float64]) -> dict[str, Any]:
     parameters = {
-        parameter.name: {"value": float(value), "uncertainty": float(u), "unit": parameter.unit}
-        for parameter, value, u in zip(term.parameters, values, sigma, strict=True)
+        parameter.name: {
+            "value": float(value),
+            "uncertainty": None if np.isnan(known) else float(known),
+            "unit": parameter.unit,
+        }
+        for parameter, value, known in zip(term.parameters, calibration.x[term.columns], u[term.columns], strict=True)
     }
     shared = {"shared": term.shared} if term.shared else {}
     return {"name": term.source.name, **shared, "parameters": parameters}

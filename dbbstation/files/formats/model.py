@@ -71,6 +71,7 @@ def parse_model(path: Path, known_sources: Mapping[str, ErrorSource], faults: li
         count = len(file.covariance.rows)  # none at all in a model that was written by hand
         covariance = np.array(file.covariance.matrix, dtype=np.float64).reshape(count, count)
     _check_rows(document, file, faults)
+    _check_lengths(document, file, faults)
     if covariance is None:
         what = f"covariance.matrix: {len(file.covariance.rows)} rows of as many numbers were expected, one per row name"
         faults.append(document.problem(("covariance", "matrix"), what, "restore the file as it was written"))
@@ -78,6 +79,7 @@ def parse_model(path: Path, known_sources: Mapping[str, ErrorSource], faults: li
         faults.append(document.problem(("covariance", "matrix"), f"covariance.matrix: {fault}", "restore the file"))
     if faults or covariance is None:
         return None
+    of_formulas = file.covariance.formula_variance
     return IdentifiedModel(
         model=MachineModel(machine, tuple(one for one in fitted if one is not None)),
         covariance_rows=file.covariance.rows,
@@ -85,6 +87,8 @@ def parse_model(path: Path, known_sources: Mapping[str, ErrorSource], faults: li
         directions_lost=file.directions_lost,
         report=_lists(file.report),
         sessions=file.sessions,
+        null_space=None if file.null_space is None else np.array(file.null_space, dtype=np.float64),
+        formula_variance=None if of_formulas is None else np.array(of_formulas, dtype=np.float64),
     )
 
 
@@ -179,6 +183,18 @@ def _check_rows(document: YamlDocument, file: ModelFile, faults: list[Problem]) 
         seen.add(row)
 
 
+def _check_lengths(document: YamlDocument, file: ModelFile, faults: list[Problem]) -> None:
+    """Add a fault for each list that has not one number for every row of the covariance."""
+    lists: list[tuple[Location, tuple[float, ...] | None]] = [
+        (("covariance", "formula_variance"), file.covariance.formula_variance),
+        *((("null_space", k), row) for k, row in enumerate(file.null_space or ())),
+    ]
+    for location, numbers in lists:
+        if numbers is not None and len(numbers) != len(file.covariance.rows):
+            what = f"{dotted(location)}: {len(numbers)} numbers, {len(file.covariance.rows)} were expected, one per row name"
+            faults.append(document.problem(location, what, "restore the file as it was written"))
+
+
 def covariance_fault(covariance: NDArray[np.float64]) -> str | None:
     """Say why a matrix, shape (k, k), is no covariance; None where it is one."""
     variance = np.diag(covariance)
@@ -225,19 +241,22 @@ def model_data(model: IdentifiedModel) -> dict[str, Any]:
     own = [one for one in model.model.sources if one.source.belongs_to is Owner.MACHINE]
     others = [one for one in model.model.sources if one.source.belongs_to is not Owner.MACHINE]
     nominal = machine_data(machine_parts(machine))
-    return {
-        "format": format_for(ModelFile, nominal),
+    of_formulas, unseen = model.formula_variance, model.null_space
+    data = {
         "machine": nominal,
         "sources": [_source_data(one, machine) for one in own],
         "measurement_effects": [_source_data(one, machine) for one in others],
         "covariance": {
             "rows": [list(row) for row in model.covariance_rows],
             "matrix": [row.tolist() for row in model.covariance],
+            **({} if of_formulas is None or not of_formulas.any() else {"formula_variance": of_formulas.tolist()}),
         },
         "directions_lost": list(model.directions_lost),
+        **({} if unseen is None or not len(unseen) else {"null_space": unseen.tolist()}),
         "report": dict(model.report),
         "sessions": dict(model.sessions),
     }
+    return {"format": format_for(ModelFile, data), **data}
 
 
 def _source_data(fitted: Fitted, machine: Machine) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""`dbb-model/3`, which has all of `dbb-model/1` and `/2`: an identified machine model with the uncertainty and provenance of its numbers."""
+"""`dbb-model/4`, which has all of the versions before: an identified machine model with the uncertainty and provenance of its numbers."""
 
 from typing import Annotated, Any, Literal
 
@@ -40,7 +40,11 @@ class CovarianceSchema(Schema):
     rows: tuple[tuple[str, str, str], ...]
     """Source, set (empty for the machine's own) and parameter of every row, and of every column in the same order."""
     matrix: tuple[tuple[float, ...], ...]
-    """Symmetric, in the products of the parameters' units; a direction held at nominal has no variance."""
+    """Symmetric, in the products of the parameters' units, with what formulas may be off by; a direction held at nominal has no
+    variance."""
+    formula_variance: tuple[float, ...] | None = None
+    """Part of each row's variance that is what the formula of its source may be off by, the same in every session of a machine;
+    absent where none is, and in files of older programs, whose matrix is without it."""
 
 
 class ProvenanceSchema(Schema):
@@ -57,10 +61,10 @@ class ProvenanceSchema(Schema):
 class ModelFile(Schema):
     """The nominal machine, what is different on the real one, and how well that is known.
 
-    Every key but `provenance` is required, empty where there is nothing to say, so that a file that was cut short is noticed.
+    Every key but `null_space` and `provenance` is required, empty where there is nothing to say, so that a file that was cut short is noticed.
     """
 
-    format: Literal["dbb-model/1", "dbb-model/2", "dbb-model/3"]
+    format: Literal["dbb-model/1", "dbb-model/2", "dbb-model/3", "dbb-model/4"]
     """Name and version of this format."""
     machine: MachineParts
     """The nominal machine, as in a `dbb-machine/1` file."""
@@ -71,7 +75,10 @@ class ModelFile(Schema):
     covariance: CovarianceSchema
     """Uncertainty of the parameters."""
     directions_lost: tuple[str, ...]
-    """What the recordings could not see, in words; held at nominal."""
+    """What the recordings could not determine, in words; held at nominal, or prescribed parameters in its place."""
+    null_space: tuple[tuple[float, ...], ...] | None = None
+    """The same in numbers: combinations of the covariance's rows, each at its plausible size in the parameters' units; absent
+    where nothing was lost, and in files of older programs."""
     report: dict[str, Any]
     """What the fit reported, by name."""
     sessions: dict[str, Sha256Hex]

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 POSE_COLUMNS = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 UNCERTAINTY_COLUMNS = ("u_x_mm", "u_y_mm", "u_z_mm")
+REASON_COLUMN = "u_not_known_because"
+"""Why the cell of an uncertainty is empty; empty itself where all three are known."""
 MOST_FAULTS = 20
 ELSE = "other tables need --decimal and --separator, or `numbers` in the settings"
 
@@ -98,20 +100,31 @@ def write_poses(
     others: dict[str, list[str]],
     provenance: Provenance,
     *,
+    why_unknown: str = "",
     force: bool = False,
 ) -> None:
-    """Write poses, shape (n, 6) [mm, deg], their standard uncertainties, shape (n, 3) [mm], and further columns.
+    """Write poses with their standard uncertainties and further columns, and beside the table where it comes from.
 
-    Beside the table is written where it comes from.
+    Args:
+        path: of the table.
+        poses: shape (n, 6) [mm, deg].
+        uncertainty_mm: of X, Y and Z, shape (n, 3) [mm]; NaN, and then an empty cell, where not known.
+        others: texts of further columns by name.
+        provenance: where the table comes from.
+        why_unknown: why an uncertainty is not known, for the rows where one is not.
+        force: overwrite.
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.
     """
-    kept = {name: cells for name, cells in others.items() if name not in UNCERTAINTY_COLUMNS}
+    own = (*UNCERTAINTY_COLUMNS, REASON_COLUMN)
+    kept = {name: cells for name, cells in others.items() if name not in own}
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*POSE_COLUMNS, *UNCERTAINTY_COLUMNS, *kept])
+    writer.writerow([*POSE_COLUMNS, *own, *kept])
     for k, (pose, uncertainty) in enumerate(zip(poses, uncertainty_mm, strict=True)):
-        numbers = [f"{value:.9f}" for value in pose] + [f"{value:.7f}" for value in uncertainty]
-        writer.writerow([*numbers, *(cells[k] for cells in kept.values())])
+        numbers = [f"{value:.9f}" for value in pose]
+        numbers += ["" if np.isnan(value) else f"{value:.7f}" for value in uncertainty]
+        reason = why_unknown if np.isnan(uncertainty).any() else ""
+        writer.writerow([*numbers, reason, *(cells[k] for cells in kept.values())])
     write_table(path, out.getvalue(), provenance, force=force)

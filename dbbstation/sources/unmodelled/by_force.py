@@ -32,6 +32,7 @@ class UnexplainedByForce(LinearSource):
     detail_mm = SMOOTH_MM
     varies_with = "strut-force"
     candidate = False
+    form_uncertainty = 0.0  # a curve through what was measured, no formula
     texts = texts("axial force", "actual minus driven length = sum over points k of v_ik hat_k(T_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:

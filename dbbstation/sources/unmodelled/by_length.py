@@ -29,6 +29,7 @@ class UnexplainedByLength(LinearSource):
     belongs_to = Owner.MACHINE
     varies_with = "strut-length"
     candidate = False
+    form_uncertainty = 0.0  # a curve through what was measured, no formula
     texts = texts("length", "actual minus driven length = sum over points k of v_ik hat_k(L_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:

@@ -29,6 +29,7 @@ class UnexplainedWave(ErrorSource):
     belongs_to = Owner.MACHINE
     varies_with = "strut-length"
     candidate = False
+    form_uncertainty = 0.0  # a curve through what was measured, no formula
     texts = texts("length", "dL_i = a_i sin(2 pi (L_i - L_0) / p_i) + b_i cos(2 pi (L_i - L_0) / p_i)")
 
     def parameters(self, machine: Machine) -> tuple[Parameter, ...]:

@@ -70,8 +70,16 @@ def drawn(reference, seed: int) -> IdentifiedModel:
         "by": {"x": 1e-9},
     }
     sessions = {"2026-11-20": "ab" * 32}
+    unseen, of_formulas = rng.normal(size=(2, 6)), rng.uniform(size=6)
     return IdentifiedModel(
-        MachineModel(reference, fitted), rows, root @ root.T, ("all six, along Z",), report, sessions
+        MachineModel(reference, fitted),
+        rows,
+        root @ root.T,
+        ("all six, along Z",),
+        report,
+        sessions,
+        unseen,
+        of_formulas,
     )
 
 
@@ -84,6 +92,8 @@ def test_a_model_survives_to_the_last_bit(tmp_path_factory, reference, seed) -> 
     read = read_model(path, KNOWN)
     assert np.array_equal(read.covariance, model.covariance)
     assert (read.covariance_rows, read.directions_lost) == (model.covariance_rows, model.directions_lost)
+    assert np.array_equal(read.null_space, model.null_space)
+    assert np.array_equal(read.formula_variance, model.formula_variance)
     assert (read.report, read.sessions) == (model.report, model.sessions)
     assert len(read.model.sources) == 3
     for a, b in zip(read.model.sources, model.model.sources, strict=True):
@@ -159,9 +169,12 @@ def test_a_model_that_could_not_be_read_back_is_not_written(tmp_path: Path, refe
         ("strut_2_mm: {value", "strut_3_mm: {value", "sources[0].parameters: `strut_2_mm` of struts is missing; add it"),
         ('[struts, "", strut_2_mm]', '[struts, "", strut_1_mm]', "the covariance row `struts strut_1_mm` stands here a se"),
         ('[struts, "", strut_2_mm]', '[struts, "", strut_9_mm]', "the covariance row `struts strut_9_mm` names no parameter"),
+        ("formula_variance: [", "formula_variance: [0.0, ", "covariance.formula_variance: 7 numbers, 6 were expected"),
+        ("null_space:\n  - [", "null_space:\n  - [0.0, ", "null_space[0]: 7 numbers, 6 were expected, one per row name"),
+        ("format: dbb-model/4", "format: dbb-model/3", "the key `formula_variance` came with dbb-model/4"),
         ("abababab", "abab", "sessions.2026-11-20: string should match pattern"),
         ("value: ", "value: .nan #", "not YAML"),
-        ("format: dbb-model/1", "format: dbb-machine/1", "this file is a machine (`dbb-machine/1`), a model (`dbb-model/3`)"),
+        ("format: dbb-model/4", "format: dbb-machine/1", "this file is a machine (`dbb-machine/1`), a model (`dbb-model/4`)"),
     ],
 )  # fmt: skip
 def test_tampering_is_refused(tmp_path: Path, reference, old: str, new: str, said: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,13 @@ def test_poses_and_further_columns(tmp_path: Path) -> None:
     table = read(tmp_path, f"name,{HEADER}\np1,1,2,-1000,0.5,0,0\np2,1,2,-1001,0,0,1e-1\n")
     assert table.poses.tolist() == [[1, 2, -1000, 0.5, 0, 0], [1, 2, -1001, 0, 0, 0.1]]
     assert table.others == {"name": ["p1", "p2"]}
-    write_poses(tmp_path / "out.csv", table.poses, np.zeros((2, 3)), table.others, Provenance("p 1", "p"))
-    assert (tmp_path / "out.csv").read_text().splitlines()[0] == f"{HEADER},u_x_mm,u_y_mm,u_z_mm,name"
+    u_mm = np.array([[0.001, 0.002, np.nan], [0.001, 0.002, 0.003]])
+    write_poses(tmp_path / "out.csv", table.poses, u_mm, table.others, Provenance("p 1", "p"), why_unknown="no, not Z")
+    with (tmp_path / "out.csv").open(newline="") as file:
+        first, second, third = csv.reader(file)
+    assert ",".join(first) == f"{HEADER},u_x_mm,u_y_mm,u_z_mm,u_not_known_because,name"
+    assert second[6:] == ["0.0010000", "0.0020000", "", "no, not Z", "p1"]
+    assert third[6:] == ["0.0010000", "0.0020000", "0.0030000", "", "p2"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,87 @@
+"""One uncertainty for one value: a finding, the model file, the summary of a calibration; one error over the workspace."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dbbstation.calibration.fit.calibrate import default_sources
+from dbbstation.calibration.reporting.evaluation import evaluate
+from dbbstation.calibration.reporting.summary import calibration_summary, identified_model
+from dbbstation.diagnosis.diagnose import diagnose
+from dbbstation.diagnosis.summary import diagnosis_summary
+from dbbstation.diagnosis.workspace import workspace
+from dbbstation.files.formats.plan import read_plan
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.model.uncertainty import position_uncertainty_mm, predicted_poses, prediction_summary
+from dbbstation.report.model_part import parameters
+from dbbstation.sources.contract import Fitted, Motion
+from dbbstation.sources.registry import sources_named
+from dbbstation.virtual.truth import random_kinematics
+from studies.virtual_session import draw_session
+
+COMPLIANCE_UM_KN = 9.68
+NAME = "strut_compliance_um_kn"
+
+
+@pytest.fixture(scope="module")
+def diagnosed(reference):
+    """Gravity on fifteen level circles, the only cause that is looked for."""
+    (gravity,) = sources_named(["gravity"])
+    truth = MachineModel(reference, (*random_kinematics(reference, 3), Fitted(gravity, np.array([COMPLIANCE_UM_KN]))))
+    plan = read_plan(shipped_folder("protocols") / "plans" / "table2.yaml")
+    runs = draw_session(truth, plan, np.random.default_rng(3), 5e-4, 120)
+    return diagnose(reference, runs, [gravity])
+
+
+def test_what_a_formula_may_be_off_by_is_in_every_uncertainty_of_a_value(diagnosed):
+    """Two per cent of 9.68 µm/kN, beside what the recordings leave open [a sum of squares, GUM 5.1.2]."""
+    (finding,) = diagnosed.sources
+    found = finding.parameters[NAME]
+    after = diagnosed.after
+    (column,) = (k for k, name in enumerate(after.layout.names) if name[2] == NAME)
+    # What level circles cannot determine has a small part along the compliance too.
+    seen = after.solution.covariance[column, column] + np.sum(after.null_space[:, column] ** 2)
+    expected = np.hypot(np.sqrt(seen), 0.02 * after.x[column])
+    assert expected > 5.0 * np.sqrt(after.solution.covariance[column, column])
+    assert found.uncertainty == pytest.approx(expected)
+    identified = identified_model(after, {}, {})
+    assert identified.uncertainties["gravity", "", NAME] == pytest.approx(expected)
+    summary = calibration_summary(after, evaluate(after.model, after.observations))
+    (told,) = (s["parameters"][NAME] for s in summary["sources"] if s["name"] == "gravity")
+    assert told["uncertainty"] == pytest.approx(expected)
+    (row,) = (row for row in parameters(identified, 2.0) if row[1] == NAME)
+    assert row[3] == f"{2.0 * expected:.2g}"
+    between = identified.uncertainties_between_sessions["gravity", "", NAME]
+    assert between == pytest.approx(np.sqrt(after.solution.covariance[column, column]))
+
+
+def test_the_formula_of_the_kinematics_is_exact(diagnosed):
+    of_formulas = diagnosed.after.layout.formula_variance(diagnosed.after.x)
+    names = [name for name, variance in zip(diagnosed.after.layout.names, of_formulas, strict=True) if variance]
+    assert names == [("gravity", "", NAME)]
+
+
+def test_errors_over_the_workspace_are_those_that_predict_gives(diagnosed, reference):
+    """Both calibrations predicted like any poses, with the common shift and without it."""
+    poses = workspace(reference)
+    before, after = (identified_model(fit, {}, {}) for fit in (diagnosed.before, diagnosed.after))
+    assert {source.name for source in default_sources()} > {"bar-offset"}
+    (was, _), (now, u_mm) = predicted_poses(before, poses), predicted_poses(after, poses)
+    expected = prediction_summary(now, was, u_mm)
+    told = diagnosis_summary(diagnosed, {})["workspace"]
+    assert told["common_shift_um"] == pytest.approx(expected["common_shift_um"])
+    assert told["error_with_shift_rms_um"] == pytest.approx(expected["error_rms_um"])
+    assert told["error_rms_um"] == pytest.approx(expected["error_about_mean_rms_um"])
+    assert told["error_with_shift_rms_um"] ** 2 == pytest.approx(
+        told["error_rms_um"] ** 2 + np.sum(np.square(told["common_shift_um"]))
+    )
+    # Level bars do not see the base's height: a common shift is not known, what is apart from it is.
+    assert told["uncertainty_with_shift_rms_um"] is None
+    about_um = 1e3 * position_uncertainty_mm(after, Motion(poses), about_mean=True)
+    assert told["uncertainty_rms_um"] == pytest.approx(np.sqrt(np.mean(np.sum(about_um**2, axis=1))))
+    assert np.isnan(position_uncertainty_mm(after, Motion(poses))[:, 2]).all()
+    assert replace(after, directions_lost=()).unseen is after.null_space

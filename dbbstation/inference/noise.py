@@ -65,6 +65,8 @@ _FEWEST = 20
 
 def _autocovariance(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sums of products at lags 0 to 200."""
-    size = next_fast_len(max(len(residual), _LAGS) + _LAGS, real=True)  # room for the lags: nothing wraps round into them
+    size = next_fast_len(
+        max(len(residual), _LAGS) + _LAGS, real=True
+    )  # room for the lags: nothing wraps round into them
     spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
     return np.fft.irfft(spectrum, size)[:_LAGS]

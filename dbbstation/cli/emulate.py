@@ -154,6 +154,7 @@ def _truth(machine: Machine, file: Path | None, source_files: tuple[Path, ...], 
 def _programs(folder: Path) -> Callable[[str], CommandedPath]:
     """Return what turns the name of a program in a folder into what it commands."""
     from dbbstation.errors import InputError, Problem
+    from dbbstation.files.gateway import content_of
     from dbbstation.station.programs import read_toolpath
     from dbbstation.virtual.path import path_of
 
@@ -161,6 +162,6 @@ def _programs(folder: Path) -> Callable[[str], CommandedPath]:
         path = folder / name
         if path.parent != folder or not path.is_file():
             raise InputError([Problem(str(path), 0, 0, "there is no such program", f"name a file in {folder}")])
-        return path_of(read_toolpath(path, path.read_bytes()))
+        return path_of(read_toolpath(path, content_of(path)))
 
     return read

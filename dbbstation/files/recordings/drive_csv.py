@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.source_text import decode, read_bytes, shortened
+from dbbstation.files.source_text import decode, first_line, read_bytes, shortened
 from dbbstation.trace.drive_recording import DriveRecording
 
 if TYPE_CHECKING:
@@ -68,11 +68,10 @@ class DriveFile:
 def looks_like_drive(path: Path) -> bool:
     """Whether the first line that is no comment names a position and no bar length: what runs have."""
     try:
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            head = next((line for line in file if line.strip() and not line.lstrip().startswith("#")), "")
+        head = first_line(path)
     except OSError:
         return False
-    names = {name.strip() for name in head.split(",")}
+    names = {name.strip() for name in head.decode("utf-8-sig", "replace").split(",")}
     return POSITION in names and "length_mm" not in names
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import Problem
-from dbbstation.files.source_text import decode, shortened
+from dbbstation.files.source_text import decode, first_line, shortened, unreadable
 from dbbstation.trace import columns
 
 if TYPE_CHECKING:
@@ -147,10 +147,9 @@ def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
 def split_head(path: Path, faults: list[Problem]) -> tuple[str, ...]:
     """Return the columns of a run file without reading its samples; none, with the reason in `faults`, where it has none."""
     try:
-        with path.open("rb") as file:
-            head = next((line for line in file if line.strip() and not line.startswith((b"#", b"\xef\xbb\xbf#"))), b"")
+        head = first_line(path)
     except OSError as error:
-        faults.append(Problem(str(path), 0, 0, f"cannot be read: {(error.strerror or '').lower()}", "check the file"))
+        faults.append(unreadable(path, error))
         return ()
     text = decode(head, str(path), faults)
     return () if not text else tuple(name.strip() for name in text.split(","))

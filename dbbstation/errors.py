@@ -60,12 +60,12 @@ def few(problems: Sequence[Problem], count: int | None = None) -> list[Problem]:
 
     Args:
         problems: in the order of the file.
-        count: how many there are, where only the first of them were made.
+        count: how many there are, where only the first `MOST_FAULTS` + 1 of them were made.
     """
     more = (count or len(problems)) - MOST_FAULTS
     if more <= 0:
         return list(problems)
-    last = problems[MOST_FAULTS - 1]
+    last = problems[MOST_FAULTS]
     what = f"and {more} more of these from here on"
     return [*problems[:MOST_FAULTS], Problem(last.file, last.line, last.column, what)]
 

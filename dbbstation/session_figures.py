@@ -160,6 +160,4 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
             parameters.append(
                 _as_printed(ModelParameter(fitted.source.name, parameter.name, float(value), sure, parameter.unit))
             )
-    return ModelFigures(
-        path.name, digest_of(path), dict(identified.sessions), tuple(parameters)
-    )
+    return ModelFigures(path.name, digest_of(path), dict(identified.sessions), tuple(parameters))

@@ -6,6 +6,7 @@ tags, no merge keys, no key twice. Sequences become tuples, times stay text: the
 
 from __future__ import annotations
 
+import functools
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, StreamMark, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
+from ruamel.yaml.scanner import Scanner
 
 from dbbstation.errors import Problem, few
 from dbbstation.files.source_text import decode, read_bytes, shortened
@@ -79,6 +81,9 @@ MOST_VALUES = MOST_NODES
 DEEPEST = 50
 """Lists and mappings that may stand in one another: the formats have eight."""
 
+LONGEST_TAG = 1000
+"""Characters of a tag. None is allowed, but each is read to its end first."""
+
 LONGEST_S = 60.0
 """Time that a document may take [s]: six times what `MOST_NODES` take, for a slow computer."""
 
@@ -92,12 +97,29 @@ def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
 
 def parse_yaml(text: str, file: str, faults: list[Problem]) -> YamlDocument | None:
     """Parse YAML text; None with the reasons added to `faults` where that is impossible."""
+    document, found = _parsed(text, file)
+    faults += found
+    return document
+
+
+# Whoever looks which format a file has reads it again at once.
+@functools.lru_cache(maxsize=1)
+def _parsed(text: str, file: str) -> tuple[YamlDocument | None, tuple[Problem, ...]]:
+    faults: list[Problem] = []
+    return _composed(text, file, faults), tuple(faults)
+
+
+def _composed(text: str, file: str, faults: list[Problem]) -> YamlDocument | None:
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _Counting
+    yaml.Scanner = _BoundedScanner
     try:
         root = yaml.compose(text)
     except YAMLError as error:
         faults.append(_syntax_problem(error, text, file))
+        return None
+    except ValueError as error:  # a version of YAML with a thousand digits
+        faults.append(Problem(file, 1, 1, f"not YAML: {error}", "compare it with the example of its format"))
         return None
     except _OverBudgetError as error:
         faults.append(Problem(file, *error.place, error.what, "check that it is the right file"))
@@ -120,6 +142,15 @@ class _OverBudgetError(Exception):
         super().__init__(what)
         self.what = what
         self.place = (mark.line + 1, mark.column + 1)
+
+
+class _BoundedScanner(Scanner):
+    """Refuses tags longer than anybody writes: the time that ruamel.yaml takes for one grows with its square."""
+
+    def scan_tag(self) -> Any:  # noqa: ANN401 - as in ruamel.yaml
+        if not self.reader.prefix(LONGEST_TAG).split(maxsplit=1)[0][LONGEST_TAG - 1 :]:
+            return super().scan_tag()
+        raise _OverBudgetError(f"a tag has more than {LONGEST_TAG:,} characters", self.reader.get_mark())
 
 
 class _Counting(Composer):
@@ -206,7 +237,11 @@ class _Walk:
             key = self._scalar(key_node)
             if key in data:
                 line = self.key_places[*location, key][0]
-                self._fault(key_node, f"the key `{shortened(str(key))}` stands here a second time, first in line {line}", "remove one")
+                self._fault(
+                    key_node,
+                    f"the key `{shortened(str(key))}` stands here a second time, first in line {line}",
+                    "remove one",
+                )
                 continue
             self.key_places[*location, key] = _place(key_node)
             data[key] = self.value(value_node, (*location, key))
@@ -225,7 +260,9 @@ class _Walk:
         if kind == "merge":
             self._fault(node, "merge keys `<<` are not allowed", "write the entries out")
         else:
-            self._fault(node, f"the tag `{shortened(str(node.tag))}` is not allowed", "remove it, values need no tags here")
+            self._fault(
+                node, f"the tag `{shortened(str(node.tag))}` is not allowed", "remove it, values need no tags here"
+            )
         return None
 
     def _number(self, node: ScalarNode, kind: str, digits: str) -> float | int | None:
@@ -244,7 +281,9 @@ class _Walk:
 
     def _untagged(self, node: Node, kind: str) -> None:
         if node.tag != _TAG + kind:
-            self._fault(node, f"the tag `{shortened(str(node.tag))}` is not allowed", "remove it, values need no tags here")
+            self._fault(
+                node, f"the tag `{shortened(str(node.tag))}` is not allowed", "remove it, values need no tags here"
+            )
 
     def _fault(self, node: Node, what: str, remedy: str) -> None:
         self.faults.append(Problem(self.file, *_place(node), what, remedy))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.number_language import is_number
 from dbbstation.files.source_text import decode, first_line, read_bytes, shortened
 from dbbstation.trace.drive_recording import DriveRecording
 
@@ -160,6 +161,9 @@ def _numbers(
     whole = len(table) == len(rows) and bool(np.isfinite(table).all())
     if not whole or any(line.count(",") != len(names) - 1 for _, line in rows):
         _name_faults(rows, names, known, file, faults)
+        if not faults:
+            what = "NumPy reads this file otherwise than line by line"
+            faults.append(Problem(file, 0, 0, what, "write plain decimal numbers"))
     return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(known)}
 
 
@@ -175,11 +179,7 @@ def _name_faults(
             continue
         for name in known:
             cell = cells[names.index(name)].strip()
-            try:
-                good = math.isfinite(float(cell))
-            except ValueError:
-                good = False
-            if not good:
+            if not is_number(cell) or not math.isfinite(float(cell)):
                 what = f"{name} is `{shortened(cell)}`, not a finite number"
                 faults.append(Problem(file, number, 0, what, "correct or remove the line"))
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import Problem
+from dbbstation.files.formats.number_language import NUMBER
 from dbbstation.files.source_text import LONGEST_LINE, decode, first_line, shortened, unreadable
 from dbbstation.trace import columns
 
@@ -26,7 +27,7 @@ _HEX_DIGIT = np.full(256, _NO_DIGIT, dtype=np.int64)
 _HEX_DIGIT[np.frombuffer(b"0123456789abcdef", dtype=np.uint8)] = np.arange(16)
 _HEX_PLACES = 16 ** np.arange(_CRC_LENGTH - 1, -1, -1, dtype=np.int64)
 _CRC_TEXT = re.compile(rb"[0-9a-f]{8}")
-_NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
+_NUMBER = re.compile(NUMBER.encode())
 
 
 _MOST_KNOWN = 10_000

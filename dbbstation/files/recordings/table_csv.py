@@ -163,7 +163,8 @@ def _numbers(cells: Sequence[str], language: NumberLanguage) -> NDArray[np.float
     plain: Sequence[str] = cells
     if language.decimal != PLAIN.decimal and not any(PLAIN.decimal in cell for cell in cells):
         plain = [cell.replace(language.decimal, PLAIN.decimal) for cell in cells]
-    if language.decimal == PLAIN.decimal or plain is not cells:
+    written = "".join(plain)
+    if (language.decimal == PLAIN.decimal or plain is not cells) and written.isascii() and "_" not in written:
         try:
             return np.array(plain, dtype=np.float64)
         except ValueError:

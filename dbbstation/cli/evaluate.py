@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
+from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -67,16 +68,16 @@ def evaluate(
         print_json(summary)
         return
     print_runs(summary, low_passed=True)
-    click.echo()
+    echo()
     _print_predicted(summary)
-    click.echo()
-    click.echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
-    click.echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
-    click.echo(f"uncompensated at Z {summary['plane_z_mm']:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
+    echo()
+    echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
+    echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
+    echo(f"uncompensated at Z {summary['plane_z_mm']:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
     if summary["plane_without"]:
-        click.echo(f"(without {', '.join(summary['plane_without'])}: no pose alone says what they do)")
-    click.echo(f"flatness               {summary['flatness_um']:8.1f} µm")
-    click.echo(f"parallelism along X    {summary['parallelism_um']:8.1f} µm")
+        echo(f"(without {', '.join(summary['plane_without'])}: no pose alone says what they do)")
+    echo(f"flatness               {summary['flatness_um']:8.1f} µm")
+    echo(f"parallelism along X    {summary['parallelism_um']:8.1f} µm")
     print_tolerances(summary["tolerances"], settings.tolerances_from)
 
 
@@ -89,5 +90,5 @@ def _print_predicted(summary: Mapping[str, Any]) -> None:
         off = predicted - measured
         share = f"{100 * off / measured:.0f}" if measured else "-"
         rows.append([run["test"], run["direction"], run["repeat"], measured, predicted, off, share])
-    click.echo("circular deviation G up to 30 undulations per revolution [µm]")
+    echo("circular deviation G up to 30 undulations per revolution [µm]")
     print_table(["test", "dir", "n", "measured", "predicted", "difference", "%"], rows)

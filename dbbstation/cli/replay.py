@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.output import echo
 
 
 @click.command()
@@ -60,12 +61,12 @@ def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: 
     for row in rows:
         if row.reading is None:
             unread_bytes += len(row.raw)
-            click.echo(f"{row.t_s:12.6f} s  not understood: {row.raw.hex(' ')}" + (f"  ({row.why})" if row.why else ""))
+            echo(f"{row.t_s:12.6f} s  not understood: {row.raw.hex(' ')}" + (f"  ({row.why})" if row.why else ""))
             continue
         length = f"{row.reading.length_mm:14.5f} mm" if row.reading.length_mm is not None else f"{'--':>14}   "
         readings += 1
         lost += row.reading.lost
         gap = f"  ({row.reading.lost} lost before)" if row.reading.lost else ""
         status = f"  {row.reading.status}: {row.reading.said}" if row.reading.status != "ok" else ""
-        click.echo(f"{row.t_s:12.6f} s {length}{gap}{status}")
-    click.echo(f"{readings} readings, {lost} lost, {unread_bytes} bytes not understood", err=True)
+        echo(f"{row.t_s:12.6f} s {length}{gap}{status}")
+    echo(f"{readings} readings, {lost} lost, {unread_bytes} bytes not understood", err=True)

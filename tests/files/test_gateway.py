@@ -86,7 +86,14 @@ def test_the_search_for_ways_round_finds_them():
         "np.fromfile(p)",
     ]
     assert [opens_files(ast.parse(way)) for way in ways] == [[1]] * len(ways)
-    assert opens_files(ast.parse("path.open('w' if force else 'x')\nport.open()\nfront.open(choice, prepared)\nread_bytes(p, faults)")) == []
+    assert (
+        opens_files(
+            ast.parse(
+                "path.open('w' if force else 'x')\nport.open()\nfront.open(choice, prepared)\nread_bytes(p, faults)"
+            )
+        )
+        == []
+    )
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.csv_rows import csv_rows
+from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.provenance import Provenance, write_table
 from dbbstation.files.source_text import decode, read_bytes, shortened
@@ -108,10 +107,8 @@ def write_poses(
         OutputError: the file exists and `force` is not given, or it cannot be written.
     """
     kept = {name: cells for name, cells in others.items() if name not in UNCERTAINTY_COLUMNS}
-    out = io.StringIO(newline="")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*POSE_COLUMNS, *UNCERTAINTY_COLUMNS, *kept])
+    rows: list[list[str]] = [[*POSE_COLUMNS, *UNCERTAINTY_COLUMNS, *kept]]
     for k, (pose, uncertainty) in enumerate(zip(poses, uncertainty_mm, strict=True)):
         numbers = [f"{value:.9f}" for value in pose] + [f"{value:.7f}" for value in uncertainty]
-        writer.writerow([*numbers, *(cells[k] for cells in kept.values())])
-    write_table(path, out.getvalue(), provenance, force=force)
+        rows.append([*numbers, *(cells[k] for cells in kept.values())])
+    write_table(path, csv_text(rows), provenance, force=force)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
-import io
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.csv_rows import csv_rows
+from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
 from dbbstation.files.source_text import decode, read_bytes, shortened
 
@@ -131,12 +129,8 @@ def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Pro
 
 def table_csv(names: Sequence[str], columns: Sequence[Sequence[object]]) -> str:
     """CSV text of columns of one length; numbers with nine significant digits, texts as they are."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(names)
-    for row in zip(*columns, strict=True):
-        writer.writerow([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row])
-    return out.getvalue()
+    rows = ([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row] for row in zip(*columns, strict=True))
+    return csv_text([names, *rows])
 
 
 def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: int) -> list[Problem]:

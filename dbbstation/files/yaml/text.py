@@ -7,6 +7,7 @@ tags, no merge keys, no key twice. Sequences become tuples, times stay text: the
 from __future__ import annotations
 
 import functools
+import re
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,7 @@ Location = tuple[str | int, ...]
 """Keys and indices from the top of a document down to a value."""
 
 _TAG = "tag:yaml.org,2002:"
+_HALF = re.compile("[\ud800-\udfff]")
 _PLAIN_TEXT = {"str", "timestamp", "value"}
 
 
@@ -250,6 +252,9 @@ class _Walk:
     def _scalar(self, node: ScalarNode) -> Any:  # noqa: ANN401 - the type stands in the file
         kind, text = (node.tag or "").removeprefix(_TAG), node.value
         if kind in _PLAIN_TEXT:
+            if not text.isascii() and _HALF.search(text):
+                self._fault(node, "half a surrogate pair is no character", "write the whole character")
+                return None
             return text
         if kind == "null":
             return None

@@ -110,11 +110,29 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
     echo(f"figures of {summary['edition']}, filter: {summary['filter']}, lengths in µm, {EXPANDED}")
     head = ["session"] if several else []
     rows: list[list[object]] = []
+    titles = [
+        "test",
+        "dir",
+        "n",
+        "G",
+        "U",
+        "G(LS)",
+        "Fmax",
+        "Fmin",
+        "U",
+        "X",
+        "Y",
+        "U",
+        "step",
+        "closure",
+        "drift",
+        "noise",
+    ]
     for run in summary["runs"]:
         name: list[object] = [run["session"]] if several else []
         name += [run["test"], run["direction"], run["repeat"]]
         if run["problem"]:
-            rows.append([*name, *["-"] * 12])
+            rows.append([*name, *["-"] * (len(head) + len(titles) - len(name))])
             continue
         u = {figure: COVERAGE_FACTOR * budget["u_um"] for figure, budget in run["uncertainty"].items()}
         steps = [abs(step["height_um"]) for step in run["reversal_steps"]]
@@ -137,24 +155,6 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
                 _noise(run),
             ]
         )
-    titles = [
-        "test",
-        "dir",
-        "n",
-        "G",
-        "U",
-        "G(LS)",
-        "Fmax",
-        "Fmin",
-        "U",
-        "X",
-        "Y",
-        "U",
-        "step",
-        "closure",
-        "drift",
-        "noise",
-    ]
     print_table([*head, *titles], rows)
     if not summary["pairs"]:
         return

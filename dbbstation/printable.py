@@ -24,12 +24,13 @@ def _shown(code: int) -> str:
 
 
 _ONE_LINE = {code: _shown(code) for code in (*_CONTROL, *_DIRECTION, *_LINES, *_HALVES)}
-_TEXT = {code: shown for code, shown in _ONE_LINE.items() if chr(code) not in "\n\t"}
+TEXT = {code: shown for code, shown in _ONE_LINE.items() if chr(code) not in "\n\t"}
+"""What stands for each character that a text of several lines must not hold, as `str.translate` takes it."""
 
 
 def printable(text: str) -> str:
     r"""Return a text of any number of lines with `\x1b` in place of an escape character, and so on; `\n` and `\t` stay."""
-    return text if text.isascii() and text.isprintable() else text.translate(_TEXT)
+    return text if text.isascii() and text.isprintable() else text.translate(TEXT)
 
 
 def on_one_line(text: str) -> str:

@@ -125,7 +125,7 @@ def load_tables(paths: Sequence[Path], asked: Asked) -> Tabulated:
         faults.append(Problem(str(paths[0]), 0, 0, what, "name the column of the simulation"))
     certain = [asked.measured, asked.simulated, *(asked.variables or ())]
     faults += [fault for file in files for name in dict.fromkeys(certain) for fault in file.faults_of(name)]
-    faults += [fault for file in files for fault in _faults_of_size(file, certain)]
+    faults += [fault for file in files for fault in _faults_of_size(file, certain if asked.variables else file.names)]
     faults += _faults_of_scale(files, asked)
     if faults:
         raise InputError(faults[:MOST_FAULTS])
@@ -141,10 +141,10 @@ LARGEST_RATIO = 1e6
 millimetres. A difference of which the smaller is the millionth part has no digits of it left."""
 
 
-def _faults_of_size(file: TableFile, named: Sequence[str]) -> list[Problem]:
-    """Columns whose numbers no quantity has, with the line of the greatest; all columns may be variables unless some are named."""
+def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
+    """Columns whose numbers no quantity has, with the line of the greatest."""
     faults = []
-    for name in file.names if len(named) == len(("measured", "simulated")) else dict.fromkeys(named):
+    for name in dict.fromkeys(names):
         size = np.abs(np.nan_to_num(file.values[name], nan=0.0, posinf=0.0, neginf=0.0))
         row = int(size.argmax())
         if size[row] > LARGEST_SIZE or 0.0 < size[row] < 1.0 / LARGEST_SIZE:

@@ -157,24 +157,19 @@ def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
 
 def _faults_of_scale(files: Sequence[TableFile], asked: Asked) -> list[Problem]:
     """What is wrong where measured and simulated values cannot be of one quantity."""
-    greatest = {
-        name: max(
-            (
-                float(np.max(np.abs(file.values[name]), initial=0.0, where=np.isfinite(file.values[name])))
-                for file in files
-                if name in file.values
-            ),
-            default=0.0,
-        )
-        for name in (asked.measured, asked.simulated)
-    }
-    less, more = sorted(greatest, key=lambda name: greatest[name])
+    greatest = {name: _greatest(files, name) for name in (asked.measured, asked.simulated)}
+    less, more = min(greatest, key=lambda name: greatest[name]), max(greatest, key=lambda name: greatest[name])
     if greatest[less] == 0.0 or greatest[more] <= LARGEST_RATIO * greatest[less]:
         return []
     what = (
         f"`{more}` goes up to {greatest[more]:g}, `{less}` to {greatest[less]:g}: these are no values of one quantity"
     )
     return [Problem(files[0].file, files[0].header, 0, what, "give both in one unit")]
+
+
+def _greatest(files: Sequence[TableFile], name: str) -> float:
+    columns = [file.values[name] for file in files if name in file.values]
+    return max((float(np.abs(column[np.isfinite(column)]).max(initial=0.0)) for column in columns), default=0.0)
 
 
 def load_sources(files: Sequence[Path], table: Table) -> tuple[list[TableSource], dict[str, str]]:

@@ -81,6 +81,16 @@ def lines_of(blocks: Iterable[bytes]) -> Iterator[bytes]:
     yield left
 
 
+LARGEST_TABLE = 200_000_000
+"""Largest table that is read whole [bytes], as text cell by cell: a million rows of twenty columns, or a drive's seven million
+samples. They take ten times as much memory; runs, which are longer, are read block by block."""
+
+LARGEST_SHEET = 20_000_000
+"""Largest CMM report that is read [bytes]: a hundred thousand features."""
+
+LARGEST_PROGRAM = 1_000_000
+"""Largest Python file of the user's own that is read [bytes]: ten thousand lines."""
+
 LONGEST_LINE = 1_000_000
 """Bytes of a line that are kept: a row of a thousand columns has twenty thousand."""
 

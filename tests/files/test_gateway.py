@@ -249,3 +249,27 @@ def test_a_long_name_is_not_echoed(tmp_path):
         outcome = call("check", path)
         assert outcome.code == 1
         assert len(outcome.out + outcome.err) < 3000
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "line"),
+    [
+        ("plan.yaml", 10_000_001, ["check"]),
+        ("drive.csv", 200_000_001, ["drive"]),
+        ("table.csv", 200_000_001, ["mismatch", "--measured", "a", "--simulated", "b"]),
+        ("sheet.dmo", 20_000_001, ["jig", "sheet", "--jig", "j.yaml", "--u-um", "1", "--out", "o.yaml"]),
+        ("own.py", 1_000_001, ["sources", "--source-file"]),
+        ("run.csv", 2_000_000_001, ["check"]),
+    ],
+)
+def test_a_file_beyond_its_budget_is_refused_unread(tmp_path, monkeypatch, name, size, line):
+    monkeypatch.chdir(tmp_path)
+    jig = Path(__file__).parents[2] / "fixtures" / "jigs" / "reference-plate.yaml"
+    (tmp_path / "j.yaml").write_bytes(jig.read_bytes())
+    with (tmp_path / name).open("wb") as file:
+        file.truncate(size)  # zeros, that take no room
+    began = time.process_time()
+    outcome = call(*line, name)
+    assert outcome.code == 1
+    assert f"{name}: the file has {size:,} bytes, at most {size - 1:,} are read" in outcome.err
+    assert time.process_time() - began < 10.0

@@ -12,7 +12,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.provenance import Provenance, write_table
-from dbbstation.files.source_text import decode, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,7 +49,7 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
         InputError: every missing column and every cell that is no finite number, with its line.
     """
     faults: list[Problem] = []
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_TABLE)
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)

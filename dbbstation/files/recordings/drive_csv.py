@@ -12,7 +12,7 @@ import numpy as np
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.number_language import is_number
-from dbbstation.files.source_text import decode, first_line, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_TABLE, decode, first_line, read_bytes, shortened
 from dbbstation.trace.drive_recording import DriveRecording
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def read_drive(path: Path) -> DriveFile:
         InputError: every missing column, and lines that cannot be used, with their number.
     """
     faults: list[Problem] = []
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_TABLE)
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)

@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
-from dbbstation.files.source_text import decode, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -74,7 +74,7 @@ def read_table(path: Path, needed: Iterable[str] = (), numbers: NumberLanguage |
         InputError: it cannot be read, has no rows, lacks a column (and which it may be instead), or has lines of another width.
     """
     faults: list[Problem] = []
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_TABLE)
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)

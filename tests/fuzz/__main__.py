@@ -22,17 +22,22 @@ STUCK_S = 600.0
 
 
 def cases_of(folder: Path) -> dict[int, dict]:
-    """What came of each case so far; of one whose process died, that."""
-    found: dict[int, dict] = {}
-    for book in sorted(folder.glob("worker-*/cases.jsonl")):
-        for line in book.read_text(encoding="utf-8").splitlines():
-            told = json.loads(line)
-            if "begun" in told:
-                died = {"case": told["begun"], "kind": "?", "line": "?", "fault": "the process died", "guided": False}
-                found.setdefault(told["begun"], died | {"cpu_s": 0.0, "peak_mb": 0, "code": None})
-            else:
-                found[told["case"]] = told
-    return found
+    """What came of each case so far; one that is under way is not among them."""
+    lines = [line for book in sorted(folder.glob("worker-*/cases.jsonl")) for line in lines_of(book)]
+    return {told["case"]: told for told in lines if "case" in told}
+
+
+def lines_of(book: Path) -> list[dict]:
+    """Lines of a worker's book but one that was cut off."""
+    return [json.loads(line) for line in book.read_text(encoding="utf-8").split("\n")[:-1]]
+
+
+def note_death(book: Path) -> None:
+    """Note that the process died of the case that it had begun."""
+    begun = [line["begun"] for line in lines_of(book) if "begun" in line]
+    died = {"case": begun[-1] if begun else 0, "kind": "?", "line": "?", "fault": "the process died", "guided": False}
+    with book.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(died | {"cpu_s": 0.0, "peak_mb": 0, "code": None}) + "\n")
 
 
 def work(folder: Path, seed: int, cases: int, workers: int) -> None:
@@ -48,21 +53,16 @@ def work(folder: Path, seed: int, cases: int, workers: int) -> None:
                     if time.time() - book.stat().st_mtime > STUCK_S:
                         process.kill()
                     continue
+                if process is not None and process.returncode != 0:
+                    note_death(book)
                 book.parent.mkdir(parents=True, exist_ok=True)
                 book.touch()
-                begun = [json.loads(line).get("begun", -1) for line in book.read_text(encoding="utf-8").splitlines()]
-                first = max([*begun, k - workers]) + workers
+                first = max([k - workers, *(line["case"] for line in lines_of(book) if "case" in line)]) + workers
                 if first >= cases:
                     over.add(k)
                     continue
-                command = [
-                    sys.executable,
-                    "-m",
-                    "tests.fuzz.worker",
-                    str(book.parent),
-                    *map(str, (seed, first, workers, cases)),
-                ]
-                running[k] = subprocess.Popen(command)
+                command = [sys.executable, "-m", "tests.fuzz.worker", str(book.parent)]
+                running[k] = subprocess.Popen([*command, *map(str, (seed, first, workers, cases))])
             time.sleep(0.2)
     finally:
         for process in running.values():

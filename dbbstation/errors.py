@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 
 @dataclass(frozen=True, order=True)
@@ -38,7 +38,36 @@ class Problem:
             place += f":{self.line}"
             if self.column:
                 place += f":{self.column}"
-        return f"{place}: {self.what}" + (f"; {self.remedy}" if self.remedy else "")
+        what = f"{self.what}; {self.remedy}" if self.remedy else self.what
+        if len(what) > LONGEST_SAID:
+            what = f"{what[: LONGEST_SAID // 2]} … {what[-LONGEST_SAID // 2 :]}"
+        return f"{place}: {what}".replace("\n", "\\n")
+
+
+MOST_FAULTS = 20
+"""Faults of one kind that are listed one by one; nobody reads the ten thousandth."""
+
+
+MOST_LISTED = 200
+"""Faults of all kinds that an error lists: ten kinds, or ten files."""
+
+LONGEST_SAID = 1000
+"""Characters of what a fault says: four times the longest list of known keys."""
+
+
+def few(problems: Sequence[Problem], count: int | None = None) -> list[Problem]:
+    """Return the problems, or the first of very many with a count of the others.
+
+    Args:
+        problems: in the order of the file.
+        count: how many there are, where only the first `MOST_FAULTS` + 1 of them were made.
+    """
+    more = (count or len(problems)) - MOST_FAULTS
+    if more <= 0:
+        return list(problems)
+    last = problems[MOST_FAULTS]
+    what = f"and {more} more of these from here on"
+    return [*problems[:MOST_FAULTS], Problem(last.file, last.line, last.column, what)]
 
 
 class StationError(Exception):
@@ -63,11 +92,14 @@ class StationError(Exception):
 
 
 class InputError(StationError):
-    """A file's content is wrong; every fault found is listed, not only the first."""
+    """A file's content is wrong; every fault found is kept, and the first of very many are listed."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(sorted(problems))
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+        lines = [str(problem) for problem in self.problems[:MOST_LISTED]]
+        if len(self.problems) > MOST_LISTED:
+            lines.append(f"and {len(self.problems) - MOST_LISTED} more faults")
+        super().__init__("\n".join(lines))
 
 
 class OutputError(StationError):

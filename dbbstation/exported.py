@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,6 +10,7 @@ import numpy as np
 
 from dbbstation.errors import InputError, OutputError, Problem, TraceError
 from dbbstation.files.atomic import streamed, write_text
+from dbbstation.files.csv_rows import csv_text
 from dbbstation.files.provenance import beside_table
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.run_lines import split_head
@@ -201,13 +200,10 @@ def write_csv(
     """
     rows = 0
     with streamed(path, force=force) as file:
-        file.write((",".join(what.names) + "\n").encode())
+        file.write(csv_text([what.names]).encode())
         for block in blocks(what, progress, say):
-            text = io.StringIO()
-            writer = csv.writer(text, lineterminator="\n")
             cells = [_cells(block[name], whole=name in _WHOLE) for name in what.names]
-            writer.writerows(zip(*cells, strict=True))
-            file.write(text.getvalue().encode())
+            file.write(csv_text(zip(*cells, strict=True)).encode())
             rows += len(cells[0])
         told = {**provenance().data(), "columns": _meanings(what)}
         write_text(beside_table(path), json.dumps(told, indent=1, ensure_ascii=False) + "\n", force=force)

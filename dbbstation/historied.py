@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from contextlib import closing
@@ -12,6 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
 from dbbstation.files.kept import Kept, Stamp, stamp_of
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
@@ -151,7 +151,7 @@ class _Reading:
                 file = _File(name, path, stamp_of(path))
                 one = _understood(self._kept.of(name, file.stamp), taken, name)
                 if one is None:
-                    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+                    digest = digest_of(path)
                     text = self._kept.of_content(digest)
                     one = _understood(text, taken, name)
                     if text is None or one is None:

@@ -12,6 +12,7 @@ from dbbstation.circled import load_circles
 from dbbstation.circles.budget import Quantity, budgets
 from dbbstation.circles.path import Filter
 from dbbstation.files.formats.model import read_model
+from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book
 from dbbstation.files.own_sources import every_source
 from dbbstation.history.order import moment_words
@@ -156,6 +157,4 @@ def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures
             parameters.append(
                 _as_printed(ModelParameter(fitted.source.name, parameter.name, float(value), sure, parameter.unit))
             )
-    return ModelFigures(
-        path.name, hashlib.sha256(path.read_bytes()).hexdigest(), dict(identified.sessions), tuple(parameters)
-    )
+    return ModelFigures(path.name, digest_of(path), dict(identified.sessions), tuple(parameters))

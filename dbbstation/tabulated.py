@@ -125,9 +125,51 @@ def load_tables(paths: Sequence[Path], asked: Asked) -> Tabulated:
         faults.append(Problem(str(paths[0]), 0, 0, what, "name the column of the simulation"))
     certain = [asked.measured, asked.simulated, *(asked.variables or ())]
     faults += [fault for file in files for name in dict.fromkeys(certain) for fault in file.faults_of(name)]
+    faults += [fault for file in files for fault in _faults_of_size(file, certain if asked.variables else file.names)]
+    faults += _faults_of_scale(files, asked)
     if faults:
         raise InputError(faults[:MOST_FAULTS])
     return _Reader(files, asked, units[asked.measured] or units[asked.simulated]).read()
+
+
+LARGEST_SIZE = 1e60
+"""Greatest number that is compared, and its inverse the least beside 0: no quantity in any unit is beyond, and their fourth
+powers still have room in a double."""
+
+LARGEST_RATIO = 1e6
+"""How many times greater measured values may be than simulated ones, or the other way round: nanometres against
+millimetres. A difference of which the smaller is the millionth part has no digits of it left."""
+
+
+def _faults_of_size(file: TableFile, names: Sequence[str]) -> list[Problem]:
+    """Columns whose numbers no quantity has, with the line of the greatest."""
+    faults = []
+    for name in dict.fromkeys(names):
+        size = np.abs(np.nan_to_num(file.values[name], nan=0.0, posinf=0.0, neginf=0.0))
+        row = int(size.argmax())
+        if size[row] > LARGEST_SIZE or 0.0 < size[row] < 1.0 / LARGEST_SIZE:
+            what = (
+                f"{name} goes up to {size[row]:g}, sizes from {1.0 / LARGEST_SIZE:g} to {LARGEST_SIZE:g} are compared"
+            )
+            faults.append(Problem(file.file, int(file.lines[row]), 0, what, "check the column and its unit"))
+    return faults
+
+
+def _faults_of_scale(files: Sequence[TableFile], asked: Asked) -> list[Problem]:
+    """What is wrong where measured and simulated values cannot be of one quantity."""
+    greatest = {name: _greatest(files, name) for name in (asked.measured, asked.simulated)}
+    less, more = min(greatest, key=lambda name: greatest[name]), max(greatest, key=lambda name: greatest[name])
+    if greatest[less] == 0.0 or greatest[more] <= LARGEST_RATIO * greatest[less]:
+        return []
+    what = (
+        f"`{more}` goes up to {greatest[more]:g}, `{less}` to {greatest[less]:g}: these are no values of one quantity"
+    )
+    return [Problem(files[0].file, files[0].header, 0, what, "give both in one unit")]
+
+
+def _greatest(files: Sequence[TableFile], name: str) -> float:
+    columns = [file.values[name] for file in files if name in file.values]
+    return max((float(np.abs(column[np.isfinite(column)]).max(initial=0.0)) for column in columns), default=0.0)
 
 
 def load_sources(files: Sequence[Path], table: Table) -> tuple[list[TableSource], dict[str, str]]:

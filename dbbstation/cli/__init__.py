@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ import click
 
 from dbbstation import __version__
 from dbbstation.cli.lazy import LazyGroup
+from dbbstation.cli.output import echo
 from dbbstation.errors import StationError
 from dbbstation.files.inputs import input_book
 
@@ -100,11 +102,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except click.exceptions.Exit as left:
         code = left.exit_code
     except click.ClickException as problem:
-        problem.show()
+        told = io.StringIO()
+        problem.show(told)
+        echo(told.getvalue(), err=True, nl=False)
         sys.exit(problem.exit_code)
     except (click.Abort, KeyboardInterrupt):
         # A terminal shows ^C where the cursor stands.
-        click.echo(("\n" if sys.stderr.isatty() else "") + "interrupted; what was written before stays", err=True)
+        echo(("\n" if sys.stderr.isatty() else "") + "interrupted; what was written before stays", err=True)
         sys.exit(FAILED)
     except BrokenPipeError:
         # Whoever read the output has seen enough, as `| head` does; the interpreter must not flush into it again.
@@ -113,13 +117,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (StationError, OSError) as problem:
         if debug:
             raise
-        click.echo(str(problem), err=True)
+        echo(str(problem), err=True)
         sys.exit(FAILED)
     except Exception as problem:
         if debug:
             raise
-        click.echo(f"{type(problem).__name__}: {problem}", err=True)
-        click.echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
+        echo(f"{type(problem).__name__}: {problem}", err=True)
+        echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)
 

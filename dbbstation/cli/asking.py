@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.output import echo
+from dbbstation.printable import on_one_line
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -36,7 +39,9 @@ class Asker:
             self._missing.append(f"{option} ({question})")
             return ""
         kind = click.Choice(list(choices)) if choices else None
-        return str(click.prompt(question, type=kind, default=default, show_default=bool(default), err=True))
+        return str(
+            click.prompt(on_one_line(question), type=kind, default=default, show_default=bool(default), err=True)
+        )
 
     def number(self, question: str, option: str, *, needed: bool = False) -> float | None:
         """Return a number; None where nobody can give one, or where Enter says that nobody knows it.
@@ -55,7 +60,7 @@ class Asker:
                 if answer or not needed:
                     return float(answer.replace(",", ".")) if answer else None
             except ValueError:
-                click.echo(f"`{answer}` is not a number", err=True)
+                echo(f"`{answer}` is not a number", err=True)
 
     def check(self) -> None:
         """Refuse to go on without what could not be asked.

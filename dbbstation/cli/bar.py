@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.instrument_options import chosen_protocol, instrument_options
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.output import echo
 from dbbstation.plan.bar import STEEL_BAR_UM_M_K, USUAL_READINGS, USUAL_TEMP_UNCERTAINTY_K
 from dbbstation.service.patience import driver_patience
 
@@ -123,11 +124,11 @@ def bar(
         told |= {"reads_long_um": long_um, "standard_uncertainty_um": u_um, "drift_um": 1e3 * found.drift_mm}
         print_json({"bar": str(out), **told})
         return
-    click.echo(f"{found.count} readings, mean {found.mean_mm:.5f} mm, scatter {1e3 * found.scatter_mm:.2f} µm")
-    click.echo(f"the bar reads {long_um:+.2f} µm long on its calibrator, standard uncertainty {u_um:.2f} µm")
+    echo(f"{found.count} readings, mean {found.mean_mm:.5f} mm, scatter {1e3 * found.scatter_mm:.2f} µm")
+    echo(f"the bar reads {long_um:+.2f} µm long on its calibrator, standard uncertainty {u_um:.2f} µm")
     if abs(found.drift_mm) > DRIFT * file.uncertainty_mm:
-        click.echo(f"note: it drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: give it time to cool down", err=True)
-    click.echo(f"{out}: `dbbstation measure --bar {out} …` takes it")
+        echo(f"note: it drifted by {1e3 * found.drift_mm:+.2f} µm meanwhile: give it time to cool down", err=True)
+    echo(f"{out}: `dbbstation measure --bar {out} …` takes it")
 
 
 def _read(protocol: Protocol, port: str, baud: int | None, count: int, resolution_um: float | None) -> Steady:

@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.figure_option import figure_option, format_of
+from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -194,35 +195,35 @@ def _print(summary: Mapping[str, Any]) -> None:
     from dbbstation.cli.motors import print_currents
 
     print_runs(summary)
-    click.echo()
+    echo()
     _print_parameters(summary)
-    click.echo()
-    click.echo(f"{summary['parameters_identified']} parameters identified")
+    echo()
+    echo(f"{summary['parameters_identified']} parameters identified")
     held = "" if summary["parameters_prescribed"] else ", held at nominal"
     for text in summary["directions_lost"]:
-        click.echo(f"not visible to these tests{held}: {text}")
+        echo(f"not visible to these tests{held}: {text}")
     if summary["parameters_prescribed"]:
-        click.echo(f"held at nominal instead: {', '.join(summary['parameters_prescribed'])}")
+        echo(f"held at nominal instead: {', '.join(summary['parameters_prescribed'])}")
     for text in summary["directions_regularised"]:
-        click.echo(f"not visible to these tests, known by the machine file's joint tolerance only: {text}")
+        echo(f"not visible to these tests, known by the machine file's joint tolerance only: {text}")
     for text in summary["gaps"]:
-        click.echo(f"  {text}")
+        echo(f"  {text}")
     for weak in summary["observability"]["weak_directions"][:1]:
-        click.echo(f"least visible, to {weak['uncertainty']:.1f} {weak['unit']}: {weak['text']}")
+        echo(f"least visible, to {weak['uncertainty']:.1f} {weak['unit']}: {weak['text']}")
     if not summary["plan_check"]["enough"]:
         _print_plan_check(summary["plan_check"])
     _print_misfit(summary)
     for check in summary["scatter"]:
         _print_scatter(check, missing_physics=summary["misfit"]["missing_physics"])
-    click.echo(f"nominal machine leaves   {summary['nominal_rms_um']:8.2f} µm rms")
-    click.echo(f"model leaves             {summary['residual_rms_um']:8.2f} µm rms")
-    click.echo(f"... within each mounting {summary['residual_within_mounting_rms_um']:8.2f} µm rms")
-    click.echo(f"noise of one reading     {summary['noise_um']:8.2f} µm")
+    echo(f"nominal machine leaves   {summary['nominal_rms_um']:8.2f} µm rms")
+    echo(f"model leaves             {summary['residual_rms_um']:8.2f} µm rms")
+    echo(f"... within each mounting {summary['residual_within_mounting_rms_um']:8.2f} µm rms")
+    echo(f"noise of one reading     {summary['noise_um']:8.2f} µm")
     print_currents(summary)
 
 
 def _print_plan_check(check: Mapping[str, Any]) -> None:
-    click.echo(
+    echo(
         f"{check['tests']} tests are too few to reveal a wrong tilt, height or position in the plan: {check['left']} degrees "
         f"of freedom are left to check it, one circle has {check['of_one_test']}; a small residual proves nothing here, so "
         "check the tilts by hand or measure further circles"
@@ -235,13 +236,13 @@ def _print_misfit(summary: Mapping[str, Any]) -> None:
     if not misfit["missing_physics"]:
         return
     chance = misfit["probability"]
-    click.echo(
+    echo(
         f"the residual exceeds noise and mountings by {misfit['rms_um']:.2f} µm rms (probability by chance "
         f"{'below 1e-99' if chance < LEAST_PRINTED else f'{chance:.1g}'}): physics is missing from the model; "
         "`dbbstation diagnose` looks for it"
     )
     if summary["residual_within_mounting_rms_um"] > NOT_THIS_MACHINE * summary["noise_um"]:
-        click.echo(
+        echo(
             f"... more than {NOT_THIS_MACHINE:.0f} times the noise: check also that the machine file is this machine's, its "
             "joints in the order of the struts and the rotation convention that of the control"
         )
@@ -280,13 +281,13 @@ BESIDE_MISSING_PHYSICS = (
 def _print_scatter(check: Mapping[str, Any], *, missing_physics: bool) -> None:
     stated = f"balls stated to stand within {check['stated_um']:.2f} µm per axis"
     if check["fits"] is None:
-        click.echo(f"{stated}: these tests cannot tell")
+        echo(f"{stated}: these tests cannot tell")
         return
     low, high = check["interval_um"]
     said = SAID_OF_SCATTER[check["finding"]]
     if missing_physics and check["finding"] == "more":
         said = BESIDE_MISSING_PHYSICS
-    click.echo(f"{stated} scatter by {check['found_um']:.2f} ({low:.2f} to {high:.2f}) µm, {said}")
+    echo(f"{stated} scatter by {check['found_um']:.2f} ({low:.2f} to {high:.2f}) µm, {said}")
 
 
 def _following_thermometers(

@@ -10,6 +10,7 @@ import click
 
 from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
 from dbbstation.cli.circle_options import approach_of, circle_options
+from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def check(
         _print(results, runs)
         for one in seen:
             for note in one.notes:
-                click.echo(f"{one.plan}: {note}")
+                echo(f"{one.plan}: {note}")
     if problems:
         raise InputError(set(problems))
 
@@ -143,10 +144,10 @@ def _print(results: Sequence[Checked], runs: Sequence[DryRun]) -> None:
         for warning in result.warnings:
             say(f"note: {warning}")
         if not result.problems:
-            click.echo(f"ok  {result.path}  {result.summary}")
+            echo(f"ok  {result.path}  {result.summary}")
     for run in runs:
         if not run.problems:
-            click.echo(f"ok  {run.plan} on {run.machine}  dry run: {run.programs} programs within travel and feeds")
+            echo(f"ok  {run.plan} on {run.machine}  dry run: {run.programs} programs within travel and feeds")
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.filter_option import filter_of, filter_option
+from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -106,14 +107,32 @@ def circles(
 def _print(summary: Mapping[str, Any], *, several: bool) -> None:
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
 
-    click.echo(f"figures of {summary['edition']}, filter: {summary['filter']}, lengths in µm, {EXPANDED}")
+    echo(f"figures of {summary['edition']}, filter: {summary['filter']}, lengths in µm, {EXPANDED}")
     head = ["session"] if several else []
     rows: list[list[object]] = []
+    titles = [
+        "test",
+        "dir",
+        "n",
+        "G",
+        "U",
+        "G(LS)",
+        "Fmax",
+        "Fmin",
+        "U",
+        "X",
+        "Y",
+        "U",
+        "step",
+        "closure",
+        "drift",
+        "noise",
+    ]
     for run in summary["runs"]:
         name: list[object] = [run["session"]] if several else []
         name += [run["test"], run["direction"], run["repeat"]]
         if run["problem"]:
-            rows.append([*name, *["-"] * 12])
+            rows.append([*name, *["-"] * (len(head) + len(titles) - len(name))])
             continue
         u = {figure: COVERAGE_FACTOR * budget["u_um"] for figure, budget in run["uncertainty"].items()}
         steps = [abs(step["height_um"]) for step in run["reversal_steps"]]
@@ -136,28 +155,10 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
                 _noise(run),
             ]
         )
-    titles = [
-        "test",
-        "dir",
-        "n",
-        "G",
-        "U",
-        "G(LS)",
-        "Fmax",
-        "Fmin",
-        "U",
-        "X",
-        "Y",
-        "U",
-        "step",
-        "closure",
-        "drift",
-        "noise",
-    ]
     print_table([*head, *titles], rows)
     if not summary["pairs"]:
         return
-    click.echo("\nboth directions")
+    echo("\nboth directions")
     rows = []
     for pair in summary["pairs"]:
         u = {figure: COVERAGE_FACTOR * budget["u_um"] for figure, budget in pair["uncertainty"].items()}
@@ -195,9 +196,9 @@ def _print_budgets(summary: Mapping[str, Any]) -> None:
             rows += [[*name, cause, f"{size:.3f}"] for cause, size in budget["terms_um"].items()]
             rows.append([*name, "u, all together", f"{budget['u_um']:.3f}"])
             missing |= dict.fromkeys(budget["missing"])
-    click.echo("\nstandard uncertainties u [µm]")
+    echo("\nstandard uncertainties u [µm]")
     print_table(["test", "dir", "n", "figure", "term", "u"], rows)
-    click.echo(f"not stated, and not in U: {', '.join(missing)}")
+    echo(f"not stated, and not in U: {', '.join(missing)}")
 
 
 def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
@@ -218,7 +219,7 @@ def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
         for run in runs
         for finding in run["findings"]
     ]
-    click.echo("\nfindings")
+    echo("\nfindings")
     print_table(["test", "dir", "n", "finding", "value", "limit", "unit", "verdict"], rows)
     wrong = [
         f"{run['test']} {run['direction']} {run['repeat']}: {finding['name']}: {finding['text']}"
@@ -226,7 +227,7 @@ def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
         for finding in run["findings"]
         if finding["verdict"] == Verdict.WRONG
     ]
-    click.echo("\n".join(wrong) if wrong else "nothing is wrong")
+    echo("\n".join(wrong) if wrong else "nothing is wrong")
 
 
 def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
@@ -251,8 +252,8 @@ def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
                     one["text"] or "",
                 ]
             )
-    click.echo(f"\nquick look at the signatures of serial axes, {EXPANDED}")
-    click.echo("On a hexapod these are symptoms, no causes: it has no axes X and Y. Causes: `dbbstation diagnose`.")
+    echo(f"\nquick look at the signatures of serial axes, {EXPANDED}")
+    echo("On a hexapod these are symptoms, no causes: it has no axes X and Y. Causes: `dbbstation diagnose`.")
     print_table(["test", "dir", "n", "signature", "at", "value", "U", "unit", "seen", ""], rows)
 
 

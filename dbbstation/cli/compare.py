@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.figure_option import figure_option, format_of
+from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -102,15 +103,15 @@ def _both(a: Path, b: Path, tests: tuple[str, ...], exclude: tuple[str, ...]) ->
 
 
 def _print(summary: Mapping[str, Any]) -> None:
-    click.echo(summary["text"])
+    echo(summary["text"])
     for note in summary["notes"]:
-        click.echo(f"- {note}")
+        echo(f"- {note}")
     for title, key in (("only in A", "only_in_a"), ("only in B", "only_in_b"), ("averaged", "averaged")):
         if summary[key]:
-            click.echo(f"- {title}: {', '.join(summary[key])}")
+            echo(f"- {title}: {', '.join(summary[key])}")
     for one in summary["not_comparable"]:
-        click.echo(f"- not comparable: test {one['test']}: {one['text']}")
-    click.echo()
+        echo(f"- not comparable: test {one['test']}: {one['text']}")
+    echo()
     _print_runs(summary)
     _print_causes(summary)
 
@@ -118,7 +119,7 @@ def _print(summary: Mapping[str, Any]) -> None:
 def _print_runs(summary: Mapping[str, Any]) -> None:
     from dbbstation.cli.output import print_table
 
-    click.echo(
+    echo(
         "B less A [µm], largest first; found: rms of what was found; sigmas: how far that is out; u: standard uncertainty by noise, "
         "balls and bars"
     )
@@ -156,7 +157,7 @@ def _print_causes(summary: Mapping[str, Any]) -> None:
 
     there = [cause for cause in summary["causes"] if cause.get("where")]
     if there:
-        click.echo(
+        echo(
             "\nwhat the sessions differ by; share: of all that was found; opposite: part that changes its sign with the "
             "direction; calibration: part that a new calibration would take up"
         )
@@ -175,15 +176,15 @@ def _print_causes(summary: Mapping[str, Any]) -> None:
         print_table(titles, rows)
         for cause in there:
             if cause["text"]:
-                click.echo(f"{cause['name']}: {cause['text']}")
-        click.echo(f"\nin short: {summary['organised_text']}")
+                echo(f"{cause['name']}: {cause['text']}")
+        echo(f"\nin short: {summary['organised_text']}")
         held = summary["held_out_rms_um"]
-        click.echo(
+        echo(
             f"held-out tests: {held['before']:.2f} -> {held['after']:.2f} µm rms, once their balls and bars have settled"
         )
-    click.echo(f"\n{summary['left']['text']}")
+    echo(f"\n{summary['left']['text']}")
     for verdict in ("ambiguous", "ruled-out", "not-testable"):
         names = [c["name"] for c in summary["causes"] if c["named"] and c["verdict"] == verdict and not c.get("where")]
         if names:
-            click.echo(f"{verdict}: {', '.join(dict.fromkeys(names))}")
-    click.echo(f"`dbbstation diagnose {summary['b']}` looks for causes in one session by itself.")
+            echo(f"{verdict}: {', '.join(dict.fromkeys(names))}")
+    echo(f"`dbbstation diagnose {summary['b']}` looks for causes in one session by itself.")

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.output import echo
+
 if TYPE_CHECKING:
     from dbbstation.demo import DemoResult
 
@@ -38,7 +40,7 @@ def demo(*, out: Path | None, seed: int, as_json: bool) -> None:
 
     def progress(text: str) -> None:
         if on_terminal:
-            click.echo(f"\r  {text:<40}", nl=False, err=True)
+            echo(f"\r  {text:<40}", nl=False, err=True)
 
     def tell(text: str) -> None:
         say(("\r" + " " * 44 + "\r" if on_terminal else "") + f"$ {text}")
@@ -63,18 +65,18 @@ def _print(result: DemoResult) -> None:
     from dbbstation.cli.figures import G_LOW_PASSED
     from dbbstation.cli.output import print_table
 
-    click.echo()
-    click.echo("      centre deviation  mean radial error  circular deviation G   [µm, measured]")
+    echo()
+    echo("      centre deviation  mean radial error  circular deviation G   [µm, measured]")
     rows: list[list[object]] = [
         [run["test"], *(run[when][figure] for figure in FIGURES for when in ("before", "after"))] for run in result.runs
     ]
     means: list[object] = ["mean", *_means(result.runs)]
     print_table(["test", "before", "after", " before", " after", "  before", "  after"], [*rows, means])
-    click.echo("before: nominal programs; after: programs compensated with the joint model")
-    click.echo(G_LOW_PASSED)
-    click.echo()
+    echo("before: nominal programs; after: programs compensated with the joint model")
+    echo(G_LOW_PASSED)
+    echo()
     left = result.calibration
-    click.echo(
+    echo(
         f"A kinematic calibration alone leaves {left['residual_within_mounting_rms_um']:.1f} µm rms within mountings; "
         f"the bar's noise is 0.3 µm."
     )
@@ -82,18 +84,16 @@ def _print(result: DemoResult) -> None:
         if source["verdict"] == "identified":
             hidden = 100 * source["concealed"]
             for name, number in source["parameters"].items():
-                click.echo(
+                echo(
                     f"The diagnosis names {source['name']}: {name} {number['value']:.3g} ± {number['uncertainty']:.1g} "
                     f"{number['unit']}; the kinematic parameters had concealed {hidden:.0f} % of it."
                 )
     held_out = result.diagnosis["held_out_rms_um"]
-    click.echo(
-        f"Held-out tests are predicted to {held_out['before']:.1f} µm rms before, {held_out['after']:.1f} after."
-    )
-    click.echo()
-    click.echo(f"everything is in {result.folder}:")
+    echo(f"Held-out tests are predicted to {held_out['before']:.1f} µm rms before, {held_out['after']:.1f} after.")
+    echo()
+    echo(f"everything is in {result.folder}:")
     for name, what in _CONTENTS:
-        click.echo(f"  {name:<16} {what}")
+        echo(f"  {name:<16} {what}")
 
 
 _CONTENTS = (

@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.figure_option import figure_option, format_of
+from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -118,34 +119,32 @@ UNPREDICTABLE_UM = 1000.0
 
 def _print(summary: Mapping[str, Any]) -> None:
     if summary["mismatch"]:
-        click.echo(
+        echo(
             f"The recordings differ from the kinematic model by {summary['misfit_rms_um']:.2f} µm rms beyond noise "
             f"(probability by chance {_chance(summary['probability'])})."
         )
     else:
-        click.echo(f"The recordings agree with the kinematic model (probability {summary['probability']:.2g}).")
-    click.echo()
+        echo(f"The recordings agree with the kinematic model (probability {summary['probability']:.2g}).")
+    echo()
     for outlier in summary["outliers"]:
-        click.echo(f"outlier, kept out of the fits: {outlier['text']}")
+        echo(f"outlier, kept out of the fits: {outlier['text']}")
     _print_sources(summary["sources"])
     if summary["locations"]:
-        click.echo("\nlargest misfit of the kinematic calibration:")
+        echo("\nlargest misfit of the kinematic calibration:")
         for location in summary["locations"][:5]:
-            click.echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
+            echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
     _print_gain(summary)
     if summary["workspace"]:
         _print_workspace(summary["workspace"])
     if summary["parameter_shift"]:
-        click.echo("bias of the kinematic calibration, largest parameters:")
+        echo("bias of the kinematic calibration, largest parameters:")
         for shift in summary["parameter_shift"][:4]:
-            click.echo(f"  {shift['parameter']}: {shift['shift_um']:+.0f} µm")
-    click.echo(summary["unexplained"]["text"])
+            echo(f"  {shift['parameter']}: {shift['shift_um']:+.0f} µm")
+    echo(summary["unexplained"]["text"])
     if summary["unexplained"]["curve"]:
         _print_curve(summary["unexplained"]["curve"])
     if not summary["second_start_agrees"]:
-        click.echo(
-            "A second search came to another set of causes: several explain these recordings, take it with care."
-        )
+        echo("A second search came to another set of causes: several explain these recordings, take it with care.")
     _print_next_tests(summary)
 
 
@@ -162,11 +161,11 @@ def _print_workspace(elsewhere: Mapping[str, Any]) -> None:
         ),
     ):
         known = "not known" if elsewhere[u] is None else f"{elsewhere[u]:.1f} µm rms"
-        click.echo(
+        echo(
             f"over the workspace, kinematic calibration less joint model, {which}: {elsewhere[error]:.1f} µm rms{more}; u of the joint "
             f"model {known}"
         )
-    click.echo(f"  the common shift is {shift} µm; a program whose zero is set on the part does not feel it")
+    echo(f"  the common shift is {shift} µm; a program whose zero is set on the part does not feel it")
 
 
 STILL_OPEN = frozenset({"ambiguous", "not-testable"})
@@ -177,12 +176,12 @@ def _print_next_tests(summary: Mapping[str, Any]) -> None:
     if summary["next_test"]:
         tests = [summary["next_test"], *summary["further_tests"]]
         which = "this test" if len(tests) == 1 else f"these {len(tests)} tests"
-        click.echo(
+        echo(
             f"measure next: {'; and '.join(test['text'] for test in tests)}; {which} would bring u of {tests[0]['source']} "
             f"to {tests[-1]['sigma_after']:.2g} instead of {tests[0]['sigma_before']:.2g} {tests[0]['unit']}"
         )
     elif any(source["verdict"] in STILL_OPEN and source["gain"] is not None for source in summary["sources"]):
-        click.echo("measure next: no proposal; up to three further tests would neither change a verdict nor halve u")
+        echo("measure next: no proposal; up to three further tests would neither change a verdict nor halve u")
 
 
 def _kept(found: Diagnosis) -> Kept | None:
@@ -206,33 +205,33 @@ def _print_curve(curve: Mapping[str, Any]) -> None:
     from dbbstation.cli.output import print_table
 
     points = curve["points"]
-    click.echo(
+    echo(
         f"it moves the readings by {curve['readings_um']:.2f} µm rms; {curve['unconcealed_um']:.2f} µm rms of that no "
         "kinematic parameter can imitate; cause unknown:"
     )
     if curve["period_mm"] is not None:
-        click.echo(
+        echo(
             f"  a wave of {curve['period_mm']:.2f} mm, from {points[0]['at']:.0f} to {points[-1]['at']:.0f} mm, up to "
             f"{max(abs(point['value_um']) for point in points):.2f} µm"
         )
     elif curve["form"]:
-        click.echo(f"  {curve['form']}")
+        echo(f"  {curve['form']}")
     step = -(-len(points) // MOST_POINTS)
     rows = [[f"{p['at']:.6g}", f"{p['value_um']:+.2f}", "±", f"{p['uncertainty_um']:.2f}"] for p in points[::step]]
     print_table([f"{curve['variable']} / {curve['unit']}", "error / µm", "", "u / µm"], rows)
     if curve["convention"]:
-        click.echo(f"  ({curve['convention']})")
+        echo(f"  ({curve['convention']})")
 
 
 def _print_gain(summary: Mapping[str, Any]) -> None:
     """Print residual and prediction of held-out tests before and after."""
     residual, held_out = summary["residual_rms_um"], summary["held_out_rms_um"]
-    click.echo(f"\nresidual within mountings {residual['before']:.2f} -> {residual['after']:.2f} µm rms")
+    echo(f"\nresidual within mountings {residual['before']:.2f} -> {residual['after']:.2f} µm rms")
     normalised = summary["held_out_normalised"]
     if max(held_out.values()) > UNPREDICTABLE_UM:
-        click.echo("held-out tests cannot be predicted: the other tests are too few to identify the machine")
+        echo("held-out tests cannot be predicted: the other tests are too few to identify the machine")
     else:
-        click.echo(
+        echo(
             f"error of predicting held-out tests {held_out['before']:.2f} -> {held_out['after']:.2f} µm rms; over its "
             f"stated uncertainty {normalised['before']:.2f} -> {normalised['after']:.2f}"
         )
@@ -260,13 +259,13 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
     print_table(titles, rows)
     named = [source for source in sources if source["verdict"] in {"identified", "ambiguous"}]
     if named:
-        click.echo("\nvalue ± u (one standard uncertainty)")
+        echo("\nvalue ± u (one standard uncertainty)")
         for source in named:
-            click.echo()
+            echo()
             for name, number in source["parameters"].items():
                 value, uncertainty = f"{number['value']:.4g}", f"{number['uncertainty']:.2g}"
-                click.echo(f"{source['name']}: {name} {value} ± {uncertainty} {number['unit']}")
-            click.echo(f"  {source['text']}")
+                echo(f"{source['name']}: {name} {value} ± {uncertainty} {number['unit']}")
+            echo(f"  {source['text']}")
 
 
 def _chance(probability: float) -> str:

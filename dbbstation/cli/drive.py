@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -99,53 +100,53 @@ STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-bac
 
 def _print(summary: Mapping[str, Any]) -> None:
     if summary["mismatch"]:
-        click.echo(
+        echo(
             f"Mass and viscous friction leave {summary['misfit_rms_n']:.3g} N rms beyond noise "
             f"(probability by chance {max(summary['probability'], 1e-99):.1g})."
         )
     else:
-        click.echo(f"Mass and viscous friction are enough (probability {summary['probability']:.2g}).")
-    click.echo()
+        echo(f"Mass and viscous friction are enough (probability {summary['probability']:.2g}).")
+    echo()
     _print_sources(summary["sources"])
-    click.echo("\nidentified:")
+    echo("\nidentified:")
     for name, number in summary["parameters"].items():
         known = _number(number) if number["identifiable"] else "not identifiable from this recording"
-        click.echo(f"  {name}: {known}")
+        echo(f"  {name}: {known}")
     for side, values in summary["friction"].items():
-        click.echo(f"  friction {side}: " + ", ".join(f"{name} {_number(n)}" for name, n in values.items()))
+        echo(f"  friction {side}: " + ", ".join(f"{name} {_number(n)}" for name, n in values.items()))
     held_back = summary["held_back"]
     first, last = held_back["t_s"]
-    click.echo(f"\nrelative force error on {first:.2f} to {last:.2f} s, fitted without it:")
+    echo(f"\nrelative force error on {first:.2f} to {last:.2f} s, fitted without it:")
     before = float("inf")
     for step in held_back["steps"]:
         name = f"+ {step['added']}" if step["added"] else "mass and viscous friction"
         error = step["relative_force_error"]
         worse = "  worse than without it: it does not carry over to this stretch" if error > before else ""
-        click.echo(f"  {name:<26} {100 * error:6.2f} %{worse}")
+        echo(f"  {name:<26} {100 * error:6.2f} %{worse}")
         before = error
     if left_out := held_back["not_in_model"]:
-        click.echo(f"  not in the model, since nothing decides on it: {', '.join(left_out)}")
+        echo(f"  not in the model, since nothing decides on it: {', '.join(left_out)}")
     if summary["locations"]:
-        click.echo("\nwhere the misfit of mass and viscous friction is largest:")
+        echo("\nwhere the misfit of mass and viscous friction is largest:")
         _print_locations(summary["locations"])
-    click.echo("\n" + summary["unexplained"]["text"])
+    echo("\n" + summary["unexplained"]["text"])
     if summary["unexplained"]["significant"]:
         for effect in summary["unexplained"]["effects"][:3]:
-            click.echo(
+            echo(
                 f"  {effect['text']}: {effect['rms_n']:.2g} N rms, from {effect['from']:.4g} to {effect['to']:.4g} {effect['unit']} "
                 f"(probability {_probability(effect['probability'])})"
             )
-        click.echo(f"It is {summary['unexplained']['rms_n']:.2g} N rms; largest:")
+        echo(f"It is {summary['unexplained']['rms_n']:.2g} N rms; largest:")
         _print_locations(summary["unexplained"]["locations"][:3])
     for sentence in summary["cannot_tell"]:
-        click.echo(sentence)
+        echo(sentence)
     signals = summary["signals"]
-    click.echo(f"band up to {signals['cutoff_hz']:.3g} Hz, {signals['samples_compared']} samples compared")
+    echo(f"band up to {signals['cutoff_hz']:.3g} Hz, {signals['samples_compared']} samples compared")
 
 
 def _print_locations(locations: Sequence[Mapping[str, Any]]) -> None:
     for location in locations[:5]:
-        click.echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
+        echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
 
 
 def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
@@ -167,21 +168,21 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
     )
     for source in sources:
         if source["verdict"] in {"identified", "ambiguous"}:
-            click.echo()
+            echo()
             _print_parts(source)
-            click.echo(f"  {source['text']}")
+            echo(f"  {source['text']}")
 
 
 def _print_parts(source: Mapping[str, Any]) -> None:
     """Numbers of a cause, or of each wave and pulse where it has several."""
     if source["parameters"] and len(source["parts"]) <= 1:
         for name, number in source["parameters"].items():
-            click.echo(f"{source['name']}: {name} {_number(number)}")
+            echo(f"{source['name']}: {name} {_number(number)}")
         return
     for part in source["parts"]:
         when = f"from {part['t_s'][0]:.3f} to {part['t_s'][1]:.3f} s, " if part["t_s"] else ""
         numbers = ", ".join(f"{name} {_number(number)}" for name, number in part["parameters"].items())
-        click.echo(f"{source['name']}: {when}{numbers}")
+        echo(f"{source['name']}: {when}{numbers}")
 
 
 def _probability(probability: float) -> str:

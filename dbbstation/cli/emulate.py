@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,6 +11,7 @@ import click
 
 from dbbstation.cli.instrument_options import chosen_protocol, protocol_options
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.output import echo, json_text
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -116,9 +116,9 @@ def emulate(
         wire = stack.enter_context(VirtualInstrument(protocol, cell.length_mm_at, clock=clock, baud=baud))
         control = stack.enter_context(ControlServer(commands))
         if as_json:
-            click.echo(json.dumps({"port": wire.port, "control": control.url}))
+            echo(json_text({"port": wire.port, "control": control.url}))
         else:
-            click.echo(f"port: {wire.port}\ncontrol: {control.url}")
+            echo(f"port: {wire.port}\ncontrol: {control.url}")
         # Also where a shell started it in the background, which makes programs deaf to Ctrl-C.
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.default_int_handler)
@@ -126,7 +126,7 @@ def emulate(
             while not commands.quit.wait(_LOOK_S):
                 pass
         except KeyboardInterrupt:
-            click.echo("switched off", err=True)
+            echo("switched off", err=True)
 
 
 def _truth(machine: Machine, file: Path | None, source_files: tuple[Path, ...], seed: int) -> MachineModel:
@@ -154,6 +154,7 @@ def _truth(machine: Machine, file: Path | None, source_files: tuple[Path, ...], 
 def _programs(folder: Path) -> Callable[[str], CommandedPath]:
     """Return what turns the name of a program in a folder into what it commands."""
     from dbbstation.errors import InputError, Problem
+    from dbbstation.files.gateway import content_of
     from dbbstation.station.programs import read_toolpath
     from dbbstation.virtual.path import path_of
 
@@ -161,6 +162,6 @@ def _programs(folder: Path) -> Callable[[str], CommandedPath]:
         path = folder / name
         if path.parent != folder or not path.is_file():
             raise InputError([Problem(str(path), 0, 0, "there is no such program", f"name a file in {folder}")])
-        return path_of(read_toolpath(path, path.read_bytes()))
+        return path_of(read_toolpath(path, content_of(path)))
 
     return read

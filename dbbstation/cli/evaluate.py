@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
+from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -67,20 +68,20 @@ def evaluate(
         print_json(summary)
         return
     print_runs(summary, low_passed=True)
-    click.echo()
+    echo()
     _print_predicted(summary)
-    click.echo()
-    click.echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
-    click.echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
-    click.echo(f"uncompensated at Z {summary['plane_z_mm']:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
+    echo()
+    echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
+    echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
+    echo(f"uncompensated at Z {summary['plane_z_mm']:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
     if summary["plane_without"]:
-        click.echo(f"(without {', '.join(summary['plane_without'])}: no pose alone says what they do)")
+        echo(f"(without {', '.join(summary['plane_without'])}: no pose alone says what they do)")
     for label, figure in (("flatness           ", "flatness"), ("parallelism along X", "parallelism")):
         u_um = summary[f"{figure}_u_um"]
         known = "u not known" if u_um is None else f"u {u_um:.1f} µm"
-        click.echo(f"{label}    {summary[f'{figure}_um']:8.1f} µm   {known}")
+        echo(f"{label}    {summary[f'{figure}_um']:8.1f} µm   {known}")
     if summary["plane_uncertainty_not_known_because"]:
-        click.echo(f"  ({summary['plane_uncertainty_not_known_because']})")
+        echo(f"  ({summary['plane_uncertainty_not_known_because']})")
     print_tolerances(summary["tolerances"], settings.tolerances_from)
 
 
@@ -93,5 +94,5 @@ def _print_predicted(summary: Mapping[str, Any]) -> None:
         off = predicted - measured
         share = f"{100 * off / measured:.0f}" if measured else "-"
         rows.append([run["test"], run["direction"], run["repeat"], measured, predicted, off, share])
-    click.echo("circular deviation G up to 30 undulations per revolution [µm]")
+    echo("circular deviation G up to 30 undulations per revolution [µm]")
     print_table(["test", "dir", "n", "measured", "predicted", "difference", "%"], rows)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from dbbstation.files.recordings.entries import RunEntry
@@ -76,4 +77,4 @@ def export(
     if as_json:
         print_json({"table": str(out), "runs": len(runs), "rows": rows, "columns": list(what.names)})
     else:
-        click.echo(f"{rows} rows of {len(runs)} runs written to {out}")
+        echo(f"{rows} rows of {len(runs)} runs written to {out}")

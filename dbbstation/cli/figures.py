@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from dbbstation.cli.output import print_table
+from dbbstation.cli.output import echo, print_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,7 +25,7 @@ def print_runs(summary: Mapping[str, Any], *, low_passed: bool = False) -> None:
         summary: what `evaluation_summary` returns.
         low_passed: print the circular deviation of low-passed readings, which its runs must then have.
     """
-    click.echo("             centre deviation     mean radial error  circular deviation G  [µm]")
+    echo("             centre deviation     mean radial error  circular deviation G  [µm]")
     titles = ["test", "dir", "n", "before", "after", " before", " after", "  before", "  after"]
     rows = []
     for run in summary["runs"]:
@@ -44,7 +42,7 @@ def print_runs(summary: Mapping[str, Any], *, low_passed: bool = False) -> None:
             ]
         )
     print_table(titles, rows)
-    click.echo(G_LOW_PASSED if low_passed else G_WITH_NOISE)
+    echo(G_LOW_PASSED if low_passed else G_WITH_NOISE)
 
 
 WHEN = ("before", "after")

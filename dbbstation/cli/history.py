@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -121,20 +122,18 @@ def _print(machine: Mapping[str, Any], summary: Mapping[str, Any]) -> None:
 
     sessions = machine["sessions"]
     first, last = (sessions[k]["started"][:10] for k in (0, -1))
-    click.echo(
-        f"machine {machine['machine']}: {len(sessions)} session{'s' if len(sessions) > 1 else ''}, {first} to {last}"
-    )
+    echo(f"machine {machine['machine']}: {len(sessions)} session{'s' if len(sessions) > 1 else ''}, {first} to {last}")
     if machine["watched_quantities"]:
         rate = summary["false_alarms_per_session"]
-        click.echo(
+        echo(
             f"{machine['watched_quantities']} quantities are watched; all together they give {rate:g} false alarms per session, "
             f"{machine['false_alarms_expected']:.2g} over this history"
         )
     k = summary["coverage_factor"]
-    click.echo(headline(machine))
+    echo(headline(machine))
     for line in changes_in_words(machine, k):
-        click.echo(f"  {line}")
-    click.echo(f"\n{EXPANDED}; level: since the last change")
+        echo(f"  {line}")
+    echo(f"\n{EXPANDED}; level: since the last change")
     titles = ["quantity", "unit", "n", "last", "U", "limit", "", "level", "U", "verdict", "since", "by", "U"]
     print_table(titles, [_row(one, k) for one in machine["quantities"]])
 

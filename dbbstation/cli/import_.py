@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.mapping_options import mapping_options
+from dbbstation.cli.output import echo
 from dbbstation.cli.session_options import noted_options, session_details
+from dbbstation.printable import printable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -106,10 +108,10 @@ def import_(
     if as_json:
         _print_json(found, out, written=not dry_run)
     elif dry_run:
-        click.echo("nothing was written (--dry-run)")
+        echo("nothing was written (--dry-run)")
     else:
         kept = "" if remembered is None else f", the mapping to {remembered}"
-        click.echo(f"{len(found.runs)} runs written to {out}{kept}")
+        echo(f"{len(found.runs)} runs written to {out}{kept}")
 
 
 @dataclass(frozen=True)
@@ -178,7 +180,7 @@ def _confirm(asker: Asker, question: str, *, yes: bool) -> None:
     if not yes and not asker.terminal:
         raise click.UsageError("nothing was written: give --yes to write what is shown, or --dry-run to look only")
     if not yes:
-        click.confirm(question, abort=True, err=True)
+        click.confirm(printable(question), abort=True, err=True)
 
 
 def _print_json(found: _Import, out: Path, *, written: bool) -> None:
@@ -257,7 +259,7 @@ def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) ->
         found = run_name(answer, list(plan.tests))
         if found is not None:
             return found
-        click.echo(f"the plan's tests: {', '.join(plan.tests)}; directions: ccw, cw", err=True)
+        echo(f"the plan's tests: {', '.join(plan.tests)}; directions: ccw, cw", err=True)
 
 
 def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequence[str]) -> list[str]:
@@ -287,7 +289,7 @@ def _show(found: _Import) -> None:
     print_table(
         ["column", "means", "unit"], [[name, one.means, one.unit or ""] for name, one in found.mapping.columns.items()]
     )
-    click.echo()
+    echo()
     rows = []
     for one in found.runs:
         length, t_s = one.run.columns[LENGTH], one.run.columns[TIME]
@@ -300,6 +302,6 @@ def _show(found: _Import) -> None:
     bar = "not known" if details.bar is None else f"{details.bar.calibrated_length_mm:.4f} mm"
     temp = "not known" if details.ambient_temp_c is None else f"{details.ambient_temp_c:g} degC"
     people = f"operator {details.operator or 'not known'}, job {details.job or 'not known'}"
-    click.echo(f"\n{people}, temperature {temp}, bar {bar}")
+    echo(f"\n{people}, temperature {temp}, bar {bar}")
     for text in found.statements:
-        click.echo(f"- {text}")
+        echo(f"- {text}")

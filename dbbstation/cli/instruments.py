@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.output import echo
+
 if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
 
@@ -33,7 +35,7 @@ def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None
         if as_json:
             print_json({**_summary(protocol), "profiles": names, "protocol": protocol.model_dump(mode="json")})
         else:
-            click.echo("\n".join(_details(protocol, names)))
+            echo("\n".join(_details(protocol, names)))
         return
     if profile is not None:
         raise click.UsageError("--profile is one of an instrument: name the instrument too")
@@ -45,11 +47,11 @@ def instruments(name: str | None, *, profile: str | None, as_json: bool) -> None
     for variants in known:
         one, called = variants[0], ", ".join(each.profile for each in variants if each.profile)
         open_ones = sum(not each.verified for each in one.references)
-        click.echo(f"{one.name}" + (f" ({called})" if called else ""))
-        click.echo(f"    {one.title}")
-        click.echo(f"    {one.line.text}, about {one.fastest_hz():.0f} readings per second")
+        echo(f"{one.name}" + (f" ({called})" if called else ""))
+        echo(f"    {one.title}")
+        echo(f"    {one.line.text}, about {one.fastest_hz():.0f} readings per second")
         if open_ones:
-            click.echo(f"    {open_ones} of {len(one.references)} statements about it are not verified")
+            echo(f"    {open_ones} of {len(one.references)} statements about it are not verified")
 
 
 def _summary(protocol: Protocol) -> dict[str, object]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -123,10 +124,10 @@ def sheet(
     ]
     print_table(["ball", "x [mm]", "y [mm]", "z [mm]", "u [µm]", "dx [µm]", "dy [µm]", "dz [µm]"], rows)
     if lost:
-        click.echo(f"not in the sheet, and not in the new file: {', '.join(lost)}")
+        echo(f"not in the sheet, and not in the new file: {', '.join(lost)}")
     if cmm_temp_c is None:
-        click.echo("the file does not say how warm the plate was on the CMM: give --cmm-temp-c")
-    click.echo(f"{len(balls)} balls written to {out}")
+        echo("the file does not say how warm the plate was on the CMM: give --cmm-temp-c")
+    echo(f"{len(balls)} balls written to {out}")
 
 
 @jig.command()
@@ -197,7 +198,7 @@ def holders(
         return
     _print_holders(found)
     if out is not None:
-        click.echo(f"holders written to {out}")
+        echo(f"holders written to {out}")
 
 
 def _write_holders(found: Mapping[str, Repeatability], before: Path, out: Path, sheet: Path, *, force: bool) -> None:
@@ -237,9 +238,7 @@ def _print_holders(found: Mapping[str, Repeatability]) -> None:
     print_table(titles, lines)
     for name, one in found.items():
         if one.axes_differ < UNLIKE_AXES:
-            click.echo(
-                f"{name}: the axes scatter differently (p = {one.axes_differ:.2g}); a jig file has one value for all"
-            )
+            echo(f"{name}: the axes scatter differently (p = {one.axes_differ:.2g}); a jig file has one value for all")
 
 
 _WHAT = ("ball", "bore", "holder", "x", "y", "z", "u", "ux", "uy", "uz")

@@ -21,6 +21,7 @@ import click
 
 from dbbstation.cli.provenance import PROGRAM, command_of
 from dbbstation.cli.shop import folder_of_sessions
+from dbbstation.printable import printable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -39,7 +40,15 @@ LARGEST_BYTES, KEPT = 1_000_000, 3
 _VERSIONS = ("numpy", "scipy", "numba", "matplotlib", "pydantic", "pyserial", "textual")
 """Packages whose version decides what a fault means."""
 
-_FORM = logging.Formatter("%(asctime)s %(process)d %(levelname)s %(message)s", "%Y-%m-%dT%H:%M:%S%z")
+
+class _Printable(logging.Formatter):
+    """A log is looked at in a terminal too."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return printable(super().format(record))
+
+
+_FORM = _Printable("%(asctime)s %(process)d %(levelname)s %(message)s", "%Y-%m-%dT%H:%M:%S%z")
 
 
 def attended(command: click.Command) -> click.Command:
@@ -115,7 +124,7 @@ def _log_beginning(context: click.Context) -> None:
 
 def _to_screen() -> logging.Handler:
     screen = logging.StreamHandler(sys.stderr)
-    screen.setFormatter(logging.Formatter("log: %(message)s"))
+    screen.setFormatter(_Printable("log: %(message)s"))
     screen.addFilter(lambda record: not record.exc_info and not getattr(record, "said", False))
     return screen
 

@@ -16,6 +16,7 @@ from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.order_options import in_order, order_options, programs_option
+from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 from dbbstation.service.patience import RECONNECT_S, driver_patience
@@ -134,7 +135,7 @@ def measure(
     ):
         workplace = assemble(job, source, source.unreadable, asked=protocol.ask.asked)
         if workplace.writer.runs and job.details.noted:
-            click.echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)
+            echo("note: the session exists; it keeps operator, bar and the like as first noted", err=True)
         interrupted = _run(workplace, hands, as_json=as_json)
     if interrupted:
         raise click.Abort
@@ -165,7 +166,7 @@ def _run(workplace: Workplace, hands: VirtualHands | None, *, as_json: bool) -> 
             print_json(summary.of(workplace))
         else:
             done, planned = workplace.schedule.accepted, len(workplace.schedule.tasks)
-            click.echo(f"{workplace.writer.session.folder}: {done} of {planned} runs accepted")
+            echo(f"{workplace.writer.session.folder}: {done} of {planned} runs accepted")
     return interrupted.is_set()
 
 

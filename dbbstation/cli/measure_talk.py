@@ -7,9 +7,7 @@ import sys
 import threading
 from typing import TYPE_CHECKING, Any, TextIO
 
-import click
-
-from dbbstation.cli.output import log_said
+from dbbstation.cli.output import echo, log_said
 from dbbstation.quality.summary import findings_summary
 from dbbstation.service.shop_temperature import shop_degc
 from dbbstation.station import events
@@ -92,19 +90,19 @@ class Talk:
         if self._terminal:
             done = round(share * _BAR_WIDTH)
             text = f"\r  [{'#' * done}{'-' * (_BAR_WIDTH - done)}] {event.swept_deg:4.0f} of {event.of_deg:.0f}°"
-            click.echo(text, err=True, nl=False)
+            echo(text, err=True, nl=False)
             self._drawn = True
             return
         quarter = int(share * _QUARTERS)
         if quarter > self._quarter:
-            click.echo(f"  {event.run.label}: {event.swept_deg:.0f} of {event.of_deg:.0f}°", err=True)
+            echo(f"  {event.run.label}: {event.swept_deg:.0f} of {event.of_deg:.0f}°", err=True)
         self._quarter = quarter
 
     def _say(self, line: str) -> None:
         if self._drawn:
-            click.echo(err=True)
+            echo(err=True)
             self._drawn = False
-        click.echo(line, err=True)
+        echo(line, err=True)
 
 
 class Log:
@@ -211,7 +209,7 @@ class Keyboard:
             if command is not None:
                 self._send(command)
             elif word:
-                click.echo(f"  `{word}` is no answer", err=True)
+                echo(f"  `{word}` is no answer", err=True)
         # The input has ended: nobody will answer any more.
         self._send(Quit())
 

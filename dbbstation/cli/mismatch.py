@@ -9,6 +9,7 @@ import click
 
 from dbbstation.cli.figure_option import figure_option, format_of
 from dbbstation.cli.number_options import number_language, number_options
+from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -148,7 +149,7 @@ def _print(summary: Mapping[str, Any]) -> None:
             for v in summary["variables"]
         ],
     )
-    click.echo()
+    echo()
     _print_whether(summary)
     there = [f for f in summary["findings"] if f["verdict"] == "identified"]
     equivalent = {name for f in there for name in f["equivalent"]}
@@ -156,25 +157,25 @@ def _print(summary: Mapping[str, Any]) -> None:
     likely = [f for f in likely if f["name"] not in equivalent]
     there += likely
     if there:
-        click.echo()
+        echo()
         _print_findings(there, unit)
     _print_parameters(summary)
     held_out = summary["held_out_rms"]
     if held_out:
-        click.echo(
+        echo(
             f"\nheld-out error: {held_out['before']:.3g} -> {held_out['after']:.3g} {unit} rms, over "
             f"{len(held_out['folds'])} parts, everything chosen anew without each of them"
         )
-    click.echo()
+    echo()
     _print_left(summary)
     for verdict in ("not-testable", "ruled-out"):
         names = [f["name"] for f in summary["findings"] if f["verdict"] == verdict]
         if names:
-            click.echo(f"{verdict}: {_few(names)}")
+            echo(f"{verdict}: {_few(names)}")
     if summary["next"]:
-        click.echo("\nmeasure next:")
+        echo("\nmeasure next:")
         for step in summary["next"]:
-            click.echo(f"  {step['text']}")
+            echo(f"  {step['text']}")
 
 
 def _print_whether(summary: Mapping[str, Any]) -> None:
@@ -182,11 +183,11 @@ def _print_whether(summary: Mapping[str, Any]) -> None:
     unit, noise, rms = summary["unit"], summary["noise"], summary["residual_rms"]
     offset = summary["offset"]
     if offset["significant"]:
-        click.echo(f"Measured less simulated is {_number(offset)} on average; this is fitted and is not counted below.")
+        echo(f"Measured less simulated is {_number(offset)} on average; this is fitted and is not counted below.")
     if not summary["mismatch"]:
-        click.echo(f"No mismatch: what differs, {rms['before']:.3g} {unit} rms, is noise.".replace("  ", " "))
+        echo(f"No mismatch: what differs, {rms['before']:.3g} {unit} rms, is noise.".replace("  ", " "))
     else:
-        click.echo(
+        echo(
             f"There is a mismatch: {rms['before']:.3g} {unit} rms, of which {rms['after']:.3g} {unit} is not explained."
         )
     fitted = (
@@ -195,15 +196,13 @@ def _print_whether(summary: Mapping[str, Any]) -> None:
         else "; fitted jointly, since nothing says in which order the rows were measured"
     )
     alike = f", {noise['rows_as_one']:.3g} rows count as one" if noise["rows_as_one"] > 1.0 else ""
-    click.echo(f"noise of one row: {noise['sigma']:.3g} {unit}{alike}{fitted}")
+    echo(f"noise of one row: {noise['sigma']:.3g} {unit}{alike}{fitted}")
     if summary["led_by"]:
         led = ", ".join(
             f"{s['variable']} {100 * s['share']:.0f} % ({100 * s['lost']:.0f} %)"
             for s in summary["led_by"][:MOST_LEADING]
         )
-        click.echo(
-            f"led by (of all that is explained, what follows it alone; in brackets what is lost without it): {led}"
-        )
+        echo(f"led by (of all that is explained, what follows it alone; in brackets what is lost without it): {led}")
 
 
 MOST_LEADING = 4
@@ -228,11 +227,11 @@ def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
     for f in there:
         if f["verdict"] == "ambiguous" and len(there) > MOST_TOLD:
             continue
-        click.echo(f"\n{f['name']}")
+        echo(f"\n{f['name']}")
         values = ", ".join(f"{name} {_number(value)}" for name, value in f["values"].items())
         if values and len(f["values"]) <= MOST_VALUES:
-            click.echo(f"  {values}")
-        click.echo(f"  {f['text']}")
+            echo(f"  {values}")
+        echo(f"  {f['text']}")
 
 
 LIKELY = 0.5
@@ -249,25 +248,23 @@ def _print_parameters(summary: Mapping[str, Any]) -> None:
     parameters = summary["parameters"][1:]
     if not parameters:
         return
-    click.echo("\nparameters of the simulation, fitted anew:")
+    echo("\nparameters of the simulation, fitted anew:")
     for p in parameters:
         before, after = _number(p["before"]), _number(p["after"])
-        click.echo(f"  {p['name']}: {before} alone, {after} beside what was found; R² {p['confounded']:.2f} with it")
+        echo(f"  {p['name']}: {before} alone, {after} beside what was found; R² {p['confounded']:.2f} with it")
 
 
 def _print_left(summary: Mapping[str, Any]) -> None:
     left = summary["left"]
     if left["is_noise"]:
-        click.echo("Nothing is left beyond noise.")
+        echo("Nothing is left beyond noise.")
     else:
         worst = min(left["looks"], key=lambda look: look["probability"])
         where = f", {worst['where']}" if worst["where"] else ""
-        click.echo(f"Something is left beyond noise: {worst['name']}{where}, {worst['rms']:.2g} {summary['unit']}.")
+        echo(f"Something is left beyond noise: {worst['name']}{where}, {worst['rms']:.2g} {summary['unit']}.")
     if not summary["second_start_agrees"]:
         odds = summary["second_start_log_odds"]
-        click.echo(
-            f"A search that begins with nothing ends at another set of effects, of log odds {odds:+.0f} to this one."
-        )
+        echo(f"A search that begins with nothing ends at another set of effects, of log odds {odds:+.0f} to this one.")
 
 
 def _few(names: Sequence[str]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation.cli.instrument_options import chosen_protocol, instrument_options, spy_option, spying
+from dbbstation.cli.output import echo, json_text
 from dbbstation.cli.provenance import provenance
 from dbbstation.service.patience import RECONNECT_S
 
@@ -58,7 +58,7 @@ def monitor(
         book = stack.enter_context(spying(spy or log, protocol, port, force=force))
         driver = stack.enter_context(Instrument(protocol, port, baud=baud, log=book, reconnect_s=RECONNECT_S))
         if protocol.line.parity != "none" and not driver.sees_damage:
-            click.echo(NO_PARITY, err=True)
+            echo(NO_PARITY, err=True)
         first_s: float | None = None
         try:
             for reading in driver.readings(count):
@@ -75,12 +75,12 @@ def _show(reading: Reading, t_s: float, *, as_json: bool) -> None:
         row: dict[str, object] = {"t_s": round(t_s, 6), "length_mm": reading.length_mm, "status": reading.status}
         row |= {"lost": reading.lost, "counter": reading.counter, "said": reading.said}
         row |= {"t_uncertainty_s": reading.t_uncertainty_s}
-        click.echo(json.dumps(row))
+        echo(json_text(row))
         return
     length = f"{reading.length_mm:14.5f} mm" if reading.length_mm is not None else f"{'--':>14}   "
     lost = f"  ({reading.lost} lost before)" if reading.lost else ""
     said = f"  {reading.status}: {reading.said}" if reading.status != "ok" else ""
-    click.echo(f"{t_s:10.3f} s {length}{lost}{said}")
+    echo(f"{t_s:10.3f} s {length}{lost}{said}")
 
 
 def _conclude(tally: Tally, *, as_json: bool) -> None:
@@ -92,9 +92,9 @@ def _conclude(tally: Tally, *, as_json: bool) -> None:
             "garbage_bytes": tally.garbage_bytes,
         }
         totals |= {"rejected": tally.rejected, "reconnected": tally.reconnected}
-        click.echo(json.dumps({"totals": totals, "provenance": provenance().data()}))
+        echo(json_text({"totals": totals, "provenance": provenance().data()}))
         return
     text = f"{tally.readings} readings, {tally.lost} lost, {tally.doubtful} doubtful, {tally.garbage_bytes} bytes not understood"
     if tally.rejected:
         text += f" ({', '.join(f'{count} by {reason}' for reason, count in sorted(tally.rejected.items()))})"
-    click.echo(text + (f", for example {tally.garbage[:24].hex(' ')}" if tally.garbage else ""), err=True)
+    echo(text + (f", for example {tally.garbage[:24].hex(' ')}" if tally.garbage else ""), err=True)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from dbbstation.cli.output import print_table
+from dbbstation.cli.output import echo, print_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,8 +18,8 @@ def print_currents(summary: Mapping[str, Any]) -> None:
     currents = summary.get("motor_currents")
     if currents is None:
         return
-    click.echo()
-    click.echo(
+    echo()
+    echo(
         f"motor currents, with the platform's weight of {currents['weight_taken_as_known_n']:.0f} N taken as known; "
         "±: u, one standard uncertainty"
     )
@@ -41,21 +39,21 @@ def print_currents(summary: Mapping[str, Any]) -> None:
     print_table([*titles, "residual mA", "noise mA"], rows)
     if any(motor["torque_per_current"] is not None for motor in currents["motors"]):
         torques = ", ".join(_with_uncertainty(motor["torque_per_current"], 4)[0] for motor in currents["motors"])
-        click.echo(f"torque at the screws per current, 1 to 6: {torques} Nm/A")
+        echo(f"torque at the screws per current, 1 to 6: {torques} Nm/A")
     elif any(motor["force_per_current"] is not None for motor in currents["motors"]):
-        click.echo("torques are not given: the machine file has no screw_lead_mm; forces do not need it")
+        echo("torques are not given: the machine file has no screw_lead_mm; forces do not need it")
     if currents["centre_of_gravity"]:
-        click.echo()
+        echo()
         channels = {"circles": "circles alone", "currents": "currents alone", "both": "both"}
         titles = [column for title in channels.values() for column in (title, "±")]
         shifts = [
             [name.removesuffix("_mm"), *(text for channel in channels for text in _with_uncertainty(by[channel], 3))]
             for name, by in currents["centre_of_gravity"].items()
         ]
-        click.echo("centre of gravity, actual minus machine file, platform axes [mm]; ±: u, one standard uncertainty")
+        echo("centre of gravity, actual minus machine file, platform axes [mm]; ±: u, one standard uncertainty")
         print_table(["", *titles], shifts)
     for note in currents["notes"]:
-        click.echo(f"note: {note}")
+        echo(f"note: {note}")
 
 
 def _with_uncertainty(number: Mapping[str, Any] | None, digits: int) -> tuple[str, str]:

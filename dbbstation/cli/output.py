@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.printable import on_one_line, printable
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -17,7 +19,21 @@ COVERAGE_FACTOR = 2.0
 EXPANDED = f"U (k = {COVERAGE_FACTOR:g})"
 """Its name in headings."""
 
+_LONGEST_CELL = 300
+"""Characters of a cell that are printed: a path has some more than a hundred."""
+
 _LOG = logging.getLogger(__name__)
+
+
+def echo(text: object = "", *, err: bool = False, nl: bool = True) -> None:
+    """Print text: the one way out to a terminal, which no name, reason or cell of a file can give orders to.
+
+    Args:
+        text: control characters in it are shown.
+        err: on standard error.
+        nl: end it with a line end.
+    """
+    click.echo(printable(str(text)), err=err, nl=nl)
 
 
 def print_json(data: dict[str, Any]) -> None:
@@ -29,7 +45,12 @@ def print_json(data: dict[str, Any]) -> None:
 
 def print_plain_json(data: dict[str, Any]) -> None:
     """Print one JSON object as it is: a document of its own, such as a schema."""
-    click.echo(json.dumps(data, indent=1, allow_nan=False))
+    echo(json_text(data, indent=1))
+
+
+def json_text(data: dict[str, Any], indent: int | None = None) -> str:
+    """Return data as JSON that no terminal takes for an order: delete is the one control that `json` leaves as it is."""
+    return json.dumps(data, indent=indent, allow_nan=False).replace("\x7f", "\\u007f")
 
 
 def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -39,13 +60,13 @@ def print_table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> None
     widths = [max(len(title), *(len(row[k]) for row in texts), 0) for k, title in enumerate(titles)]
     for row in [list(titles), *texts]:
         cells = [c.rjust(w) if n else c.ljust(w) for c, w, n in zip(row, widths, numeric, strict=True)]
-        click.echo("  ".join(cells).rstrip())
+        echo("  ".join(cells).rstrip())
 
 
 def say(text: str) -> None:
     """Tell the person at the terminal, and the log, something that is not the result."""
     log_said(text)
-    click.echo(text, err=True)
+    echo(text, err=True)
 
 
 def log_said(text: str) -> None:
@@ -54,7 +75,10 @@ def log_said(text: str) -> None:
 
 
 def _text(cell: object) -> str:
-    return f"{cell:.1f}" if isinstance(cell, float) else str(cell)
+    if isinstance(cell, float):
+        return f"{cell:.1f}"
+    text = on_one_line(str(cell))
+    return text if len(text) <= _LONGEST_CELL else f"{text[:_LONGEST_CELL]}…"
 
 
 def _is_number(text: str) -> bool:

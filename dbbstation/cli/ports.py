@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from dbbstation.cli.output import echo
+
 
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
@@ -23,6 +25,6 @@ def ports(*, as_json: bool) -> None:
         print_json({"ports": [dict(zip(keys, port, strict=True)) for port in found]})
         return
     if not found:
-        click.echo("No serial port is connected: plug in the adapter of the instrument.", err=True)
+        echo("No serial port is connected: plug in the adapter of the instrument.", err=True)
     for port, description, hardware in found:
-        click.echo(f"{port:16} {description}" + (f"  ({hardware})" if hardware not in {"", "n/a"} else ""))
+        echo(f"{port:16} {description}" + (f"  ({hardware})" if hardware not in {"", "n/a"} else ""))

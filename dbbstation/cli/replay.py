@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.number_types import Finite
+from dbbstation.cli.output import echo
 
 
 @click.command()
@@ -44,30 +45,31 @@ def replay(file: Path, *, instrument: str | None, profile: str | None, zero_mm: 
     protocol = load_instrument(name, profile or (profile_of_log if instrument in {None, of_log} else None))
     if zero_mm is not None:
         protocol = with_zero(protocol, zero_mm)
-    rows = list(replayed(protocol, read_byte_log(file), where=str(file)))
-    readings = [row for row in rows if row.reading is not None]
-    garbage = [row for row in rows if row.reading is None]
-    lost = sum(row.reading.lost for row in rows if row.reading is not None)
-    doubtful = sum(row.reading.status == DOUBTFUL for row in readings if row.reading is not None)
+    rows = replayed(protocol, read_byte_log(file), where=str(file))
     if as_json:
+        every = list(rows)
+        lost = sum(row.reading.lost for row in every if row.reading is not None)
+        doubtful = sum(row.reading.status == DOUBTFUL for row in every if row.reading is not None)
+        garbage = [row for row in every if row.reading is None]
         said = [
             {"t_s": row.t_s, "length_mm": row.reading.length_mm, "status": row.reading.status, "lost": row.reading.lost}
-            for row in rows
+            for row in every
             if row.reading is not None
         ]
         unread = [{"t_s": row.t_s, "bytes": row.raw.hex(" "), "why": row.why} for row in garbage]
         print_json({"readings": said, "lost": lost, "doubtful": doubtful, "not_understood": unread})
         return
+    readings = lost = doubtful = unread_bytes = 0
     for row in rows:
         if row.reading is None:
-            click.echo(f"{row.t_s:12.6f} s  not understood: {row.raw.hex(' ')}" + (f"  ({row.why})" if row.why else ""))
+            unread_bytes += len(row.raw)
+            echo(f"{row.t_s:12.6f} s  not understood: {row.raw.hex(' ')}" + (f"  ({row.why})" if row.why else ""))
             continue
         length = f"{row.reading.length_mm:14.5f} mm" if row.reading.length_mm is not None else f"{'--':>14}   "
+        readings += 1
+        lost += row.reading.lost
         gap = f"  ({row.reading.lost} lost before)" if row.reading.lost else ""
         status = f"  {row.reading.status}: {row.reading.said}" if row.reading.status != "ok" else ""
-        click.echo(f"{row.t_s:12.6f} s {length}{gap}{status}")
-    click.echo(
-        f"{len(readings)} readings, {lost} lost, {doubtful} doubtful, "
-        f"{sum(len(row.raw) for row in garbage)} bytes not understood",
-        err=True,
-    )
+        echo(f"{row.t_s:12.6f} s {length}{gap}{status}")
+        doubtful += row.reading.status == DOUBTFUL
+    echo(f"{readings} readings, {lost} lost, {doubtful} doubtful, {unread_bytes} bytes not understood", err=True)

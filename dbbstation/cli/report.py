@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
+from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -138,6 +139,6 @@ def _modelled(
 
 
 def _print(verdict: dict[str, Any]) -> None:
-    click.echo(verdict["headline"])
+    echo(verdict["headline"])
     for text in (*verdict["reasons"], *verdict["to_do"]):
-        click.echo(f"- {text}")
+        echo(f"- {text}")

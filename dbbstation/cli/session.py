@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dbbstation.cli.output import echo
+
 if TYPE_CHECKING:
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
@@ -75,7 +77,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
         for run in read.runs
     ]
     print_table(["run", "started", "mounting", "state", "samples", "why"], rows)
-    click.echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
+    echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
 
 
 @session.command()
@@ -133,9 +135,9 @@ def take_in(folder: Path, *, as_json: bool) -> None:
         print_json({"session": str(folder), "taken_in": taken})
         return
     for name in taken:
-        click.echo(f"{name}: complete, accept or reject it")
+        echo(f"{name}: complete, accept or reject it")
     if not taken:
-        click.echo("every sealed run is listed already")
+        echo("every sealed run is listed already")
 
 
 @session.command()
@@ -174,7 +176,7 @@ def amend(folder: Path, *, reason: str, plan: Path | None, machine: Path | None,
         return
     for one in found:
         kept = f", as it was: {one.former}" if one.former else ""
-        click.echo(f"{one.what}: amended{kept}")
+        echo(f"{one.what}: amended{kept}")
 
 
 @session.command()
@@ -205,11 +207,11 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
         return
     done = "would be sealed" if dry_run else "sealed"
     for file in found.files:
-        click.echo(f"{file}: {done}")
+        echo(f"{file}: {done}")
     if not found.anything:
-        click.echo("every run and file is sealed already")
+        echo("every run and file is sealed already")
     else:
-        click.echo(f"{len(found.seal.files)} files and {found.seal.runs} runs: {done}")
+        echo(f"{len(found.seal.files)} files and {found.seal.runs} runs: {done}")
 
 
 def _name(run: RunEntry) -> str:
@@ -223,7 +225,7 @@ def _tell(name: str, run: RunEntry, *, as_json: bool) -> None:
     if as_json:
         print_json({"run": name, "state": run.state.value, "reason": run.reason or None})
     else:
-        click.echo(f"{name}: {run.state.value}" + (f" ({run.reason})" if run.reason else ""))
+        echo(f"{name}: {run.state.value}" + (f" ({run.reason})" if run.reason else ""))
 
 
 def _missing(read: SessionFolder) -> list[tuple[str, str]]:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.output import echo
+
 if TYPE_CHECKING:
     from dbbstation.files.formats.settings import Settings
 
@@ -37,7 +39,7 @@ def settings(folder: Path | None, *, template: bool, as_json: bool) -> None:
     if template:
         if folder is not None or as_json:
             raise click.UsageError("--template prints a settings file and takes nothing else")
-        click.echo(_template(), nl=False)
+        echo(_template(), nl=False)
         return
     found = shop_settings()
     if as_json:
@@ -113,11 +115,11 @@ def _print(found: Settings) -> None:
         rows.append([key, value, one["from"] or ""])
     print_table(["setting", "value", "from"], rows)
     for one in data["tolerances"]:
-        click.echo(f"tolerance: {one['quantity']} at most {one['largest_um']:g} µm, {which_circles(one)}")
+        echo(f"tolerance: {one['quantity']} at most {one['largest_um']:g} µm, {which_circles(one)}")
     if found.tolerances_from:
-        click.echo(f"tolerances from {found.tolerances_from}")
+        echo(f"tolerances from {found.tolerances_from}")
     if not found.files:
-        click.echo("no settings file was found; `dbbstation settings --template` prints one", err=True)
+        echo("no settings file was found; `dbbstation settings --template` prints one", err=True)
 
 
 def _template() -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[
         if as_json:
             print_json(told)
         else:
-            click.echo("\n".join(_details(told)))
+            echo("\n".join(_details(told)))
         return
     if as_json:
         print_json({"sources": [_told(source, None) for source in known.values()]})

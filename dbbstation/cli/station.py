@@ -19,6 +19,7 @@ from dbbstation.cli.judging_model import judging_model, judging_model_options
 from dbbstation.cli.loss import loss_option, with_loss_limit
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.order_options import in_order, order_options, programs_option
+from dbbstation.cli.output import echo
 from dbbstation.cli.sampling import say_sampling
 from dbbstation.cli.session_options import require_bar, session_details, session_options, stated_length_mm
 from dbbstation.cli.shop import SETTINGS_OPTION, from_settings
@@ -151,7 +152,7 @@ def station(
         if virtual:
             from dbbstation.service.virtual_place import virtual_place
 
-            click.echo("switching on the virtual machine …", err=True)
+            echo("switching on the virtual machine …", err=True)
             place = stack.enter_context(
                 virtual_place(
                     machine,
@@ -293,7 +294,7 @@ def _shown(app: StationApp) -> int:
     if app.crash is not None:
         raise app.crash
     if app.board.tasks:
-        click.echo(f"{app.board.session}: {app.board.accepted} of {len(app.board.tasks)} runs accepted", err=True)
+        echo(f"{app.board.session}: {app.board.accepted} of {len(app.board.tasks)} runs accepted", err=True)
     if app.board.fault is not None:
         raise app.board.fault.error
     if stopped.is_set():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
+from dbbstation.cli.output import echo
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -65,8 +65,8 @@ def print_tolerances(held: Sequence[Mapping[str, Any]], origin: str) -> None:
 
     if not held:
         return
-    click.echo()
-    click.echo(
+    echo()
+    echo(
         f"tolerances [µm], from {origin}; the worst run of each, readings under the nominal machine and under the model"
     )
     rows = []

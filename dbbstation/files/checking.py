@@ -60,7 +60,8 @@ def check(path: Path, known_sources: Mapping[str, ErrorSource]) -> Checked:
     if path.is_dir():
         if (path / SESSION_FILE).exists():
             document = load_yaml(path / SESSION_FILE, [])
-            checked.kind = "dbb-session" if document is None else str(document.data.get("format", "dbb-session"))
+            data = document.data if document is not None and isinstance(document.data, dict) else {}
+            checked.kind = str(data.get("format", "dbb-session"))
             _session(checked)
         else:
             checked.problems.append(no_session(path))

@@ -1,14 +1,43 @@
-"""Rows of CSV text, cell by cell; a cell that no table has ends it with its line."""
+"""Rows of CSV text: read cell by cell, and written so that a spreadsheet takes no text for a formula."""
 
 from __future__ import annotations
 
 import csv
+import io
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.number_language import is_number
+from dbbstation.printable import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+
+
+_BEGINS_FORMULA = frozenset("=+-@\t\n＝＋－＠")
+"""Signs with which a spreadsheet begins a formula, or leaves them out before one [OWASP, CSV Injection]."""
+
+_NONE = "-"
+"""What tables hold where there is nothing."""
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as CSV text: the one writer of tables that people open in a spreadsheet.
+
+    A text that a spreadsheet would take for a formula gets `'` before it. Numbers stay numbers, negative ones too.
+    """
+    out = io.StringIO(newline="")
+    csv.writer(out, lineterminator="\n").writerows(map(_guarded, row) for row in rows)
+    return out.getvalue()
+
+
+def _guarded(cell: object) -> object:
+    if not isinstance(cell, str):
+        return cell
+    shown = printable(cell)  # a carriage return would begin a row, and a formula at its start a cell
+    if shown.lstrip(" ")[:1] not in _BEGINS_FORMULA or shown == _NONE or is_number(shown):
+        return shown
+    return f"'{shown}"
 
 
 def csv_rows(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -64,9 +63,8 @@ def input_book() -> Iterator[InputBook]:
         _BOOK.reset(token)
 
 
-def note_input(path: Path, data: bytes) -> None:
-    """Note and log a file that was read; only logged where nobody keeps a book."""
-    digest = hashlib.sha256(data).hexdigest()
+def note_input(path: Path, digest: str) -> None:
+    """Note and log a file that was read, with its SHA-256; only logged where nobody keeps a book."""
     _LOG.info("read %s, sha256 %s", path, digest)
     book = _BOOK.get()
     if book is not None:

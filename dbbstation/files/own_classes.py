@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.catalogue import Found, classes_of, in_words
 from dbbstation.errors import Problem
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -61,7 +61,7 @@ def module_name(path: Path) -> str:
 
 def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:
     """Read a file as Python; None with the fault and its place added."""
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_PROGRAM)
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         return None

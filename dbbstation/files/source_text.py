@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import stat
+import hashlib
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
+from dbbstation.files.gateway import LARGEST_BYTES, NotRegularError, TooLargeError, content_of, opened
 from dbbstation.files.inputs import note_input, note_read
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
-
-
-LARGEST_BYTES = 2_000_000_000
-"""Largest file that is read: an hour at a hundred thousand readings a second makes about as much."""
 
 
 def read_bytes(
     path: Path, faults: list[Problem], largest: int = LARGEST_BYTES, *, is_input: bool = True
 ) -> bytes | None:
     """Return a file's bytes, or None with the reason added to `faults`.
-
-    Regular files only: a pipe would be waited for and a device never ends.
 
     Args:
         path: of the file.
@@ -30,39 +26,75 @@ def read_bytes(
         is_input: outputs name it among their inputs; not so where the hash of the file stands in another input.
     """
     try:
-        data = _bounded(path, faults, largest)
-    except FileNotFoundError:
-        faults.append(Problem(str(path), 0, 0, "there is no such file", "check the path"))
-    except IsADirectoryError:
-        faults.append(Problem(str(path), 0, 0, "this is a folder, a file is needed", "name the file in it"))
+        data = content_of(path, largest)
     except OSError as error:
-        why = (error.strerror or "unknown reason").lower()
-        faults.append(Problem(str(path), 0, 0, f"cannot be read: {why}", "check its permissions and the disk"))
-    else:
-        if data is not None:
-            note_read(path)
-            if is_input:
-                note_input(path, data)
-        return data
-    return None
-
-
-def _bounded(path: Path, faults: list[Problem], largest: int) -> bytes | None:
-    found = path.stat()
-    if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
-        what = "this is a pipe or a device, a file is needed"
-        faults.append(Problem(str(path), 0, 0, what, "write it to a file first"))
+        faults.append(unreadable(path, error))
         return None
-    if found.st_size > largest:
-        what = f"the file has {found.st_size:,} bytes, at most {largest:,} are read"
-        faults.append(Problem(str(path), 0, 0, what, "check that it is the file you mean"))
-        return None
-    with path.open("rb") as file:
-        data = file.read(largest + 1)
-    if len(data) > largest:
-        faults.append(Problem(str(path), 0, 0, f"the file goes on beyond {largest:,} bytes", "check which file it is"))
-        return None
+    note_read(path)
+    if is_input:
+        note_input(path, hashlib.sha256(data).hexdigest())
     return data
+
+
+def unreadable(path: Path, error: OSError) -> Problem:
+    """Return the problem of a file that cannot be read."""
+    if isinstance(error, FileNotFoundError):
+        return Problem(str(path), 0, 0, "there is no such file", "check the path")
+    if isinstance(error, IsADirectoryError):
+        return Problem(str(path), 0, 0, "this is a folder, a file is needed", "name the file in it")
+    if isinstance(error, NotRegularError):
+        return Problem(str(path), 0, 0, str(error.strerror), "write it to a file first")
+    if isinstance(error, TooLargeError):
+        return Problem(str(path), 0, 0, str(error.strerror), "check that it is the file you mean")
+    why = (error.strerror or "unknown reason").lower()
+    return Problem(str(path), 0, 0, f"cannot be read: {why}", "check its permissions and the disk")
+
+
+def first_line(path: Path) -> bytes:
+    """Return the first line of a file that holds something and is no comment; nothing where there is none.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with opened(path) as source:
+        return next((line for line in lines_of(source.blocks()) if not is_comment(line)), b"")
+
+
+def is_comment(line: bytes) -> bool:
+    """Whether a line is empty or begins with `#`, after a byte order mark or not."""
+    return line.lstrip(_SPACE)[:1] in {b"", b"#"}
+
+
+def lines_of(blocks: Iterable[bytes]) -> Iterator[bytes]:
+    """Yield the lines of a text without their ends; what a file without line ends holds comes in pieces.
+
+    Args:
+        blocks: of the text, cut anywhere.
+    """
+    left = b""
+    for block in blocks:
+        *whole, left = (left + block).split(b"\n")
+        yield from whole
+        if len(left) > LONGEST_LINE:
+            yield left
+            left = b""
+    yield left
+
+
+LARGEST_TABLE = 200_000_000
+"""Largest table that is read whole [bytes], as text cell by cell: a million rows of twenty columns, or a drive's seven million
+samples. They take ten times as much memory; runs, which are longer, are read block by block."""
+
+LARGEST_SHEET = 20_000_000
+"""Largest CMM report that is read [bytes]: a hundred thousand features."""
+
+LARGEST_PROGRAM = 1_000_000
+"""Largest Python file of the user's own that is read [bytes]: ten thousand lines."""
+
+LONGEST_LINE = 1_000_000
+"""Bytes of a line that are kept: a row of a thousand columns has twenty thousand."""
+
+_SPACE = b" \t\r\v\f\xef\xbb\xbf"
 
 
 def decode(data: bytes, file: str, faults: list[Problem]) -> str | None:

@@ -11,20 +11,28 @@ Times are seconds since the log was opened; `>` went to the device, `<` came fro
 
 from __future__ import annotations
 
+import math
 import re
 import time
+from contextlib import closing
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 from dbbstation.errors import InputError, OutputError, Problem
+from dbbstation.files.gateway import opened
+from dbbstation.files.inputs import note_read
+from dbbstation.files.source_text import lines_of, unreadable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator, Iterator
     from pathlib import Path
     from typing import Self
 
 _HEAD = "# dbb-byte-log/1"
-_LINE = re.compile(r"\s*(\d+(?:\.\d*)?) ([<>]) ([0-9a-f]{2}(?: [0-9a-f]{2})*)(?:  \|.*)?")
+_LONGEST_S = 1e9
+"""Greatest time of a line [s]: nobody logs for thirty years."""
+_LINE = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?) ([<>]) ([0-9a-f]{2}(?: [0-9a-f]{2})*)(?:  \|.*)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,12 +114,13 @@ def logged_instrument(path: Path) -> tuple[str, str]:
         InputError: the file cannot be read or is no byte log.
     """
     told = {"# instrument": "", "# profile": ""}
-    for line in _lines(path)[1:]:
-        if not line.startswith("#"):
-            break
-        key, _, value = line.partition(":")
-        if key in told:
-            told[key] = value.strip()
+    with closing(_lines(path)) as lines:
+        for _, line in lines:
+            if not line.startswith("#"):
+                break
+            key, _, value = line.partition(":")
+            if key in told:
+                told[key] = value.strip()
     return told["# instrument"], told["# profile"]
 
 
@@ -121,26 +130,34 @@ def read_byte_log(path: Path) -> Iterator[Chunk]:
     Raises:
         InputError: the file cannot be read, is no byte log, or has a line that is none of its.
     """
-    lines = _lines(path)
-    # What follows the last line end is empty, or a line that a crash cut off.
-    for number, line in enumerate(lines[1:-1], start=2):
+    for number, line in _lines(path):
         if line.startswith("#") or not line:
             continue
         match = _LINE.fullmatch(line)
-        if match is None:
+        t_s = float(match[1]) if match is not None else math.inf
+        if match is None or t_s > _LONGEST_S:
             remedy = "every line is: seconds, < or >, bytes in hexadecimal"
             raise InputError([Problem(str(path), number, 1, "this line of the byte log cannot be read", remedy)])
         direction: Literal["<", ">"] = "<" if match[2] == "<" else ">"
-        yield Chunk(float(match[1]), direction, bytes.fromhex(match[3]))
+        yield Chunk(t_s, direction, bytes.fromhex(match[3]))
 
 
-def _lines(path: Path) -> list[str]:
+def _lines(path: Path) -> Generator[tuple[int, str]]:
+    """Yield the lines below the first with their numbers; not what follows the last line end."""
+    number = 0
     try:
-        lines = path.read_text(encoding="utf-8").split("\n")
+        with opened(path) as source:
+            note_read(path)
+            for number, (line, _) in enumerate(pairwise(lines_of(source.blocks())), start=1):
+                if number > 1:
+                    yield number, line.decode("utf-8").removesuffix("\r")
+                elif line.strip() != _HEAD.encode():
+                    break
+            else:
+                if number:
+                    return
     except OSError as error:
-        raise InputError([Problem(str(path), 0, 0, error.strerror or str(error))]) from None
+        raise InputError([unreadable(path, error)]) from error
     except UnicodeDecodeError:
-        raise InputError([Problem(str(path), 0, 0, "not UTF-8 text, so no byte log")]) from None
-    if lines[0].strip() != _HEAD:
-        raise InputError([Problem(str(path), 1, 1, f"not a byte log: the first line is not {_HEAD!r}")])
-    return lines
+        raise InputError([Problem(str(path), number, 0, "not UTF-8 text, so no byte log")]) from None
+    raise InputError([Problem(str(path), 1, 1, f"not a byte log: the first line is not {_HEAD!r}")])

@@ -6,6 +6,7 @@ import re
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from dbbstation.files.gateway import head_of
 from dbbstation.files.shipped import shipped_folder
 
 if TYPE_CHECKING:
@@ -64,8 +65,7 @@ def _files(folder: Path, depth: int) -> Iterator[Path]:
 
 def _is(kind: Kind, path: Path) -> bool:
     try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD)
+        head = head_of(path, _HEAD)
     except OSError:
         return False
     return re.search(rb"^format:\s*['\"]?" + re.escape(kind.encode()), head, re.MULTILINE) is not None

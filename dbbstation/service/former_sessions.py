@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.atomic import write_bytes
+from dbbstation.files.gateway import content_of, digest_of
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.session import read_session
 from dbbstation.machine.difference import differences
@@ -143,7 +144,7 @@ def keep_models(former: Former, folder: Path) -> tuple[Path, ...]:
     """
     copies = []
     for model in former.in_force.models:
-        data = model.read_bytes()
+        data = content_of(model)
         copy = folder / f"former-model-{hashlib.sha256(data).hexdigest()[:8]}.yaml"
         if not copy.exists():
             write_bytes(copy, data)
@@ -164,4 +165,4 @@ def _alike(now: SessionFolder, then: SessionFolder, tests: set[str]) -> bool:
 
 
 def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return digest_of(path)

@@ -10,9 +10,13 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dbbstation.errors import OutputError
 from dbbstation.files.atomic import write_text
+from dbbstation.files.gateway import content_of
 
 FILE = "station.json"
 """Name of the file in the user's folder for states."""
+
+LARGEST_BYTES = 1_000_000
+"""Largest such file that is read: twenty sessions and their lines take some kilobytes."""
 
 MOST = 20
 """Sessions that are remembered: more than anybody looks through."""
@@ -115,7 +119,7 @@ class Memory:
     def read(self) -> Remembered:
         """Return the last choices; none where the file is missing or not understood: it is only a convenience."""
         try:
-            file = _File.model_validate_json(self.path.read_bytes())
+            file = _File.model_validate_json(content_of(self.path, LARGEST_BYTES))
         except (OSError, ValidationError):
             return Remembered()
         sessions = tuple((Path(folder), line) for folder, line in file.sessions.items())

@@ -27,10 +27,11 @@ def lost_samples(t_s: NDArray[np.float64]) -> int:
     """
     if len(t_s) < _FEWEST:
         return 0
-    spacing = np.diff(t_s)
-    periods = spacing / np.median(spacing)
+    periods = np.diff(t_s)
+    periods /= np.median(periods)
     whole = np.round(periods)
-    fits = np.abs(periods - whole) < _OFF
+    periods -= whole  # in its place: a recording may have ten million samples
+    fits = np.abs(periods, out=periods) < _OFF
     wide = whole > 1.0
     if not wide.any() or np.mean(fits & (whole > 0.0)) < _REGULAR or np.mean(fits[wide]) < _REGULAR:
         return 0

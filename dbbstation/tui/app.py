@@ -22,6 +22,7 @@ from dbbstation.station.commands import Command, Note, Quit
 from dbbstation.station.events import Noted
 from dbbstation.station.states import FINAL, RECORDING, VERDICT
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
+from dbbstation.tui.controls import show_controls
 from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.help_screen import HelpScreen
 from dbbstation.tui.help_texts import HELP
@@ -123,6 +124,7 @@ class StationApp(App[None]):
         clock: Callable[[], float] = time.monotonic,
         front: Front | None = None,
     ) -> None:
+        show_controls()
         super().__init__()
         self._clock = clock
         self.board = Board()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.errors import CalibrationError
 from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.patterns import Family, covers_turns, turn
@@ -149,7 +150,28 @@ def find_mismatch(
         hold_out: repeat everything for each held-out part; takes most of the time.
         lacking: physics that could not be asked, and why.
         progress: called with what is being done, and how much of how much where that can be counted.
+
+    Raises:
+        CalibrationError: the difference is so much larger than its noise that rounding hides what it follows.
     """
+    try:
+        return _found(table, sources, lacking or {}, progress, hold_out=hold_out)
+    except np.linalg.LinAlgError as error:
+        what = "the difference is so much larger than its noise that rounding hides what it follows"
+        remedy = "check that measured and simulated values are of one quantity in one unit"
+        raise CalibrationError(
+            what, where=f"{table.simulated_name} beside the measured values", remedy=remedy
+        ) from error
+
+
+def _found(
+    table: Table,
+    sources: Sequence[TableSource],
+    lacking: dict[str, str],
+    progress: Callable[..., None],
+    *,
+    hold_out: bool,
+) -> Mismatch:
     channel = table.channel(sources)
     channel = replace(channel, static=static_patterns(channel))
     settled = settle(channel, progress=progress)
@@ -164,7 +186,7 @@ def find_mismatch(
         fitted=_fitted(settled),
         left=left_over(settled),
         held_out=held_out,
-        lacking=lacking or {},
+        lacking=lacking,
         texts={source.name: source.texts for source in sources},
         second_start=_second_start(settled, findings),
     )

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 from dbbstation.errors import InputError, Problem
 
+NUMBER = r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?"
+"""A number as files hold it, as a regular expression. `float` takes digits of every script and `_` as well, NumPy does not."""
+
+_NUMBER = re.compile(NUMBER)
+
 DECIMALS = (".", ",")
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number with a dot as decimal sign; spaces may stand around it."""
+    return _NUMBER.fullmatch(text.strip(" \t")) is not None
 
 
 @dataclass(frozen=True)
@@ -36,10 +47,8 @@ class NumberLanguage:
     def number(self, cell: str) -> float:
         """Return the number that a cell holds; not a number where it is none, or is written with the other sign."""
         other = next(sign for sign in DECIMALS if sign != self.decimal)
-        try:
-            return math.nan if other in cell else float(cell.replace(self.decimal, "."))
-        except ValueError:
-            return math.nan
+        plain = cell.replace(self.decimal, ".")
+        return math.nan if other in cell or not is_number(plain) else float(plain)
 
     @property
     def text(self) -> str:

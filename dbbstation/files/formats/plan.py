@@ -278,7 +278,9 @@ def _check_tests(document: YamlDocument, balls: set[str], faults: list[Problem])
         ball = test.get("ball")
         if isinstance(ball, str) and ball not in balls:
             what = f"{dotted(location)}: the ball `{ball}` is not in `balls`"
-            faults.append(document.problem((*location, "ball"), what, f"known: {', '.join(sorted(balls)) or 'none'}"))
+            faults.append(
+                document.problem((*location, "ball"), what, f"known: {', '.join(sorted(map(str, balls))) or 'none'}")
+            )
     repeats = document.data.get("repeat_at_end")
     for index, name in enumerate(repeats if isinstance(repeats, tuple) else ()):
         if name not in names:

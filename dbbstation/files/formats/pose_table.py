@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.csv_rows import csv_rows
+from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import DECIMALS, PLAIN, SEPARATORS, NumberLanguage
 from dbbstation.files.provenance import Provenance, write_table
-from dbbstation.files.source_text import decode, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,7 +51,7 @@ def read_poses(path: Path, language: NumberLanguage = PLAIN) -> PoseTable:
         InputError: every missing column and every cell that is no finite number, with its line.
     """
     faults: list[Problem] = []
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_TABLE)
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)
@@ -119,12 +118,10 @@ def write_poses(
     """
     own = (*UNCERTAINTY_COLUMNS, REASON_COLUMN)
     kept = {name: cells for name, cells in others.items() if name not in own}
-    out = io.StringIO(newline="")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*POSE_COLUMNS, *own, *kept])
+    rows: list[list[str]] = [[*POSE_COLUMNS, *own, *kept]]
     for k, (pose, uncertainty) in enumerate(zip(poses, uncertainty_mm, strict=True)):
         numbers = [f"{value:.9f}" for value in pose]
         numbers += ["" if np.isnan(value) else f"{value:.7f}" for value in uncertainty]
         reason = why_unknown if np.isnan(uncertainty).any() else ""
-        writer.writerow([*numbers, reason, *(cells[k] for cells in kept.values())])
-    write_table(path, out.getvalue(), provenance, force=force)
+        rows.append([*numbers, reason, *(cells[k] for cells in kept.values())])
+    write_table(path, csv_text(rows), provenance, force=force)

@@ -147,10 +147,14 @@ ExpansionUmMK = Annotated[float, Quantity("µm/(m K)", 0.01, 50, or_zero=True)]
 
 
 def twice(values: Iterable[Any]) -> list[int]:
-    """Indices of values that stood earlier already."""
+    """Indices of values that stood earlier already; mappings, and lists that hold some, are not compared."""
     seen: set[Any] = set()
     again = []
     for index, value in enumerate(values):
+        try:
+            hash(value)
+        except TypeError:
+            continue
         if value in seen:
             again.append(index)
         seen.add(value)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.source_text import decode, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_SHEET, decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,7 +44,7 @@ def read_dmis(path: Path) -> list[DmisPoint]:
         InputError: it cannot be read, has none, no unit, polar coordinates, or sets another frame between two of them.
     """
     faults: list[Problem] = []
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_SHEET)
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)

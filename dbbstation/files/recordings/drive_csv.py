@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.source_text import decode, read_bytes, shortened
+from dbbstation.files.formats.number_language import is_number
+from dbbstation.files.source_text import LARGEST_TABLE, decode, first_line, read_bytes, shortened
 from dbbstation.trace.drive_recording import DriveRecording
 
 if TYPE_CHECKING:
@@ -68,11 +69,10 @@ class DriveFile:
 def looks_like_drive(path: Path) -> bool:
     """Whether the first line that is no comment names a position and no bar length: what runs have."""
     try:
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            head = next((line for line in file if line.strip() and not line.lstrip().startswith("#")), "")
+        head = first_line(path)
     except OSError:
         return False
-    names = {name.strip() for name in head.split(",")}
+    names = {name.strip() for name in head.decode("utf-8-sig", "replace").split(",")}
     return POSITION in names and "length_mm" not in names
 
 
@@ -83,7 +83,7 @@ def read_drive(path: Path) -> DriveFile:
         InputError: every missing column, and lines that cannot be used, with their number.
     """
     faults: list[Problem] = []
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_TABLE)
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)
@@ -161,6 +161,9 @@ def _numbers(
     whole = len(table) == len(rows) and bool(np.isfinite(table).all())
     if not whole or any(line.count(",") != len(names) - 1 for _, line in rows):
         _name_faults(rows, names, known, file, faults)
+        if not faults:
+            what = "NumPy reads this file otherwise than line by line"
+            faults.append(Problem(file, 0, 0, what, "write plain decimal numbers"))
     return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(known)}
 
 
@@ -176,11 +179,7 @@ def _name_faults(
             continue
         for name in known:
             cell = cells[names.index(name)].strip()
-            try:
-                good = math.isfinite(float(cell))
-            except ValueError:
-                good = False
-            if not good:
+            if not is_number(cell) or not math.isfinite(float(cell)):
                 what = f"{name} is `{shortened(cell)}`, not a finite number"
                 faults.append(Problem(file, number, 0, what, "correct or remove the line"))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
+from dbbstation.files.gateway import head_of
 from dbbstation.files.recordings.session_name import SESSION_FILE
 
 if TYPE_CHECKING:
@@ -90,8 +91,7 @@ def _is_folder(entry: os.DirEntry[str]) -> bool:
 
 def _may_be_model(path: Path) -> bool:
     try:
-        with path.open("rb") as file:
-            return _MODEL_MARK in file.read(_MARK_WITHIN)
+        return _MODEL_MARK in head_of(path, _MARK_WITHIN)
     except OSError:
         return False
 

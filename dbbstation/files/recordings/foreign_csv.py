@@ -13,7 +13,7 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.csv_rows import csv_rows
 from dbbstation.files.formats.number_language import NumberLanguage
 from dbbstation.files.recordings.table_csv import TableFile, parse_table
-from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -74,7 +74,7 @@ def read_foreign(path: Path, language: NumberLanguage | None = None, encoding: s
         InputError: it cannot be read, has no table, or has lines of another width.
     """
     faults: list[Problem] = []
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_TABLE)
     text = None if data is None else _text(data, str(path), encoding, faults)
     if data is None or text is None:
         raise InputError(faults)

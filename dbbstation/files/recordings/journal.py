@@ -6,7 +6,6 @@ recorded the file ends in `.csv.part`; sealing renames it. Nothing is ever overw
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 import time
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError, Problem
 from dbbstation.files.atomic import sync_folder
+from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.run_csv import PART, RunFile, parse_run
 from dbbstation.files.source_text import read_bytes
 from dbbstation.trace import columns
@@ -201,7 +201,7 @@ class RunWriter:
         self.sync()
         self.close()
         with self._told():
-            digest = hashlib.sha256(self.path.read_bytes()).hexdigest()
+            digest = digest_of(self.path)
             if self.sealed_path.exists():
                 raise OutputError("this run exists already", where=str(self.sealed_path), remedy="take the next repeat")
             self.path.rename(self.sealed_path)

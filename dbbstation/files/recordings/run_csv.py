@@ -1,35 +1,34 @@
 """Run files `runs/*.csv`: one circle, one direction, raw.
 
-One way leads in: bytes to lines (`run_lines`), lines to checked numbers (`run_numbers`), numbers to a recording. Of a
+One way leads in, block by block: bytes to lines (`run_lines`), lines to checked numbers (`run_numbers`), numbers to a recording. Of a
 file that was being recorded when the station died (`.csv.part`) the good lines are returned, the others named.
 """
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
-from dbbstation.files.recordings.run_lines import Lines, lines_of
-from dbbstation.files.recordings.run_numbers import numbers_of
-from dbbstation.files.source_text import read_bytes
+from dbbstation.errors import InputError, Problem, few
+from dbbstation.files.gateway import opened
+from dbbstation.files.inputs import note_input, note_read
+from dbbstation.files.recordings.run_lines import pieces_of
+from dbbstation.files.recordings.run_numbers import Numbers
+from dbbstation.files.source_text import unreadable
 from dbbstation.trace import columns
 from dbbstation.trace.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
 
 PART = ".part"
 """Ending, after `.csv`, of a run that is being recorded."""
-
-_MOST_FAULTS = 20
-"""Faults of one kind that are listed one by one; nobody reads the ten thousandth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,14 +62,33 @@ def read_run(path: Path, *, sha256: str = "") -> RunFile:
     Raises:
         InputError: every fault of the file with its line.
     """
-    faults: list[Problem] = []
-    data = read_bytes(path, faults, is_input=not sha256)
-    if data is None:
-        raise InputError(faults)
-    digest = hashlib.sha256(data).hexdigest()
-    if sha256 and digest != sha256:
+    digest = hashlib.sha256()
+    try:
+        with opened(path) as source:
+            note_read(path)
+            blocks = _hashed(source.blocks(), digest)
+            run: RunFile | InputError
+            try:
+                run = _parsed(blocks, str(path), partial=path.suffix == PART)
+            except InputError as error:
+                run = error
+            for _ in blocks:
+                pass  # what is not worth parsing counts for the hash
+    except OSError as error:
+        raise InputError([unreadable(path, error)]) from error
+    if not sha256:
+        note_input(path, digest.hexdigest())
+    elif digest.hexdigest() != sha256:
         raise InputError([changed(str(path))])
-    return parse_run(data, str(path), digest, partial=path.suffix == PART)
+    if isinstance(run, InputError):
+        raise run
+    return replace(run, sha256=digest.hexdigest())
+
+
+def _hashed(blocks: Iterable[bytes], digest: hashlib._Hash) -> Iterator[bytes]:
+    for block in blocks:
+        digest.update(block)
+        yield block
 
 
 def sealed_or_part(path: Path) -> Path:
@@ -97,19 +115,37 @@ def parse_run(data: bytes, file: str, sha256: str = "", *, partial: bool = False
     Raises:
         InputError: every fault of the file with its line.
     """
+    return replace(_parsed([data], file, partial=partial), sha256=sha256)
+
+
+def _parsed(blocks: Iterable[bytes], file: str, *, partial: bool) -> RunFile:
+    """Parse a run file block by block: what is kept of a block are its numbers and its texts, equal ones once."""
     faults: list[Problem] = []
     warnings: list[Problem] = []
-    lines = lines_of(data, file, faults, warnings, partial=partial)
-    numbers = None if lines is None else numbers_of(lines, faults)
-    if lines is None or numbers is None:
-        raise InputError(_few(faults, file))
+    numbers = Numbers()
+    texts: dict[str, list[str]] = {}
+    known: dict[bytes, str] = {}
+    header: Mapping[str, str] = {}
+    for lines in pieces_of(blocks, file, faults, warnings, partial=partial):
+        header = lines.header
+        numbers.take(lines)
+        if numbers.faults.enough:
+            break
+        if not numbers.faults.count:
+            for name in (name for name in lines.columns if name not in columns.COLUMNS and name != columns.CRC):
+                texts.setdefault(name, []).extend(lines.texts(name, known))
+    found = numbers.columns()
+    faults = [*few(faults), *numbers.faults.told()]
+    if faults:
+        raise InputError(faults)
+    status = texts.pop(columns.STATUS, [])
+    usable = np.array([text in {"", columns.STATUS_GOOD} for text in status], dtype=np.bool_) if status else None
     return RunFile(
-        recording=_recording(lines, numbers),
-        header=lines.header,
-        unknown_columns={name: tuple(lines.texts(name)) for name in lines.unknown},
-        warnings=tuple(_few(warnings, file)),
-        sha256=sha256,
-        status=tuple(lines.texts(columns.STATUS)) if columns.STATUS in lines.columns else (),
+        recording=_recording(file, found, usable),
+        header=header,
+        unknown_columns={name: tuple(cells) for name, cells in texts.items()},
+        warnings=tuple(few(warnings)),
+        status=tuple(status),
     )
 
 
@@ -117,25 +153,12 @@ _BY_THEMSELVES = (columns.TIME, columns.LENGTH, columns.THETA)
 """Columns that a recording has in places of their own."""
 
 
-def _recording(lines: Lines, numbers: dict[str, NDArray[np.float64]]) -> Recording:
-    usable = None
-    if columns.STATUS in lines.columns:
-        said = lines.texts(columns.STATUS)
-        usable = np.array([text in {"", columns.STATUS_GOOD} for text in said], dtype=np.bool_)
+def _recording(file: str, numbers: Mapping[str, NDArray[np.float64]], usable: NDArray[np.bool_] | None) -> Recording:
     return Recording(
-        name=lines.file,
+        name=file,
         t_s=numbers[columns.TIME],
         length_mm=numbers[columns.LENGTH],
         theta_deg=numbers.get(columns.THETA),
         logged={name: values for name, values in numbers.items() if name not in _BY_THEMSELVES},
         usable=usable,
     )
-
-
-def _few(problems: list[Problem], file: str) -> list[Problem]:
-    """Return the problems, or the first of very many with a count of the others."""
-    if len(problems) <= _MOST_FAULTS:
-        return problems
-    more = len(problems) - _MOST_FAULTS
-    last = problems[_MOST_FAULTS].line
-    return [*problems[:_MOST_FAULTS], Problem(file, last, 0, f"and {more} more of these from here on")]

@@ -1,4 +1,4 @@
-"""Lines of a run file: the header taken off, rows with their line numbers, checked one by one or all at once."""
+"""Lines of a run file, piece by piece: the header taken off, rows with their numbers, checked one by one or all at once."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import Problem
-from dbbstation.files.source_text import decode, shortened
+from dbbstation.files.formats.number_language import NUMBER
+from dbbstation.files.source_text import LONGEST_LINE, decode, first_line, shortened, unreadable
 from dbbstation.trace import columns
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
     from pathlib import Path
 
 _COMMA, _NEWLINE = ord(","), ord("\n")
@@ -25,21 +27,26 @@ _HEX_DIGIT = np.full(256, _NO_DIGIT, dtype=np.int64)
 _HEX_DIGIT[np.frombuffer(b"0123456789abcdef", dtype=np.uint8)] = np.arange(16)
 _HEX_PLACES = 16 ** np.arange(_CRC_LENGTH - 1, -1, -1, dtype=np.int64)
 _CRC_TEXT = re.compile(rb"[0-9a-f]{8}")
-_NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
+_NUMBER = re.compile(NUMBER.encode())
+
+
+_MOST_KNOWN = 10_000
+"""Texts that are kept once: of a column with more nearly every one is another."""
 
 
 @dataclass(frozen=True)
 class Lines:
-    """A run file taken apart into lines.
+    """A piece of a run file, or the whole, taken apart into lines.
 
     Attributes:
         file: as named in messages.
-        header: `# key: value` lines by key.
+        header: `# key: value` lines by key, as far as the file was read.
         header_line: number of the line that names the columns.
         columns: their names in order.
         rows: the lines below, without line ends.
         numbers: line number of each row.
         ended: the last row ends with a line end.
+        opening: this is the first piece.
     """
 
     file: str
@@ -49,6 +56,7 @@ class Lines:
     rows: list[bytes]
     numbers: range | list[int]
     ended: bool
+    opening: bool = True
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -59,10 +67,19 @@ class Lines:
         """Return the same file with only these rows."""
         return replace(self, rows=self.rows[rows], numbers=self.numbers[rows], ended=True)
 
-    def texts(self, name: str) -> list[str]:
-        """Return one column as text."""
+    def texts(self, name: str, known: dict[bytes, str] | None = None) -> list[str]:
+        """Return one column as text.
+
+        Args:
+            name: of the column.
+            known: texts that came before, so that equal ones are kept once; more are added.
+        """
         at = self.columns.index(name)
-        return [row.split(b",")[at].decode("utf-8", "replace").strip() for row in self.rows]
+        cells = [row.split(b",")[at] for row in self.rows]
+        seen = {} if known is None or len(known) > _MOST_KNOWN else known
+        for cell in set(cells) - seen.keys():
+            seen[cell] = cell.decode("utf-8", "replace").strip()
+        return [seen[cell] for cell in cells]
 
     def regular(self) -> bool:
         """Whether every row has as many fields as there are columns."""
@@ -90,67 +107,135 @@ class Lines:
         return bool((found != digits @ _HEX_PLACES).any())
 
 
-def lines_of(data: bytes, file: str, faults: list[Problem], warnings: list[Problem], *, partial: bool) -> Lines | None:
-    """Lines of a run file that are to be read.
+def pieces_of(
+    blocks: Iterable[bytes], file: str, faults: list[Problem], warnings: list[Problem], *, partial: bool
+) -> Iterator[Lines]:
+    """Yield the lines of a run file that are to be read, piece by piece; nothing more once there are faults.
 
     Args:
-        data: whole file.
+        blocks: of the file, cut anywhere.
         file: as named in messages.
         faults: what makes the file useless is added.
         warnings: what does not spoil it is added: unknown columns, a last line that was cut off, lines left out.
-        partial: keep the good lines of an interrupted recording only.
-
-    Returns:
-        None where there are faults.
+        partial: yield the good lines of an interrupted recording only, in one piece: they may stand out of order.
     """
-    lines = split_file(data, file, faults)
-    if lines is None or faults:
-        return None
-    for name in lines.unknown:
-        what = f"the column `{name}` is not known; it is kept and not used"
-        warnings.append(Problem(file, lines.header_line, 0, what))
-    lines = _without_cut_line(lines, warnings)
+    pieces = split_pieces(blocks, file, faults)
     if partial:
-        lines, bad = good_lines(lines)
-        warnings += bad
-    return lines
+        whole = _whole(pieces)
+        pieces = iter([] if whole is None else [whole])
+    for piece in pieces:
+        if piece.opening:
+            _check_columns(piece.columns, file, piece.header_line, faults)
+            for name in piece.unknown:
+                what = f"the column `{shortened(name)}` is not known; it is kept and not used"
+                warnings.append(Problem(file, piece.header_line, 0, what))
+        if faults:
+            return
+        lines = _without_cut_line(piece, warnings)
+        if partial:
+            lines, bad = good_lines(lines)
+            warnings += bad
+        yield lines
 
 
 def split_file(data: bytes, file: str, faults: list[Problem]) -> Lines | None:
-    """Take a run file apart; None, or columns that cannot be used, are told in `faults`."""
-    all_lines = data.replace(b"\r\n", b"\n").split(b"\n")
-    ended = all_lines[-1] == b""
-    if ended:
-        all_lines.pop()
+    """Take a whole run file apart; None, or columns that cannot be used, are told in `faults`."""
+    whole = _whole(split_pieces([data], file, faults))
+    if whole is not None:
+        _check_columns(whole.columns, file, whole.header_line, faults)
+    return whole
+
+
+def _whole(pieces: Iterable[Lines]) -> Lines | None:
+    every = list(pieces)
+    if not every:
+        return None
+    rows = [row for piece in every for row in piece.rows]
+    start = every[0].header_line + 1
+    return replace(every[0], rows=rows, numbers=range(start, start + len(rows)), ended=every[-1].ended)
+
+
+def split_pieces(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[Lines]:
+    """Take a run file apart, piece by piece; nothing, with the reason in `faults`, where no line names columns.
+
+    The first piece may have no rows. All share one header, which has what stands below the rows when the last was taken.
+    """
     header: dict[str, str] = {}
-    at = 0
-    while at < len(all_lines) and (all_lines[at].startswith((b"#", b"\xef\xbb\xbf#")) or not all_lines[at].strip()):
-        header |= _said(all_lines[at])
-        at += 1
-    if at == len(all_lines):
-        what = "the file is empty" if not data.strip() else "there is no line that names the columns"
-        faults.append(Problem(file, at, 0, what, f"a run starts with the line `{','.join(columns.REQUIRED)}`"))
-        return None
+    top: Lines | None = None
+    above, blank = 0, True
+    foot: list[bytes] = []  # it is one if no row follows
+    for lines, ended in _lines(blocks, file, faults):
+        if top is None:
+            at = next((at for at, line in enumerate(lines) if _names_columns(line)), len(lines))
+            for line in lines[:at]:
+                header |= _said(line)
+                blank = blank and not line.strip()
+            above += at
+            if at == len(lines):
+                continue
+            names = _names(lines[at], file, above + 1, faults)
+            if names is None:
+                return
+            top = Lines(file, header, above + 1, names, [], range(0), ended)
+            above += 1
+            lines = lines[at + 1 :]  # noqa: PLW2901 (the rest of them)
+        rows = [*foot, *lines]
+        end = len(rows)
+        while end and rows[end - 1].startswith(b"#") and len(rows) - end < _LONGEST_FOOT:
+            end -= 1
+        foot = rows[end:]
+        cut = not ended and not foot
+        yield replace(top, rows=rows[:end], numbers=range(above + 1, above + 1 + end), ended=not cut)
+        top = replace(top, opening=False)
+        above += end
+    if top is None and not faults:
+        what = "there is no line that names the columns" if above and not blank else "the file is empty"
+        faults.append(Problem(file, above, 0, what, f"a run starts with the line `{','.join(columns.REQUIRED)}`"))
+    for line in foot:
+        header |= _said(line)
+
+
+_LONGEST_FOOT = 1000
+"""Lines `# key: value` that may stand below the rows: the program writes ten."""
+
+
+def _lines(blocks: Iterable[bytes], file: str, faults: list[Problem]) -> Iterator[tuple[list[bytes], bool]]:
+    """Yield the lines of each block without their ends; at last the one that has no line end, with False."""
+    left = b""
+    number = 1
+    for block in blocks:
+        text = left + block
+        end = text.rfind(b"\n") + 1
+        left = text[end:]
+        if end:
+            lines = text[:end].replace(b"\r\n", b"\n")[:-1].split(b"\n")
+            number += len(lines)
+            yield lines, True
+        if len(left) > LONGEST_LINE:
+            what = f"the line has more than {LONGEST_LINE:,} characters"
+            faults.append(Problem(file, number, 0, what, "check which file it is"))
+            return
+    if left:
+        yield [left], False
+
+
+def _names_columns(line: bytes) -> bool:
+    return bool(line.strip()) and not line.startswith((b"#", b"\xef\xbb\xbf#"))
+
+
+def _names(line: bytes, file: str, number: int, faults: list[Problem]) -> tuple[str, ...] | None:
     bad: list[Problem] = []
-    text = decode(all_lines[at], file, bad)
-    if text is None:
-        faults.extend(replace(problem, line=at + 1) for problem in bad)
-        return None
-    names = tuple(name.strip() for name in text.split(","))
-    _check_columns(names, file, at + 1, faults)
-    rows = all_lines[at + 1 :]
-    while rows and rows[-1].startswith(b"#"):
-        header |= _said(rows.pop())
-    return Lines(file, header, at + 1, names, rows, range(at + 2, at + 2 + len(rows)), ended)
+    text = decode(line, file, bad)
+    faults.extend(replace(problem, line=number) for problem in bad)
+    return None if text is None else tuple(name.strip() for name in text.split(","))
 
 
 def split_head(path: Path, faults: list[Problem]) -> tuple[str, ...]:
     """Return the columns of a run file without reading its samples; none, with the reason in `faults`, where it has none."""
     try:
-        with path.open("rb") as file:
-            head = next((line for line in file if line.strip() and not line.startswith((b"#", b"\xef\xbb\xbf#"))), b"")
+        head = first_line(path)
     except OSError as error:
-        faults.append(Problem(str(path), 0, 0, f"cannot be read: {(error.strerror or '').lower()}", "check the file"))
+        faults.append(unreadable(path, error))
         return ()
     text = decode(head, str(path), faults)
     return () if not text else tuple(name.strip() for name in text.split(","))

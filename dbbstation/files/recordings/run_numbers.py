@@ -1,83 +1,138 @@
 """Numbers of a run file: lines to columns, time that rises, sizes that are plausible.
 
-Whole files are parsed by NumPy at once; line by line only to name what is wrong with a file that it refused.
+Pieces are parsed by NumPy at once; line by line only to name what is wrong with a piece that it refused.
 """
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import Problem
+from dbbstation.errors import MOST_FAULTS, Problem, few
 from dbbstation.files.recordings.run_lines import fault_of_line
 from dbbstation.trace import columns
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
     from numpy.typing import NDArray
 
     from dbbstation.files.recordings.run_lines import Lines
 
 
-def numbers_of(lines: Lines, faults: list[Problem]) -> dict[str, NDArray[np.float64]] | None:
-    """Every numeric column, shape (n,); None where something is wrong, with every fault added to `faults`."""
-    if not lines.rows:
-        faults.append(Problem(lines.file, lines.header_line, 0, "there are no samples below this line"))
-        return None
-    numbers = _parsed(lines)
-    if numbers is None:
-        faults += _faults_of_lines(lines)
-        return None
-    wrong = [*_faults_of_time(lines, numbers[columns.TIME]), *_faults_of_size(lines, numbers)]
-    faults += wrong
-    return None if wrong else numbers
+class Counted:
+    """Faults of a file: the first of them, and how many there are."""
+
+    def __init__(self) -> None:
+        self.first: list[Problem] = []
+        self.count = 0
+
+    def add(self, problems: Iterable[Problem]) -> None:
+        """Count faults and keep the first."""
+        for problem in problems:
+            self.count += 1
+            if len(self.first) <= MOST_FAULTS:
+                self.first.append(problem)
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are so many that the rest of the file need not be looked at."""
+        return self.count >= _MOST_COUNTED
+
+    def told(self) -> list[Problem]:
+        """Return the first faults, and how many follow."""
+        return few(self.first, self.count)
+
+
+_MOST_COUNTED = 10_000
+"""Faults that are counted: ten thousand bad lines tell no more than the file's first hundred."""
+
+
+class Numbers:
+    """The numeric columns of a run file, gathered piece by piece into 8 bytes a number.
+
+    Attributes:
+        faults: of its lines.
+    """
+
+    def __init__(self) -> None:
+        self.faults = Counted()
+        self._parts: dict[str, list[NDArray[np.float64]]] = {}
+        self._last: Lines | None = None
+
+    def take(self, lines: Lines) -> None:
+        """Add the rows of a piece."""
+        self._last = lines
+        if not lines.rows:
+            return
+        numbers = _parsed(lines)
+        if numbers is None:
+            self.faults.add(_faults_of_lines(lines))
+        elif not self.faults.count:
+            for name, values in numbers.items():
+                self._parts.setdefault(name, []).append(values)
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """Return every numeric column, shape (n,), and let go of the pieces; what is wrong is added to `faults`."""
+        last = self._last
+        if self.faults.count or last is None:
+            return {}
+        if not self._parts:
+            self.faults.add([Problem(last.file, last.header_line, 0, "there are no samples below this line")])
+            return {}
+        # One column after the other, so that no more than one stands twice in the memory.
+        joined = {name: np.concatenate(self._parts.pop(name)) for name in list(self._parts)}
+        count = len(joined[columns.TIME])
+        numbers = (
+            last.numbers if len(last.numbers) == count else range(last.header_line + 1, last.header_line + 1 + count)
+        )
+        self.faults.add(_faults_of_time(last.file, joined[columns.TIME], numbers))
+        self.faults.add(_faults_of_size(last.file, joined, numbers))
+        return joined
 
 
 def _parsed(lines: Lines) -> dict[str, NDArray[np.float64]] | None:
-    """Parse all lines at once; None where one of them is not as it should be."""
+    """Parse all rows of a piece at once; None where one of them is not as it should be."""
     if not lines.regular() or lines.bad_crc():
         return None
     names = [name for name in lines.columns if name in columns.COLUMNS]
     usecols = [lines.columns.index(name) for name in names]
-    text = io.BytesIO(b"\n".join(lines.rows))
     try:
-        table = np.loadtxt(text, delimiter=",", usecols=usecols, comments=None, ndmin=2, encoding="latin-1")
+        table = np.loadtxt(lines.rows, delimiter=",", usecols=usecols, comments=None, ndmin=2, encoding="latin-1")
     except ValueError:
         return None
     if len(table) != len(lines.rows) or not np.isfinite(table).all():
         return None
-    return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
+    return {name: table[:, i].copy() for i, name in enumerate(names)}
 
 
-def _faults_of_lines(lines: Lines) -> list[Problem]:
-    faults = [
-        Problem(lines.file, number, 0, *fault)
-        for number, row in zip(lines.numbers, lines.rows, strict=True)
-        if (fault := fault_of_line(row, lines.columns)) is not None
-    ]
-    what = "NumPy reads this file otherwise than line by line"
-    return faults or [Problem(lines.file, 0, 0, what, "write plain decimal numbers")]
+def _faults_of_lines(lines: Lines) -> Iterator[Problem]:
+    found = False
+    for number, row in zip(lines.numbers, lines.rows, strict=True):
+        fault = fault_of_line(row, lines.columns)
+        if fault is not None:
+            found = True
+            yield Problem(lines.file, number, 0, *fault)
+    if not found:
+        what = "NumPy reads this file otherwise than line by line"
+        yield Problem(lines.file, 0, 0, what, "write plain decimal numbers")
 
 
-def _faults_of_time(lines: Lines, t_s: NDArray[np.float64]) -> list[Problem]:
+def _faults_of_time(file: str, t_s: NDArray[np.float64], numbers: Sequence[int]) -> Iterator[Problem]:
     """Places where time does not rise."""
-    faults = []
-    for index in np.flatnonzero(np.diff(t_s) <= 0) + 1:
+    for index in (np.flatnonzero(t_s[1:] <= t_s[:-1]) + 1).tolist():
         what = "runs backwards" if t_s[index] < t_s[index - 1] else "stands still"
         what = f"time {what} here: t_s {t_s[index]:g} after {t_s[index - 1]:g}"
         remedy = "the file was reordered, or the clock was set while recording"
-        faults.append(Problem(lines.file, lines.numbers[index], 0, what, remedy))
-    return faults
+        yield Problem(file, numbers[index], 0, what, remedy)
 
 
-def _faults_of_size(lines: Lines, numbers: dict[str, NDArray[np.float64]]) -> list[Problem]:
+def _faults_of_size(file: str, found: dict[str, NDArray[np.float64]], numbers: Sequence[int]) -> Iterator[Problem]:
     """First value of each column that is larger than is plausible."""
-    faults = []
-    for name, values in numbers.items():
+    for name, values in found.items():
         column = columns.COLUMNS[name]
-        for index in np.flatnonzero(np.abs(values) > column.size)[:1]:
+        for index in np.flatnonzero((values > column.size) | (values < -column.size))[:1].tolist():
             what = f"{name} is {values[index]:g}, sizes up to {column.size:g} {column.unit} are plausible"
             remedy = f"check the unit, {column.unit} is needed"
-            faults.append(Problem(lines.file, lines.numbers[index], 0, what, remedy))
-    return faults
+            yield Problem(file, numbers[index], 0, what, remedy)

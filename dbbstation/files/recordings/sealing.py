@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.entries import run_entry
 from dbbstation.files.recordings.seal import (
     Seal,
@@ -112,7 +112,7 @@ def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
             what = f"the run file {file.value} is missing"
             faults.append(Problem(str(path), *place, what, "put it there or leave the run out"))
             continue
-        additions.append(_behind(run, "file", f"sha256: {hashlib.sha256(recorded.read_bytes()).hexdigest()}", text))
+        additions.append(_behind(run, "file", f"sha256: {digest_of(recorded)}", text))
         named.append(file.value)
     if faults:
         raise InputError(faults)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings import session_name
 from dbbstation.files.recordings.entries import (
     RunEntry,
@@ -269,7 +269,7 @@ def parse_session(
         faults += seal_faults(folder, file, seal, (session.machine, session.plan), entries)
     if machine is None or planned is None:
         return None
-    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    digest = digest_of(file)
     return SessionFolder(
         name=folder.resolve().name,
         folder=folder,

@@ -33,7 +33,7 @@ def check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: 
             if test not in plan.tests:
                 what = f"the plan has no test `{test}`: this is a run of another plan"
                 faults.append(document.problem((*location, "test"), what, f"its tests: {', '.join(plan.tests)}"))
-            elif direction in {"ccw", "cw"} and direction not in plan.tests[test].directions:
+            elif direction in ("ccw", "cw") and direction not in plan.tests[test].directions:
                 what = f"the plan does not run test {test} {direction}: this is a run of another plan"
                 faults.append(document.problem((*location, "direction"), what, "check plan and run"))
         _check_file(document, location, run, folder, faults)

@@ -78,9 +78,11 @@ def mounted_name(plan: Plan, test: str, mounting: int | None) -> str:
 
 def check_set_up_errors(document: YamlDocument, plan: Plan | None, faults: list[Problem]) -> None:
     """Check readings against runs, plan and each other, on the raw data: other faults must not hide these."""
-    mountings: dict[Any, list[Any]] = {}
+    mountings: dict[str, list[Any]] = {}
     for _, run in document.entries("runs"):
-        mountings.setdefault(run.get("test"), []).append(run.get("mounting"))
+        test = run.get("test")
+        if isinstance(test, str):
+            mountings.setdefault(test, []).append(run.get("mounting"))
     first: dict[str, Location] = {}
     for location, entry in document.entries("set_up_errors"):
         test, mounting = entry.get("test"), entry.get("mounting")
@@ -106,7 +108,7 @@ def check_set_up_errors(document: YamlDocument, plan: Plan | None, faults: list[
 def _no_such_mounting(
     document: YamlDocument, location: Location, test: str, mounting: object, there: list[Any]
 ) -> Problem:
-    numbers = ", ".join(str(number) for number in dict.fromkeys(there) if number is not None)
+    numbers = ", ".join(dict.fromkeys(str(number) for number in there if number is not None))
     if not there:
         return document.problem((*location, "test"), f"{dotted(location)}: test {test} has no run", "check the test")
     if mounting is None:

@@ -11,6 +11,7 @@ from dbbstation.files.atomic import remove_leftovers, write_bytes, write_folder,
 from dbbstation.files.formats.machine import machine_text
 from dbbstation.files.formats.plan import plan_text
 from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.gateway import content_of, digest_of
 from dbbstation.files.recordings.entries import Program, RunEntry, RunState
 from dbbstation.files.recordings.journal import RunWriter, run_header, run_line, run_name
 from dbbstation.files.recordings.lock import SessionLock
@@ -212,7 +213,7 @@ class SessionWriter:
         # A run that was sealed when the station died only lacks its hash.
         for run in writer.runs:
             if run.state is RunState.RECORDING and run.path.suffix == ".csv":
-                digest = hashlib.sha256(run.path.read_bytes()).hexdigest()
+                digest = digest_of(run.path)
                 found = part_entry(run.path)
                 counts = None if found is None else found.counts
                 writer._put(replace(run, state=RunState.COMPLETE, sha256=digest, counts=counts))
@@ -343,7 +344,7 @@ class SessionWriter:
         ):
             what = f"the session lists another run {found.label}"
             raise InputError([Problem(file, 1, 0, what, "give one of them another repeat")])
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        digest = digest_of(path)
         entry = replace(found, state=RunState.COMPLETE, sha256=digest)
         self._session.load(entry)
         taken = self._put(entry)
@@ -357,7 +358,7 @@ class SessionWriter:
             OutputError: another program has that name, or the disk refuses.
         """
         path = self._session.folder / PROGRAMS / name
-        if not (path.is_file() and path.read_bytes() == content):
+        if not (path.is_file() and content_of(path) == content):
             write_bytes(path, content)
         return Program(path, hashlib.sha256(content).hexdigest(), model_sha256)
 
@@ -382,7 +383,7 @@ class SessionWriter:
 
     def _write(self) -> None:
         file, session = self._session.folder / SESSION_FILE, self._session
-        if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() != session.sha256:
+        if file.is_file() and digest_of(file) != session.sha256:
             # Somebody wrote micrometer readings into it while runs come in; nothing else may be changed there.
             session = replace(session, set_up_errors=readings_in(file, session.plan))
         text = session_text(session.folder, session.names, session, session.runs)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
-import io
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.csv_rows import csv_rows
+from dbbstation.files.csv_rows import csv_rows, csv_text
 from dbbstation.files.formats.number_language import PLAIN, NumberLanguage
-from dbbstation.files.source_text import decode, read_bytes, shortened
+from dbbstation.files.source_text import LARGEST_TABLE, decode, read_bytes, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -76,7 +74,7 @@ def read_table(path: Path, needed: Iterable[str] = (), numbers: NumberLanguage |
         InputError: it cannot be read, has no rows, lacks a column (and which it may be instead), or has lines of another width.
     """
     faults: list[Problem] = []
-    data = read_bytes(path, faults)
+    data = read_bytes(path, faults, LARGEST_TABLE)
     text = None if data is None else decode(data, str(path), faults)
     if text is None:
         raise InputError(faults)
@@ -131,12 +129,8 @@ def missing_column(name: str, names: Sequence[str], file: str, line: int) -> Pro
 
 def table_csv(names: Sequence[str], columns: Sequence[Sequence[object]]) -> str:
     """CSV text of columns of one length; numbers with nine significant digits, texts as they are."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(names)
-    for row in zip(*columns, strict=True):
-        writer.writerow([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row])
-    return out.getvalue()
+    rows = ([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row] for row in zip(*columns, strict=True))
+    return csv_text([names, *rows])
 
 
 def _faults_of_names(names: list[str], needed: Iterable[str], file: str, line: int) -> list[Problem]:
@@ -163,7 +157,8 @@ def _numbers(cells: Sequence[str], language: NumberLanguage) -> NDArray[np.float
     plain: Sequence[str] = cells
     if language.decimal != PLAIN.decimal and not any(PLAIN.decimal in cell for cell in cells):
         plain = [cell.replace(language.decimal, PLAIN.decimal) for cell in cells]
-    if language.decimal == PLAIN.decimal or plain is not cells:
+    written = "".join(plain)
+    if (language.decimal == PLAIN.decimal or plain is not cells) and written.isascii() and "_" not in written:
         try:
             return np.array(plain, dtype=np.float64)
         except ValueError:

@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
-from dbbstation.errors import Problem
+from dbbstation.errors import MOST_FAULTS, Problem, few
+from dbbstation.files.source_text import shortened
 from dbbstation.files.yaml.text import Location, YamlDocument, load_yaml
 
 FORMATS = {
@@ -107,7 +108,9 @@ def validate(document: YamlDocument, schema: type[S], faults: list[Problem]) -> 
     try:
         return schema.model_validate(document.data)
     except ValidationError as error:
-        faults.extend(_problem(document, schema, detail) for detail in error.errors(include_url=False))
+        # Naming what a key may have been meant for takes a millisecond: for the first few only.
+        details = sorted(error.errors(include_url=False), key=lambda detail: _place(document, detail))
+        faults += few([_problem(document, schema, detail) for detail in details[: MOST_FAULTS + 1]], len(details))
         return None
 
 
@@ -152,7 +155,7 @@ def _newer_keys(document: YamlDocument, schema: type[Schema]) -> list[Problem]:
             what = f"the key `{location[-1]}` came with {name}/{since}, and this file is {given}"
             remedy = f"write `format: {name}/{since}`"
             found.append(document.problem(location, what, remedy, at_key=True))
-    return found
+    return few(found)
 
 
 def _has_format(document: YamlDocument, known: Sequence[str], faults: list[Problem]) -> bool:
@@ -168,13 +171,13 @@ def _has_format(document: YamlDocument, known: Sequence[str], faults: list[Probl
         return True
     given_name = str(given).partition("/")[0]
     if given_name == name:
-        what = f"`{given}` is a version that this program does not know"
+        what = f"`{shortened(str(given))}` is a version that this program does not know"
         remedy = f"it reads {', '.join(known)}; a newer dbbstation reads the file"
     elif given_name in FORMATS:
-        what = f"this file is {FORMATS[given_name]} (`{given}`), {wanted} (`{expected}`) was expected"
+        what = f"this file is {FORMATS[given_name]} (`{shortened(str(given))}`), {wanted} (`{expected}`) was expected"
         remedy = "check which file is given where"
     else:
-        what, remedy = f"`{given}` is no format that this program knows", f"write `format: {expected}`"
+        what, remedy = f"`{shortened(str(given))}` is no format that this program knows", f"write `format: {expected}`"
     faults.append(document.problem(("format",), what, remedy))
     return False
 
@@ -190,7 +193,7 @@ def _problem(document: YamlDocument, schema: type[Schema], detail: ErrorDetails)
         allowed = list(keys_at(schema, location[:-1]))
         near = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.6)
         remedy = f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(sorted(allowed))}"
-        what = f"{_within(location[:-1])}the key `{location[-1]}` is not known"
+        what = f"{_within(location[:-1])}the key `{shortened(str(location[-1]))}` is not known"
         return document.problem(location, what, remedy, at_key=True)
     what, remedy = _in_words(kind, given, context, detail["msg"])
     return document.problem(location, f"{dotted(location)}: {what}", remedy)
@@ -218,11 +221,17 @@ def _in_words(kind: str, given: object, context: dict[str, Any], message: str) -
     return message[:1].lower() + message[1:], ""
 
 
+def _place(document: YamlDocument, detail: ErrorDetails) -> tuple[int, int]:
+    """Where a complaint of pydantic belongs, as a line and a column."""
+    location = _known_part(document, detail["loc"])
+    return document.key_places.get(location) or document.value_places.get(location, (0, 0))
+
+
 def dotted(location: Location) -> str:
     """Write a location as people do: `tests[3].ball`."""
     text = ""
     for step in location:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else str(step)
+        text += f"[{step}]" if isinstance(step, int) else f".{shortened(step)}" if text else shortened(step)
     return text
 
 
@@ -236,8 +245,8 @@ def _shown(value: object) -> str:
     if isinstance(value, dict | tuple):
         return "`key: value` entries" if isinstance(value, dict) else f"a list of {len(value)}"
     if isinstance(value, str):
-        return f"the text `{value}`"
-    return f"`{str(value).lower() if isinstance(value, bool) else value}`"
+        return f"the text `{shortened(value)}`"
+    return f"`{str(value).lower() if isinstance(value, bool) else shortened(str(value))}`"
 
 
 def _known_part(document: YamlDocument, location: tuple[int | str, ...]) -> Location:

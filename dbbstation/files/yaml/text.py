@@ -6,15 +6,20 @@ tags, no merge keys, no key twice. Sequences become tuples, times stay text: the
 
 from __future__ import annotations
 
+import functools
+import re
+import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.composer import Composer
+from ruamel.yaml.error import MarkedYAMLError, StreamMark, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
+from ruamel.yaml.scanner import Scanner
 
-from dbbstation.errors import Problem
+from dbbstation.errors import Problem, few
 from dbbstation.files.source_text import decode, read_bytes, shortened
 
 if TYPE_CHECKING:
@@ -24,6 +29,7 @@ Location = tuple[str | int, ...]
 """Keys and indices from the top of a document down to a value."""
 
 _TAG = "tag:yaml.org,2002:"
+_HALF = re.compile("[\ud800-\udfff]")
 _PLAIN_TEXT = {"str", "timestamp", "value"}
 
 
@@ -64,11 +70,24 @@ class YamlDocument:
         return [((*location, key), entry) for key, entry in pairs if isinstance(entry, dict)]
 
 
-LARGEST_BYTES = 20_000_000
-"""Largest YAML file that is read: plans, models and settings have some hundred kilobytes at the most."""
+LARGEST_BYTES = 10_000_000
+"""Largest YAML file that is read: twice what `MOST_NODES` numbers of full precision take."""
 
-MOST_VALUES = 500_000
-"""Values that a document may have, aliases written out: nine aliases of nine aliases and so on would fill any memory."""
+MOST_NODES = 250_000
+"""Keys and values that a document may have. A model with 490 parameters and their whole covariance has as many, a session
+of ten thousand runs too; both are ten times what anybody has recorded. Reading them takes ten seconds and 250 MB."""
+
+MOST_VALUES = MOST_NODES
+"""Values, aliases written out: nine aliases of nine aliases and so on would fill any memory."""
+
+DEEPEST = 50
+"""Lists and mappings that may stand in one another: the formats have eight."""
+
+LONGEST_TAG = 1000
+"""Characters of a tag. None is allowed, but each is read to its end first."""
+
+LONGEST_S = 60.0
+"""Time that a document may take [s]: six times what `MOST_NODES` take, for a slow computer."""
 
 
 def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
@@ -80,13 +99,32 @@ def load_yaml(path: Path, faults: list[Problem]) -> YamlDocument | None:
 
 def parse_yaml(text: str, file: str, faults: list[Problem]) -> YamlDocument | None:
     """Parse YAML text; None with the reasons added to `faults` where that is impossible."""
+    document, found = _parsed(text, file)
+    faults += found
+    return document
+
+
+# Whoever looks which format a file has reads it again at once.
+@functools.lru_cache(maxsize=1)
+def _parsed(text: str, file: str) -> tuple[YamlDocument | None, tuple[Problem, ...]]:
+    faults: list[Problem] = []
+    return _composed(text, file, faults), tuple(faults)
+
+
+def _composed(text: str, file: str, faults: list[Problem]) -> YamlDocument | None:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = _Counting
+    yaml.Scanner = _BoundedScanner
     try:
-        root = YAML(typ="safe", pure=True).compose(text)
+        root = yaml.compose(text)
     except YAMLError as error:
         faults.append(_syntax_problem(error, text, file))
         return None
-    except RecursionError:
-        faults.append(Problem(file, 0, 0, "brackets or lists are nested too deeply", "check that it is the right file"))
+    except ValueError as error:  # a version of YAML with a thousand digits
+        faults.append(Problem(file, 1, 1, f"not YAML: {error}", "compare it with the example of its format"))
+        return None
+    except _OverBudgetError as error:
+        faults.append(Problem(file, *error.place, error.what, "check that it is the right file"))
         return None
     if root is None:
         faults.append(Problem(file, 1, 1, "the file is empty", "start it with `format: ` and the format's name"))
@@ -94,9 +132,51 @@ def parse_yaml(text: str, file: str, faults: list[Problem]) -> YamlDocument | No
     walk = _Walk(file)
     data = walk.value(root, ())
     if walk.faults:
-        faults.extend(walk.faults)
+        faults.extend(few(walk.faults))
         return None
     return YamlDocument(file, data, walk.value_places, walk.key_places)
+
+
+class _OverBudgetError(Exception):
+    """A document is beyond a budget at a line and column, counted from 1."""
+
+    def __init__(self, what: str, mark: StreamMark) -> None:
+        super().__init__(what)
+        self.what = what
+        self.place = (mark.line + 1, mark.column + 1)
+
+
+class _BoundedScanner(Scanner):
+    """Refuses tags longer than anybody writes: the time that ruamel.yaml takes for one grows with its square."""
+
+    def scan_tag(self) -> Any:  # noqa: ANN401 - as in ruamel.yaml
+        if not self.reader.prefix(LONGEST_TAG).split(maxsplit=1)[0][LONGEST_TAG - 1 :]:
+            return super().scan_tag()
+        raise _OverBudgetError(f"a tag has more than {LONGEST_TAG:,} characters", self.reader.get_mark())
+
+
+class _Counting(Composer):
+    """Composes nodes and counts them, their depth and the time while it does so: before they fill the memory."""
+
+    def __init__(self, loader: Any = None) -> None:  # noqa: ANN401 - a class of ruamel.yaml without a name of its own
+        super().__init__(loader)
+        self._nodes = 0
+        self._depth = 0
+        self._until_s = time.monotonic() + LONGEST_S
+
+    def compose_node(self, parent: Node | None, index: Any) -> Node | None:  # noqa: ANN401 - as in ruamel.yaml
+        mark = self.parser.peek_event().start_mark
+        self._nodes += 1
+        self._depth += 1
+        if self._nodes > MOST_NODES:
+            raise _OverBudgetError(f"there are more than {MOST_NODES:,} keys and values", mark)
+        if self._depth > DEEPEST:
+            raise _OverBudgetError("brackets or lists are nested too deeply", mark)
+        if time.monotonic() > self._until_s:
+            raise _OverBudgetError(f"reading this far took {LONGEST_S:g} s", mark)
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
 
 
 def _syntax_problem(error: YAMLError, text: str, file: str) -> Problem:
@@ -159,7 +239,11 @@ class _Walk:
             key = self._scalar(key_node)
             if key in data:
                 line = self.key_places[*location, key][0]
-                self._fault(key_node, f"the key `{key}` stands here a second time, first in line {line}", "remove one")
+                self._fault(
+                    key_node,
+                    f"the key `{shortened(str(key))}` stands here a second time, first in line {line}",
+                    "remove one",
+                )
                 continue
             self.key_places[*location, key] = _place(key_node)
             data[key] = self.value(value_node, (*location, key))
@@ -168,6 +252,9 @@ class _Walk:
     def _scalar(self, node: ScalarNode) -> Any:  # noqa: ANN401 - the type stands in the file
         kind, text = (node.tag or "").removeprefix(_TAG), node.value
         if kind in _PLAIN_TEXT:
+            if not text.isascii() and _HALF.search(text):
+                self._fault(node, "half a surrogate pair is no character", "write the whole character")
+                return None
             return text
         if kind == "null":
             return None
@@ -178,7 +265,9 @@ class _Walk:
         if kind == "merge":
             self._fault(node, "merge keys `<<` are not allowed", "write the entries out")
         else:
-            self._fault(node, f"the tag `{node.tag}` is not allowed", "remove it, values need no tags here")
+            self._fault(
+                node, f"the tag `{shortened(str(node.tag))}` is not allowed", "remove it, values need no tags here"
+            )
         return None
 
     def _number(self, node: ScalarNode, kind: str, digits: str) -> float | int | None:
@@ -197,7 +286,9 @@ class _Walk:
 
     def _untagged(self, node: Node, kind: str) -> None:
         if node.tag != _TAG + kind:
-            self._fault(node, f"the tag `{node.tag}` is not allowed", "remove it, values need no tags here")
+            self._fault(
+                node, f"the tag `{shortened(str(node.tag))}` is not allowed", "remove it, values need no tags here"
+            )
 
     def _fault(self, node: Node, what: str, remedy: str) -> None:
         self.faults.append(Problem(self.file, *_place(node), what, remedy))

@@ -348,7 +348,7 @@ def test_aliases_of_aliases_end_in_a_message(tmp_path):
     for before, name in pairwise("abcdefghi"):
         lines.append(f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]")
     (what,) = _faults(tmp_path, "\n".join(lines))
-    assert "500,000 values" in what
+    assert "250,000 values" in what
 
 
 def test_brackets_without_end_end_in_a_message(tmp_path):

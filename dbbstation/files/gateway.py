@@ -1,0 +1,159 @@
+"""The one way in for every file that the program reads: regular files only, counted as they are read.
+
+A pipe would be waited for and a device never ends; a file may grow while it is read. Whoever needs a file's bytes asks
+here, and `tests/files/test_gateway.py` finds who does not. What a file is refused for comes as an `OSError` whose
+`strerror` says it, like everything else that the system refuses.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import stat
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from io import FileIO
+    from pathlib import Path
+
+LARGEST_BYTES = 2_000_000_000
+"""Largest file that is read: an hour at a hundred thousand readings a second makes about as much."""
+
+BLOCK_BYTES = 1 << 20
+"""Bytes that are read at once: a thousandth of the largest file, and little beside what the program itself takes."""
+
+# Opening must not wait for whoever writes into a pipe, nor become the terminal that interrupts the program. Windows has
+# neither, and changes line ends unless told not to.
+_FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY"))
+
+
+class NotRegularError(OSError):
+    """A pipe, a socket or a device stands where a file is needed."""
+
+
+class TooLargeError(OSError):
+    """A file has more bytes than are read."""
+
+
+class Source:
+    """A regular file that is open.
+
+    Args:
+        file: unbuffered, open for reading.
+        path: as named in messages.
+        size: bytes that it had when it was opened.
+        largest: bytes that are read at the most.
+    """
+
+    def __init__(self, file: FileIO, path: Path, size: int, largest: int) -> None:
+        self._file = file
+        self._path = path
+        self._size = size
+        self._left = largest
+        self._largest = largest
+
+    def read(self, most: int = BLOCK_BYTES) -> bytes:
+        """Return the next bytes, `most` of them at the most; none at the end.
+
+        Raises:
+            TooLargeError: it goes on beyond the largest size.
+            OSError: it cannot be read.
+        """
+        data = self._file.read(min(most, self._left + 1))
+        self._left -= len(data)
+        if self._left < 0:
+            raise TooLargeError(errno.EFBIG, f"the file goes on beyond {self._largest:,} bytes", str(self._path))
+        return data
+
+    def blocks(self) -> Iterator[bytes]:
+        """Yield the file block by block.
+
+        Raises:
+            OSError: as `read`.
+        """
+        while data := self.read():
+            yield data
+
+    def content(self) -> bytes:
+        """Return the whole file.
+
+        Raises:
+            OSError: as `read`.
+        """
+        # The whole at once, without a second copy: it grows on only where it grew since it was opened.
+        first = self.read(self._size + 1)
+        rest = list(self.blocks())
+        return b"".join([first, *rest]) if rest else first
+
+
+@contextmanager
+def opened(path: Path, largest: int = LARGEST_BYTES) -> Iterator[Source]:
+    """Open a regular file for reading.
+
+    Args:
+        path: of the file.
+        largest: bytes that are read at the most.
+
+    Raises:
+        NotRegularError: it is a pipe, a socket or a device.
+        TooLargeError: it has more bytes than that.
+        OSError: there is no such file, it is a folder, or the system refuses it.
+    """
+    _check(path, _stat(path), largest)  # some devices do something when they are opened
+    with os.fdopen(os.open(path, _FLAGS), "rb", buffering=0) as file:
+        found = os.fstat(file.fileno())  # it may be another one by now
+        _check(path, found, largest)
+        yield Source(file, path, found.st_size, largest)
+
+
+def content_of(path: Path, largest: int = LARGEST_BYTES) -> bytes:
+    """Return a file's bytes.
+
+    Raises:
+        OSError: as `opened`, and as `Source.read`.
+    """
+    with opened(path, largest) as source:
+        return source.content()
+
+
+def head_of(path: Path, most: int) -> bytes:
+    """Return a file's first bytes, `most` of them at the most.
+
+    Raises:
+        OSError: as `opened`, and as `Source.read`.
+    """
+    with opened(path) as source:
+        return source.read(most)
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file in hexadecimal, read block by block.
+
+    Raises:
+        OSError: as `opened`, and as `Source.read`.
+    """
+    digest = hashlib.sha256()
+    with opened(path) as source:
+        for block in source.blocks():
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def _stat(path: Path) -> os.stat_result:
+    try:
+        return path.stat()
+    except ValueError as error:  # a name that no file can have: with a zero byte or half a surrogate pair
+        raise FileNotFoundError(errno.ENOENT, "there is no such file", str(path)) from error
+
+
+def _check(path: Path, found: os.stat_result, largest: int) -> None:
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "this is a folder, a file is needed", str(path))
+    if not stat.S_ISREG(found.st_mode):
+        raise NotRegularError(errno.EINVAL, "this is a pipe or a device, a file is needed", str(path))
+    if found.st_size > largest:
+        what = f"the file has {found.st_size:,} bytes, at most {largest:,} are read"
+        raise TooLargeError(errno.EFBIG, what, str(path))

@@ -1,0 +1,38 @@
+r"""Text that other people typed, made safe for a terminal: control characters are shown, not obeyed.
+
+A name, a reason or a cell of a table may hold `\x1b]0;…`, which renames the window, `\r`, which writes over what stood
+before, or marks that turn the direction of writing, behind which words change places.
+"""
+
+from __future__ import annotations
+
+_CONTROL = [*range(0x20), *range(0x7F, 0xA0)]
+"""C0 and C1 controls and delete [ECMA-48]."""
+
+_DIRECTION = [0x061C, 0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
+"""Marks and overrides of the direction of writing [Unicode TR9]."""
+
+_LINES = [0x2028, 0x2029]
+"""Ends of lines and paragraphs."""
+
+_HALVES = range(0xD800, 0xE000)
+"""Halves of surrogate pairs: no encoding can write them."""
+
+
+def _shown(code: int) -> str:
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"  # noqa: PLR2004 (two digits)
+
+
+_ONE_LINE = {code: _shown(code) for code in (*_CONTROL, *_DIRECTION, *_LINES, *_HALVES)}
+TEXT = {code: shown for code, shown in _ONE_LINE.items() if chr(code) not in "\n\t"}
+"""What stands for each character that a text of several lines must not hold, as `str.translate` takes it."""
+
+
+def printable(text: str) -> str:
+    r"""Return a text of any number of lines with `\x1b` in place of an escape character, and so on; `\n` and `\t` stay."""
+    return text if text.isascii() and text.isprintable() else text.translate(TEXT)
+
+
+def on_one_line(text: str) -> str:
+    r"""Return a text as `printable` does, with `\x0a` in place of an end of a line: a name, a cell of a table."""
+    return text if text.isascii() and text.isprintable() else text.translate(_ONE_LINE)

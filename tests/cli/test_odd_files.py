@@ -1,0 +1,130 @@
+"""Files that no program wrote: a list where keys belong, digits of another script, columns of another size. A message each."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+import zlib
+
+import pytest
+
+from dbbstation.files.shipped import shipped_folder
+from tests.cli.conftest import call
+
+FIXTURES = shipped_folder("fixtures")
+
+
+@pytest.fixture
+def session(tmp_path):
+    return shutil.copytree(FIXTURES / "sessions" / "small", tmp_path / "session")
+
+
+def told(*arguments) -> str:
+    outcome = call(*arguments)
+    assert outcome.code == 1
+    assert "fault of dbbstation" not in outcome.err
+    return outcome.err
+
+
+@pytest.mark.parametrize("text", ["[1, 2]", "word", "null", "12", "- a: 1"])
+@pytest.mark.parametrize("command", [["check"], ["session", "list"], ["circles"], ["export", "--out", "e.csv"]])
+def test_a_session_file_that_holds_no_keys(session, text, command):
+    (session / "session.yaml").write_text(text + "\n", encoding="utf-8")
+    assert "session.yaml:1:1: the file holds no `key: value` lines" in told(*command, session)
+
+
+@pytest.mark.parametrize("value", ["{a: 1}", "[ccw]", "null", "1.5", "[{a: []}]"])
+@pytest.mark.parametrize("key", ["direction", "test", "repeat", "file", "state"])
+def test_a_run_with_a_value_of_another_kind(session, key, value):
+    path = session / "session.yaml"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(re.sub(rf"\b{key}: [^,}}]+", f"{key}: {value}", text, count=1), encoding="utf-8")
+    assert f"runs[0].{key}" in told("check", session)
+
+
+@pytest.mark.parametrize("cell", ["１２", "١", "1_0"])
+@pytest.mark.parametrize(
+    ("head", "rows"),
+    [
+        ("t_s,position_mm,force_n", ["0.0,{},1", "0.1,1,1"]),
+        ("t_s,length_mm", ["0.0,{}", "0.1,150"]),
+        ("x_mm,measured,simulated", ["1,{},1"]),
+        ("x_mm,y_mm,z_mm,a_deg,b_deg,c_deg", ["{},0,-1008,0,0,0"]),
+    ],
+)
+def test_digits_of_another_script_are_no_number(tmp_path, head, rows, cell):
+    file = tmp_path / "file.csv"
+    file.write_text("\n".join([head, *rows]).format(cell) + "\n", encoding="utf-8")
+    command = ["check", file]
+    if "measured" in head:
+        command = ["mismatch", file, "--measured", "measured", "--simulated", "simulated"]
+    elif "a_deg" in head:
+        model = FIXTURES / "models" / "small.yaml"
+        command = ["predict", "--model", model, "--poses", file, "--out", tmp_path / "out.csv"]
+    assert f"{file}:2" in told(*command)
+
+
+@pytest.mark.parametrize("t_s", ["9" * 400, "1e3", "１", "9" * 12])
+def test_times_of_a_byte_log_that_are_none(tmp_path, t_s):
+    log = tmp_path / "log.txt"
+    log.write_text(f"# dbb-byte-log/1\n# instrument: mahr-c1202\n{t_s} < 41\n0.2 < 42\n", encoding="utf-8")
+    for more in ([], ["--json"]):
+        assert f"{log}:3:1: this line of the byte log cannot be read" in told("replay", log, *more)
+
+
+def scaled(tmp_path, column, power):
+    """The first rows of the table with a column scaled by a power of ten."""
+    lines = (FIXTURES / "tables" / "axis.csv").read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",") for line in lines if not line.startswith("#")][:121]
+    k = rows[0].index(column)
+    for row in rows[1:]:
+        row[k] += f"e{power}"
+    file = tmp_path / "table.csv"
+    file.write_text("\n".join(map(",".join, rows)) + "\n", encoding="utf-8")
+    return ["mismatch", file, "--measured", "measured_mm", "--simulated", "simulated_mm", "--no-held-out", "--json"]
+
+
+@pytest.mark.parametrize("power", [-320, -160, 160, 300])
+@pytest.mark.parametrize("column", ["measured_mm", "simulated_mm", "t_s", "load_n"])
+def test_a_column_of_numbers_that_no_quantity_has(tmp_path, column, power):
+    assert f"{column} goes up to" in told(*scaled(tmp_path, column, power))
+
+
+@pytest.mark.parametrize(("column", "power"), [("simulated_mm", 3), ("simulated_mm", 12), ("measured_mm", -12)])
+def test_a_simulation_in_another_unit(tmp_path, column, power):
+    assert "in one unit" in told(*scaled(tmp_path, column, power))
+
+
+@pytest.mark.parametrize(("column", "power"), [("load_n", -30), ("load_n", 30), ("oil_temp_c", 9)])
+def test_a_variable_in_any_unit_is_compared(tmp_path, column, power):
+    outcome = call(*scaled(tmp_path, column, power))
+    assert outcome.code == 0, outcome.err
+
+
+def test_a_direction_without_a_circle_leaves_a_row_of_its_own(session):
+    run = session / "runs" / "a-cw-2.csv"
+    before = hashlib.sha256(run.read_bytes()).hexdigest()
+    lines = run.read_text(encoding="utf-8").splitlines()
+    at = next(at for at, line in enumerate(lines) if line.startswith("t_s"))
+    assert lines[at].startswith("t_s,length_mm,")
+    assert lines[at].endswith(",crc")
+    for k in range(at + 1, len(lines)):
+        t_s, _, *others, _ = lines[k].split(",")
+        body = ",".join([t_s, "150.0", *others])
+        lines[k] = f"{body},{zlib.crc32(body.encode()):08x}"
+    run.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    file = session / "session.yaml"
+    after = hashlib.sha256(run.read_bytes()).hexdigest()
+    file.write_text(file.read_text(encoding="utf-8").replace(before, after), encoding="utf-8")
+    outcome = call("circles", session, "--findings", "--budget")
+    assert outcome.code == 0, outcome.err
+    row = next(line.split() for line in outcome.out.splitlines() if line.startswith("a") and " cw " in line)
+    assert row == ["a", "cw", "2", *["-"] * 13]
+
+
+def test_half_a_surrogate_pair_is_no_character(tmp_path):
+    path = tmp_path / "machine.yaml"
+    text = (FIXTURES / "machines" / "reference.yaml").read_text(encoding="utf-8")
+    path.write_text(re.sub(r"name: .*", r'name: "\\ud800"', text, count=1), encoding="utf-8")
+    assert "half a surrogate pair is no character" in told("check", path)

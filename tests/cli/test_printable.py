@@ -1,0 +1,156 @@
+"""What other people typed gives no orders: not to the terminal that shows it, not to the spreadsheet that opens it."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import io
+import shutil
+from pathlib import Path
+
+import pytest
+
+import dbbstation
+from dbbstation.files.csv_rows import csv_text
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.printable import on_one_line, printable
+from tests.cli.conftest import call
+
+PACKAGE = Path(dbbstation.__file__).parent
+TITLE = "\x1b]0;owned\x07"
+FORMULA = "=HYPERLINK(1)"
+
+PRINT = {
+    "cli/output.py": "is the one way out",
+    "cli/progress.py": "draws bars over themselves, whose labels are the program's own words",
+    "cli/asking.py": "asks, with escaped questions",
+    "cli/import_.py": "asks, with an escaped question",
+}
+"""Files that write to a terminal themselves, each with its reason."""
+
+TABLES = {
+    "files/csv_rows.py": "is the one writer",
+    "files/recordings/journal.py": "writes runs, whose columns are numbers and words of the program",
+    "files/recordings/run_lines.py": "names the program's own columns in a message",
+    "files/recordings/drive_csv.py": "writes numbers under the program's own names",
+}
+"""Files that write CSV themselves, each with its reason."""
+
+
+def prints(tree: ast.AST) -> list[int]:
+    """Lines that write to a terminal: `print`, functions of click, and the streams."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and ast.unparse(node) in {
+            *(
+                f"click.{name}"
+                for name in ("echo", "secho", "prompt", "confirm", "progressbar", "echo_via_pager", "style")
+            ),
+            *(f"sys.{stream}.{name}" for stream in ("stdout", "stderr") for name in ("write", "writelines", "buffer")),
+        }:
+            found.append(node.lineno)
+        if isinstance(node, ast.Name) and node.id == "print":
+            found.append(node.lineno)
+    return sorted(found)
+
+
+def writes_tables(tree: ast.AST) -> list[int]:
+    """Lines that write CSV: its module, NumPy's function, and cells joined by a separator."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and ast.unparse(node) in {"csv.writer", "csv.DictWriter", "np.savetxt"}:
+            found.append(node.lineno)
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in {"','.join", "';'.join", r"'\t'.join"}:
+            found.append(node.lineno)
+    return sorted(found)
+
+
+def found_in_package(search) -> dict[str, list[int]]:
+    every = {
+        path.relative_to(PACKAGE).as_posix(): search(ast.parse(path.read_text(encoding="utf-8")))
+        for path in PACKAGE.rglob("*.py")
+    }
+    return {name: lines for name, lines in every.items() if lines}
+
+
+@pytest.mark.parametrize(("search", "allowed"), [(prints, PRINT), (writes_tables, TABLES)], ids=["terminal", "tables"])
+def test_nobody_goes_round_the_escaper(search, allowed):
+    found = found_in_package(search)
+    assert {name: lines for name, lines in found.items() if name not in allowed} == {}
+    assert set(allowed) - set(found) == set()
+
+
+def test_the_searches_find_ways_round():
+    assert prints(ast.parse("print(1)\nclick.echo(2)\nsys.stdout.write(3)\nsays = click.secho")) == [1, 2, 3, 4]
+    assert writes_tables(ast.parse("csv.writer(f)\n','.join(a)\n', '.join(b)\nnp.savetxt(f, x)")) == [1, 2, 4]
+
+
+def test_controls_are_shown_and_text_stays():
+    every = "".join(map(chr, [*range(0xA1), 0x202E, 0x2066, 0x2028, 0xD800]))
+    for made in (printable(every), on_one_line(every)):
+        assert all(char.isprintable() or char in "\n\t" or char == "\xa0" for char in made)
+        made.encode()
+    assert printable("a\nb\tµ 測定 é") == "a\nb\tµ 測定 é"
+    assert on_one_line("a\nb") == r"a\x0ab"
+    assert printable(TITLE) == r"\x1b]0;owned\x07"
+    assert printable("\u202eab") == r"\u202eab"
+
+
+@pytest.mark.parametrize(
+    "cell", ["=1+1", "+cmd", "-cmd|x", "@SUM(1)", "\t=1", "\r=1", "＝1", " =1", "-", "-inf", "a", "", "'"]
+)
+def test_a_text_begins_no_formula(cell):
+    (row,) = csv.reader(io.StringIO(csv_text([[cell]]), newline=""))
+    assert row[0].endswith(printable(cell))
+    assert row[0] == "-" or row[0].strip()[:1] not in set("=+-@＝")
+
+
+@pytest.mark.parametrize("number", ["-1", "+1.5", "-1e-5", "-.5", "1", -1.0, -3, None])
+def test_a_number_stays_a_number(number):
+    assert csv_text([[number, "x"]]) == f"{'' if number is None else number},x\n"
+
+
+@pytest.fixture
+def session(tmp_path):
+    """A session with orders in the name of its machine, in the names of its columns and in its folder's own name."""
+    folder = tmp_path / f"{FORMULA}"
+    shutil.copytree(shipped_folder("fixtures") / "sessions" / "small", folder)
+    machine = folder / "machine.yaml"
+    text = machine.read_text(encoding="utf-8")
+    assert "name: " in text
+    lines = [f'name: "{FORMULA}\\e]0;owned\\a"' if line.startswith("name: ") else line for line in text.splitlines()]
+    machine.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        ["check", "{s}/machine.yaml"],
+        ["check", "{s}"],
+        ["session", "list", "{s}"],
+        ["session", "reject", "{s}", "a-ccw-1", "--reason", TITLE],
+        ["circles", "{s}"],
+        ["history", "{t}"],
+        ["check", "{s}/" + TITLE],
+        [TITLE],
+        ["check", "--" + TITLE],
+    ],
+    ids=lambda line: ascii(" ".join(line)),
+)
+def test_no_command_passes_orders_on_to_the_terminal(session, line):
+    outcome = call(*(word.format(s=session, t=session.parent) for word in line))
+    assert not set("\x1b\x07\x9b") & set(outcome.out + outcome.err)
+
+
+@pytest.mark.parametrize(
+    "line", [["history", "{t}", "--csv", "{o}"], ["circles", "{s}", "--csv", "{o}"], ["export", "{s}", "--out", "{o}"]]
+)
+def test_no_table_holds_a_formula(session, tmp_path, line):
+    out = tmp_path / "out.csv"
+    outcome = call(*(word.format(s=session, t=session.parent, o=out) for word in line))
+    assert outcome.code == 0, outcome.err
+    text = out.read_text(encoding="utf-8")
+    assert "HYPERLINK" in text
+    cells = [cell for row in csv.reader(io.StringIO(text, newline="")) for cell in row]
+    assert not [cell for cell in cells if cell.startswith(("=", "+", "@"))]

@@ -73,6 +73,19 @@ def read_run(path: Path, *, sha256: str = "") -> RunFile:
     return parse_run(data, str(path), digest, partial=path.suffix == PART)
 
 
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    faults: list[Problem] = []
+    data = read_bytes(path, faults, is_input=False)
+    if data is None:
+        raise InputError(faults)
+    return hashlib.sha256(data).hexdigest()
+
+
 def sealed_or_part(path: Path) -> Path:
     """Return where a run's file is: it may have been sealed and renamed just before the station died."""
     sealed = path.with_suffix("") if path.suffix == PART else path

@@ -36,6 +36,7 @@ def judge(folder: Path, name: str, reason: str, begin: int, told: int) -> None:
         os.write(told, b"done\n")
 
 
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize(
     "times", [pytest.param(20, marks=pytest.mark.slow), pytest.param(500, marks=pytest.mark.nightly)]
 )

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import note_known
-from dbbstation.files.kept import Kept, Stamp, stamp_of
+from dbbstation.files.kept import Kept, Noted, Stamp, stamp_of
+from dbbstation.files.recordings.anchors import SHORTEST, links_of
 from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
 from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.history.order import date_faults
@@ -76,7 +77,9 @@ def load_history(
         sessions = reading.every(found.sessions, _session_of, _session_data, _processes_for)
         models = reading.every(found.models, model_from, partial(_model_data, source_files=tuple(source_files)))
         kept.drop_others([*found.sessions, *found.models])
-        notes = [kept.problem] if kept.problem else []
+        moment = now or datetime.now(UTC)
+        seals = [note for one in sessions if (note := _seal_note(kept, folder, one, moment))]
+        notes = [*([kept.problem] if kept.problem else []), *seals]
     progress(reading.of, reading.of)
     sessions, alike = _once(sessions)
     dated = [one for one in sessions if one.started is not None]
@@ -97,6 +100,21 @@ def load_history(
         notes += date_faults(machine.sessions, now or datetime.now(UTC))
         notes += _gathered(machine.sessions)
     return Historied(machines, tuple(left_out), tuple(notes), reading.worked_out)
+
+
+def _seal_note(kept: Kept, folder: Path, one: SessionFigures, moment: datetime) -> str:
+    """Note the anchor of a session, and say where it is not a continuation of the one that was noted before."""
+    noted = kept.noted(one.name)
+    if noted is None or noted.anchor == one.anchor or noted.anchor in links_of(folder / one.name):
+        if one.anchor and (noted is None or noted.anchor != one.anchor):
+            kept.note(one.name, Noted(one.anchor, moment.isoformat(timespec="seconds")))
+        return ""
+    before = f"one ended with {noted.anchor[:SHORTEST]} on {noted.at[:10]}"
+    if not one.anchor:
+        return f"{one.name} carries no seal, {before}: the seal was taken out"
+    return (
+        f"{one.name} carries another seal, {before}, which is not part of it: it was sealed anew, or is another session"
+    )
 
 
 _Kind = TypeVar("_Kind", SessionFigures, ModelFigures)
@@ -264,6 +282,7 @@ def session_from(data: dict[str, Any], folder: str) -> SessionFigures:
         bar=data["bar"],
         programs=data["programs"],
         notes=tuple(data["notes"]),
+        anchor=data["anchor"],
     )
 
 

@@ -15,6 +15,7 @@ from dbbstation.files.formats.model import read_model
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book
 from dbbstation.files.own_sources import every_source
+from dbbstation.files.recordings.anchors import anchor_of
 from dbbstation.history.order import moment_words
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.plan.tolerance import CircleFigure
@@ -60,6 +61,7 @@ def session_figures(folder: Path) -> SessionFigures:
             *_clock(session.runs),
             *_lacks(session, found.circles),
         ),
+        anchor=anchor_of(session.seal),
     )
 
 

@@ -12,8 +12,9 @@ import click
 from dbbstation import __version__
 from dbbstation.cli.lazy import LazyGroup
 from dbbstation.cli.output import echo
-from dbbstation.errors import StationError
+from dbbstation.errors import OutputError, StationError
 from dbbstation.files.inputs import input_book
+from dbbstation.files.refused import in_a_sentence, refusal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -98,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # Not `cli.main`, which answers Ctrl-C with an empty line of its own.
         with input_book(), cli.make_context("dbbstation", _own_first(given), obj=tuple(given)) as context:
             code = cli.invoke(context)
-        sys.stdout.flush()
+        _flush()
     except click.exceptions.Exit as left:
         code = left.exit_code
     except click.ClickException as problem:
@@ -111,13 +112,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         echo(("\n" if sys.stderr.isatty() else "") + "interrupted; what was written before stays", err=True)
         sys.exit(FAILED)
     except BrokenPipeError:
-        # Whoever read the output has seen enough, as `| head` does; the interpreter must not flush into it again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Whoever read the output has seen enough, as `| head` does.
+        _drop_output()
         sys.exit(FAILED)
     except (StationError, OSError) as problem:
         if debug:
             raise
-        echo(str(problem), err=True)
+        _drop_unwritable()
+        echo(in_a_sentence(problem) if isinstance(problem, OSError) else str(problem), err=True)
         sys.exit(FAILED)
     except Exception as problem:
         if debug:
@@ -126,6 +128,34 @@ def main(arguments: Sequence[str] | None = None) -> None:
         echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)
+
+
+def _flush() -> None:
+    """Bring the output to where it goes.
+
+    Raises:
+        OutputError: the disk that it goes to refuses.
+    """
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        why, remedy = refusal(error)
+        raise OutputError(f"cannot be written: {why}", where="standard output", remedy=remedy) from error
+
+
+def _drop_unwritable() -> None:
+    """Forget output that cannot be written: the interpreter would try again behind the sentence that says what to do."""
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        _drop_output()
+
+
+def _drop_output() -> None:
+    """Let the interpreter flush what is left of the output into nothing."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _own_first(given: list[str]) -> list[str]:

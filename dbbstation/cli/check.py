@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,12 @@ if TYPE_CHECKING:
     from dbbstation.sources.contract import ErrorSource
 
 
+def _anchor(_context: click.Context, _option: click.Parameter, given: str | None) -> str | None:
+    if given is None or re.fullmatch(r"[0-9a-f]{16,64}", given.lower()):
+        return None if given is None else given.lower()
+    raise click.BadParameter("sixteen to sixty-four hex digits, as a report and `dbbstation check` show them")
+
+
 @click.command()
 @click.argument("files", nargs=-1, type=click.Path(path_type=Path), metavar="FILE...")
 @source_file_option
@@ -31,6 +38,12 @@ if TYPE_CHECKING:
     "--instrument", metavar="NAME", help="Say what this instrument sees of the plans' circles at their feeds."
 )
 @click.option("--profile", metavar="NAME", help="Variant of that instrument.")
+@click.option(
+    "--anchor",
+    metavar="HASH",
+    callback=_anchor,
+    help="Say whether the sessions still hold what they did when this was noted.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.option("--schema", metavar="FORMAT", help="Print the JSON Schema of a format, such as dbb-plan/2, and stop.")
 def check(
@@ -44,6 +57,7 @@ def check(
     bar_stays_on: bool,
     instrument: str | None,
     profile: str | None,
+    anchor: str | None,
     as_json: bool,
     schema: str | None,
 ) -> None:
@@ -56,6 +70,9 @@ def check(
     Plans and one machine together are also dry-run: every program that `dbbstation program` would write with the same options
     is held against the travel of axes, angles and struts and against the feeds, on its whole way. All faults are listed.
 
+    The summary of a session ends with its anchor, the link of the last event of its log. Note it elsewhere, as reports do: with
+    --anchor HASH, sixteen digits or more of it, a session is told whether anything was changed that stood there then.
+
     With --instrument, each plan is told how many points per turn that instrument brings at the plan's feeds, and what is not
     seen with them.
 
@@ -66,6 +83,7 @@ def check(
       dbbstation check my-gauge.yaml
       dbbstation check plan.yaml machine.yaml --exclude h --clearance-mm 50
       dbbstation check 2026-11-20-hexapod-7
+      dbbstation check 2026-11-20-hexapod-7 --anchor 3f2a9c1b2d4e5f60
       dbbstation check --schema dbb-plan/2 > dbb-plan-2.schema.json
     """
     from dbbstation.cli.output import print_json
@@ -83,6 +101,7 @@ def check(
 
     known = every_source(source_files)
     results = [_check_one(file, known) for file in files]
+    _hold_against(results, anchor)
     machines = _sound(results, "dbb-machine")
     # Of several machines nobody has said which the plans are for.
     runs = [
@@ -119,6 +138,17 @@ def check(
                 echo(f"{one.plan}: {note}")
     if problems:
         raise InputError(set(problems))
+
+
+def _hold_against(results: Sequence[Checked], anchor: str | None) -> None:
+    """Say of every session what an anchor says of it."""
+    from dbbstation.files.recordings.anchors import anchor_told
+
+    for result in results:
+        if anchor is not None and result.kind.startswith("dbb-session"):
+            folder = result.path if result.path.is_dir() else result.path.parent
+            told = anchor_told(folder, anchor)
+            (result.problems if told.remedy else result.warnings).append(told)
 
 
 def _file(result: Checked) -> dict[str, object]:

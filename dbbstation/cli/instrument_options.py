@@ -103,13 +103,15 @@ def spying(path: Path | None, protocol: Protocol, port: str, *, force: bool = Fa
     """Open a byte log where one is asked for.
 
     Raises:
-        OutputError: the file exists already, or cannot be written.
+        OutputError: the file exists already, lies in a session, or cannot be written.
     """
+    from dbbstation.files.recorded_ground import refuse_recorded
     from dbbstation.instrument.bytelog import ByteLog
 
     if path is None:
         yield None
         return
+    refuse_recorded(path)
     with ByteLog(path, instrument=protocol.name, profile=protocol.profile, port=port, force=force) as log:
         yield log
 

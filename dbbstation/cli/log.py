@@ -15,7 +15,7 @@ import sys
 import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -123,7 +123,7 @@ def _log_beginning(context: click.Context) -> None:
 
 
 def _to_screen() -> logging.Handler:
-    screen = logging.StreamHandler(sys.stderr)
+    screen = _undisturbing(logging.StreamHandler)(sys.stderr)
     screen.setFormatter(_Printable("log: %(message)s"))
     screen.addFilter(lambda record: not record.exc_info and not getattr(record, "said", False))
     return screen
@@ -140,10 +140,27 @@ def _to_file(context: click.Context) -> logging.Handler | None:
         # A log is no reason to fail: recordings may lie where nobody may write.
         with suppress(OSError):
             path.parent.mkdir(parents=True, exist_ok=True)
-            file = RotatingFileHandler(path, maxBytes=LARGEST_BYTES, backupCount=KEPT, encoding="utf-8")
+            file = _undisturbing(RotatingFileHandler)(path, maxBytes=LARGEST_BYTES, backupCount=KEPT, encoding="utf-8")
             file.setFormatter(_FORM)
             return file
     return None
+
+
+_Kind = TypeVar("_Kind", bound=logging.Handler)
+
+
+def _undisturbing(kind: type[_Kind]) -> type[_Kind]:
+    """Return a kind of handler that falls silent where it cannot write: a log is no reason to fail, or to hide one."""
+
+    class Undisturbing(kind):  # type: ignore[misc, valid-type]  # a kind that is known here only
+        def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802, ARG002 - called so by the library
+            self.addFilter(lambda _record: False)
+
+        def close(self) -> None:
+            with suppress(OSError):
+                super().close()
+
+    return Undisturbing
 
 
 def _usual_places(context: click.Context) -> Iterator[Path]:

@@ -28,6 +28,7 @@ def session() -> None:
       dbbstation session reject 2026-11-20-hexapod-7 a-ccw-2 --reason "chip under the holder"
       dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
       dbbstation session seal from-the-old-program
+      dbbstation session log 2026-11-20-hexapod-7
     """  # noqa: D301 (click reads the escape)
 
 
@@ -126,10 +127,11 @@ def take_in(folder: Path, *, as_json: bool) -> None:
       dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
+    from dbbstation.files.recordings.lock import PATIENCE_S
     from dbbstation.files.recordings.session import unlisted_sealed
     from dbbstation.files.recordings.session_writer import SessionWriter
 
-    with SessionWriter.open(folder) as writer:
+    with SessionWriter.open(folder, PATIENCE_S) as writer:
         taken = [_name(writer.take_in(path)) for path in unlisted_sealed(writer.session)]
     if as_json:
         print_json({"session": str(folder), "taken_in": taken})
@@ -196,11 +198,11 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
       dbbstation session seal from-the-old-program
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json
-    from dbbstation.files.recordings.sealing import sealing
+    from dbbstation.files.recordings.sealing import seal_session, sealing
 
     found = sealing(folder)
     if found.anything and not dry_run:
-        found.write()
+        found = seal_session(folder)
     if as_json:
         told = {"without_hash": found.files, "linked": found.linked, "files": dict(found.seal.files)}
         print_json({"session": str(found.path), "sealed": [] if dry_run else found.files, **told})
@@ -212,6 +214,78 @@ def seal(folder: Path, *, dry_run: bool, as_json: bool) -> None:
         echo("every run and file is sealed already")
     else:
         echo(f"{len(found.seal.files)} files and {found.seal.runs} runs: {done}")
+
+
+@session.command()
+@_FOLDER
+@_JSON
+def log(folder: Path, *, as_json: bool) -> None:
+    """List what happened in a session: runs, verdicts with their reasons, notes, amendments, each with its time and link.
+
+    The last line is the anchor of the session. Noted elsewhere, it tells later whether anything was changed that stood there:
+    `dbbstation check --anchor`.
+
+    \b
+    Examples:
+      dbbstation session log 2026-11-20-hexapod-7
+      dbbstation session log 2026-11-20-hexapod-7 --json
+    """  # noqa: D301 (click reads the escape)
+    from dbbstation.cli.output import print_json, print_table
+    from dbbstation.files.recordings.event_log import keys_told, read_event_log, runs_told
+    from dbbstation.files.recordings.session import read_session
+
+    read = read_session(folder)
+    found = read_event_log(read.folder, [])
+    events = () if found is None else found.events
+    if as_json:
+        listed = [
+            {
+                "event": number,
+                "at": None if event.at is None else event.at.isoformat(),
+                "what": event.what,
+                "about": runs_told(event) or ", ".join(keys_told(event)),
+                "link": event.link,
+            }
+            for number, event in enumerate(events, start=1)
+        ]
+        print_json({"session": read.name, "events": listed, "anchor": events[-1].link if events else None})
+        return
+    rows = [
+        [
+            number,
+            "" if event.at is None else event.at.strftime("%Y-%m-%d %H:%M:%S %Z").strip(),
+            event.what,
+            runs_told(event) or ", ".join(keys_told(event)),
+        ]
+        for number, event in enumerate(events, start=1)
+    ]
+    if rows:
+        print_table(["event", "at", "what", "about"], rows)
+    echo(f"anchor {events[-1].link}" if events else "no event log; `dbbstation session seal` begins one")
+
+
+@session.command()
+@_FOLDER
+@_JSON
+def rebuild(folder: Path, *, as_json: bool) -> None:
+    """Write the session file anew, as the event log has it.
+
+    For a session file that was spoilt, is gone, or was edited by mistake. What stands there now is kept in the folder `sealed`.
+    The recordings are not touched.
+
+    \b
+    Examples:
+      dbbstation session rebuild 2026-11-20-hexapod-7
+    """  # noqa: D301 (click reads the escape)
+    from dbbstation.cli.output import print_json
+    from dbbstation.files.recordings.rebuilding import rebuild as written
+
+    former, events = written(folder)
+    if as_json:
+        print_json({"session": str(folder), "events": events, "former": former or None})
+        return
+    kept = f"; as it was: {former}" if former else ""
+    echo(f"session file written from {events} events{kept}")
 
 
 def _name(run: RunEntry) -> str:
@@ -247,14 +321,13 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
     import difflib
 
     from dbbstation.errors import InputError, Problem
-    from dbbstation.files.recordings.session import read_session
+    from dbbstation.files.recordings.lock import PATIENCE_S
     from dbbstation.files.recordings.session_writer import SessionWriter
 
-    names = [_name(entry) for entry in read_session(folder).runs]
-    if run not in names:
-        near = difflib.get_close_matches(run, names, n=1, cutoff=0.6)
-        remedy = f"did you mean {near[0]}?" if near else "`dbbstation session list` names them"
-        raise InputError([Problem(str(folder), 0, 0, f"the session has no run {run}", remedy)])
-    with SessionWriter.open(folder) as writer:
-        entry = next(entry for entry in writer.runs if _name(entry) == run)
-        return writer.judge(entry, accepted=accepted, reason=reason)
+    with SessionWriter.open(folder, PATIENCE_S) as writer:
+        entries = {_name(entry): entry for entry in writer.runs}
+        if run not in entries:
+            near = difflib.get_close_matches(run, entries, n=1, cutoff=0.6)
+            remedy = f"did you mean {near[0]}?" if near else "`dbbstation session list` names them"
+            raise InputError([Problem(str(folder), 0, 0, f"the session has no run {run}", remedy)])
+        return writer.judge(entries[run], accepted=accepted, reason=reason)

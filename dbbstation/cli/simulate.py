@@ -56,7 +56,7 @@ def simulate(
     from dbbstation.files.formats.model import read_model
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.own_sources import every_source
-    from dbbstation.files.recordings.session_writer import FinishedRun, write_session
+    from dbbstation.files.recordings.new_session import FinishedRun, write_session
     from dbbstation.model.simulation import setup_of, simulate_circle
     from dbbstation.virtual.under_spindle import SetUp, put_up
 

@@ -10,15 +10,18 @@ import contextlib
 import logging
 import os
 import shutil
+import stat
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from dbbstation.errors import OutputError
 from dbbstation.files.inputs import was_read
+from dbbstation.files.recorded_ground import refuse_recorded
+from dbbstation.files.refused import refusal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
 _LOG = logging.getLogger(__name__)
 
@@ -37,14 +40,15 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
         path: of the file.
         data: what it will hold.
         force: replace a file that exists.
-        rewrites: the file is one that was read to be changed, such as a session file.
+        rewrites: the file is the program's own and was read to be changed, such as a session file.
 
     Raises:
-        OutputError: it exists and `force` is not given, the same command has read it, or it cannot be written; the old file
-            is then untouched.
+        OutputError: it exists and `force` is not given, it lies in a session, the same command has read it, or it cannot be
+            written; the old file is then untouched.
     """
-    refuse_existing(path, force=force)
+    _refuse_unfit(path, force=force)
     if not rewrites:
+        refuse_recorded(path)
         _refuse_input(path)
     path = path.resolve()  # a link stays a link, what it leads to is replaced
     with _told(path):
@@ -91,24 +95,35 @@ def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
     _LOG.info("wrote %s", target)
 
 
-def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool = False) -> None:
+def write_folder(
+    folder: Path,
+    files: Mapping[str, str | bytes],
+    *,
+    force: bool = False,
+    own: bool = False,
+    read_only: Callable[[str], bool] = lambda _name: False,
+) -> None:
     """Write several files into one folder, all or none; the folder is made where it does not exist.
 
     Args:
         folder: where they go.
         files: content by path within the folder; a path that ends with a slash is an empty folder.
         force: replace files that exist; others in the folder stay.
+        own: the folder is a session and the files are part of it.
+        read_only: whether a file, by its path within the folder, may only be read from then on.
 
     Raises:
-        OutputError: one exists and `force` is not given, or one cannot be written; nothing has changed then.
+        OutputError: one exists and `force` is not given, it lies in a session, or one cannot be written; nothing has changed then.
     """
+    if not own:
+        refuse_recorded(folder / "any")
     if not folder.exists():
         with _told(folder):
             _make_parents(folder.parent)
             made = Path(tempfile.mkdtemp(prefix=f".{folder.name}", suffix=_MARK, dir=folder.parent))
             try:
                 made.chmod(_usual_mode(0o777))
-                _fill(made, files)
+                _fill(made, files, read_only)
                 made.rename(folder)
             except BaseException:
                 shutil.rmtree(made, ignore_errors=True)
@@ -119,9 +134,10 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes], *, force: bool 
     for name in files:
         if not name.endswith("/"):
             _refuse_overwriting(folder / name, force=force)
-            _refuse_input(folder / name)
+            if not own:
+                _refuse_input(folder / name)
     with _told(folder):
-        _replace_all(folder, files)
+        _replace_all(folder, files, read_only)
     for name in files:
         _LOG.info("wrote %s", folder / name)
 
@@ -130,8 +146,13 @@ def refuse_existing(path: Path, *, force: bool) -> None:
     """Refuse to overwrite, and to work for a folder that is not there: asked before long work, not after it.
 
     Raises:
-        OutputError: the path exists and `force` is not given, or is a folder, or has no folder to go into.
+        OutputError: the path exists and `force` is not given, is a folder, has no folder to go into, or lies in a session.
     """
+    refuse_recorded(path)
+    _refuse_unfit(path, force=force)
+
+
+def _refuse_unfit(path: Path, *, force: bool) -> None:
     _refuse_overwriting(path, force=force)
     if not path.parent.is_dir():
         what = f"cannot be written: there is no folder {path.parent}"
@@ -198,7 +219,20 @@ def sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def _fill(folder: Path, files: Mapping[str, str | bytes]) -> None:
+def set_read_only(path: Path) -> None:
+    """Let a file be read and no more, where the system can do that: who may write the folder can still exchange it.
+
+    Raises:
+        OSError: it is not there.
+    """
+    with contextlib.suppress(PermissionError):  # on shares that belong to somebody else
+        path.chmod(path.stat().st_mode & ~_WRITE)
+
+
+_WRITE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
+
+
+def _fill(folder: Path, files: Mapping[str, str | bytes], read_only: Callable[[str], bool]) -> None:
     for name, content in files.items():
         path = folder / name
         if name.endswith("/"):
@@ -206,11 +240,13 @@ def _fill(folder: Path, files: Mapping[str, str | bytes]) -> None:
             continue
         path.parent.mkdir(parents=True, exist_ok=True)
         _write_synced(path, content.encode() if isinstance(content, str) else content)
+        if read_only(name):
+            set_read_only(path)
     for inner in {folder, *(path for path in folder.rglob("*") if path.is_dir())}:
         sync_folder(inner)
 
 
-def _replace_all(folder: Path, files: Mapping[str, str | bytes]) -> None:
+def _replace_all(folder: Path, files: Mapping[str, str | bytes], read_only: Callable[[str], bool]) -> None:
     """Write all beside their targets first: what can fail has failed before the first target is touched."""
     written: list[tuple[Path, Path]] = []
     try:
@@ -221,6 +257,8 @@ def _replace_all(folder: Path, files: Mapping[str, str | bytes]) -> None:
                 temporary = _temporary(path)
                 written.append((temporary, path))
                 _write_synced(temporary, content.encode() if isinstance(content, str) else content)
+                if read_only(name):
+                    set_read_only(temporary)
         for temporary, path in written:
             temporary.replace(path)
     except BaseException:
@@ -259,9 +297,5 @@ def _told(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        why = (error.strerror or str(error)).lower()
-        raise OutputError(
-            f"cannot be written: {why}",
-            where=str(path),
-            remedy="check that the folder exists, its permissions and the disk",
-        ) from error
+        why, remedy = refusal(error)
+        raise OutputError(f"cannot be written: {why}", where=str(path), remedy=remedy) from error

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dbbstation.errors import InputError, Problem, TravelError
 from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.every_format import SCHEMAS
@@ -13,11 +15,14 @@ from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.mapping import parse_mapping
 from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
+from dbbstation.files.formats.session import BAR_LENGTH
 from dbbstation.files.formats.settings import read_settings
+from dbbstation.files.recordings.anchors import SHORTEST, anchor_of
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.judged import JUDGED, judge_session
 from dbbstation.files.recordings.run_csv import PART, read_run
+from dbbstation.files.recordings.seal import copy_faults
 from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, no_session, parse_session, unlisted_sealed
 from dbbstation.files.yaml.text import load_yaml
 from dbbstation.quality.finding import Name
@@ -31,6 +36,10 @@ if TYPE_CHECKING:
     from dbbstation.quality.judge import Judgement
     from dbbstation.sources.contract import ErrorSource
     from dbbstation.trace.recording import Recording
+
+
+FEWEST_SAMPLES = 8
+"""Centre, radius, ellipse and triangle of a circle are seven numbers; with fewer samples than this nothing is known of it."""
 
 
 @dataclass
@@ -158,11 +167,31 @@ def _run(checked: Checked) -> None:
         checked.problems += error.problems
         return
     checked.warnings += run.warnings
+    if checked.path.suffix != PART:  # the good lines of a run that died are what they are
+        checked.problems += _implausible(checked.path, run.recording)
     seconds = run.recording.t_s[-1] - run.recording.t_s[0]
     lost = lost_samples(run.recording.t_s)
     unused = len(run.recording) - len(run.recording.good)
     told = (f", {lost} lost" if lost else "") + (f", {unused} doubtful or no length" if unused else "")
     checked.summary = f"run: {_count(len(run.recording), 'sample')} in {seconds:.1f} s{told}"
+
+
+def _implausible(path: Path, recording: Recording) -> list[Problem]:
+    """What no recording of a bar can be, whatever plan it belongs to: a session holds more against its plan."""
+    faults = []
+    usable = np.arange(len(recording)) if recording.usable is None else np.flatnonzero(recording.usable)
+    if len(usable) < FEWEST_SAMPLES:
+        what = f"{_count(len(usable), 'usable sample')}: a circle takes {FEWEST_SAMPLES} at the least"
+        faults.append(Problem(str(path), 0, 0, what, "check that it is the whole recording, and what `status` says"))
+    lengths = recording.length_mm[usable]
+    wrong = np.flatnonzero((lengths < BAR_LENGTH.least) | (lengths > BAR_LENGTH.most))
+    if wrong.size:
+        found = float(lengths[wrong[0]])
+        what = f"length_mm is {found:g} in sample {usable[wrong[0]] + 1}, expected {BAR_LENGTH.range}{BAR_LENGTH.guess(found)}"
+        more = f"; {wrong.size - 1} more are so" if wrong.size > 1 else ""
+        remedy = "give the whole distance between the balls in mm, nothing taken off"
+        faults.append(Problem(str(path), 0, 0, what + more, remedy))
+    return faults
 
 
 def _drive(checked: Checked) -> None:
@@ -208,8 +237,17 @@ def _session(checked: Checked) -> None:
         checked.problems.append(Problem(str(session.plan_path), 0, 0, f"{error.where}: {error.what}", error.remedy))
     _judge(checked, session, wanted)
     checked.warnings += [Problem(str(session.folder), 0, 0, amendment.text) for amendment in session.amendments]
-    seal = "sealed" if session.seal is not None else NO_SEAL
-    checked.summary = f"session: {_states(session)}; {seal}"
+    if session.seal is not None:
+        checked.problems += copy_faults(session.folder, session.seal, session.amendments)
+    checked.summary = f"session: {_states(session)}; {_seal(session)}"
+
+
+def _seal(session: SessionFolder) -> str:
+    if session.seal is None:
+        return NO_SEAL
+    if not session.seal.events:
+        return f"sealed, without an event log (`dbbstation session seal` begins one), anchor {anchor_of(session.seal)[:SHORTEST]}"
+    return f"sealed, {_count(session.seal.events, 'event')}, anchor {anchor_of(session.seal)[:SHORTEST]}"
 
 
 NO_SEAL = "it carries no seal (`dbbstation session seal` writes one)"

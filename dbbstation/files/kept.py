@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
-_FORM = 1
+_FORM = 2
 """Counts changes of what is kept under one version of the program."""
 
 VERSION = f"{__version__}/{_FORM}"
@@ -64,6 +64,19 @@ def stamp_of(path: Path) -> Stamp:
 
 
 @dataclass(frozen=True)
+class Noted:
+    """An anchor as it was noted.
+
+    Attributes:
+        anchor: the link that a log ended with.
+        at: when it was noted, ISO 8601.
+    """
+
+    anchor: str
+    at: str
+
+
+@dataclass(frozen=True)
 class _Row:
     stamp: Stamp
     sha256: str
@@ -75,7 +88,7 @@ class Kept:
 
     Args:
         folder: whose files these are.
-        begin_anew: forget what is kept.
+        begin_anew: forget what is kept, but for anchors that were noted.
 
     Attributes:
         problem: why nothing can be kept, in words; empty where it can.
@@ -84,6 +97,7 @@ class Kept:
     def __init__(self, folder: Path, *, begin_anew: bool = False) -> None:
         self.problem = ""
         self._rows: dict[str, _Row] = {}
+        self._noted: dict[str, Noted] = {}
         self._by_hash: dict[str, str] = {}
         self._file = index_file(folder)
         self._base: sqlite3.Connection | None = None
@@ -91,9 +105,7 @@ class Kept:
         if why:
             self._give_up(why)
             return
-        if begin_anew:
-            self._forget()
-        self._open()
+        self._open(begin_anew=begin_anew)
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -133,6 +145,15 @@ class Kept:
             del self._rows[name]
         self._write("DELETE FROM kept WHERE name = ?", [(name,) for name in sorted(gone)])
 
+    def noted(self, name: str) -> Noted | None:
+        """Return the anchor that was noted of a file, whatever became of it since; None where none was."""
+        return self._noted.get(name)
+
+    def note(self, name: str, noted: Noted) -> None:
+        """Note the anchor of a file. It outlasts a change of the file, and an index that is begun anew on purpose."""
+        self._noted[name] = noted
+        self._write("INSERT OR REPLACE INTO noted VALUES (?, ?, ?)", [(name, noted.anchor, noted.at)])
+
     def _write(self, command: str, rows: Sequence[tuple[object, ...]]) -> None:
         if self._base is None or not rows:
             return
@@ -141,11 +162,11 @@ class Kept:
         except sqlite3.Error as error:
             self._give_up(str(error))
 
-    def _open(self) -> None:
+    def _open(self, *, begin_anew: bool) -> None:
         for attempt in range(2):
             try:
                 self._file.parent.mkdir(parents=True, exist_ok=True)
-                self._base = self._ready()
+                self._base = self._ready(begin_anew=begin_anew)
                 self._read()
             except sqlite3.OperationalError as error:  # locked, no room, no permission: not for us to remove
                 self._give_up(str(error))
@@ -160,20 +181,21 @@ class Kept:
             if self._base is not None or self.problem:
                 return
 
-    def _ready(self) -> sqlite3.Connection:
+    def _ready(self, *, begin_anew: bool) -> sqlite3.Connection:
         base = sqlite3.connect(self._file, timeout=_PATIENCE_S, isolation_level=None)
         try:
             base.execute("PRAGMA journal_mode = DELETE")
             base.execute("BEGIN IMMEDIATE")
             base.execute("CREATE TABLE IF NOT EXISTS version (text TEXT)")
             known = [text for (text,) in base.execute("SELECT text FROM version")]
-            if known != [VERSION]:
+            if known != [VERSION] or begin_anew:
                 base.execute("DROP TABLE IF EXISTS kept")
                 base.execute("DELETE FROM version")
                 base.execute("INSERT INTO version VALUES (?)", (VERSION,))
             base.execute(
                 "CREATE TABLE IF NOT EXISTS kept (name TEXT PRIMARY KEY, modified_ns INTEGER, size INTEGER, sha256 TEXT, text TEXT)"
             )
+            base.execute("CREATE TABLE IF NOT EXISTS noted (name TEXT PRIMARY KEY, anchor TEXT, at TEXT)")
             base.execute("COMMIT")
         except sqlite3.Error:
             base.close()
@@ -188,6 +210,8 @@ class Kept:
             str(n): _Row(Stamp(int(at), int(size)), str(digest), str(text)) for n, at, size, digest, text in rows
         }
         self._by_hash = {row.sha256: row.text for row in self._rows.values()}
+        noted = self._base.execute("SELECT name, anchor, at FROM noted").fetchall()
+        self._noted = {str(name): Noted(str(anchor), str(at)) for name, anchor, at in noted}
 
     def _forget(self) -> None:
         for path in (self._file, self._file.with_name(self._file.name + "-journal")):

@@ -54,6 +54,7 @@ class SessionFigures:
         bar: serial number of the bar; empty where not noted.
         programs: NC programs that were run instead of the plan's circles, as a hash over theirs; empty for none.
         notes: remarks on it.
+        anchor: link of the last event of its log; of a session without a log the end of its chain of runs; empty without a seal.
     """
 
     name: str
@@ -64,6 +65,7 @@ class SessionFigures:
     bar: str = ""
     programs: str = ""
     notes: tuple[str, ...] = ()
+    anchor: str = ""
 
 
 @dataclass(frozen=True)

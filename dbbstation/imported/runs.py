@@ -27,7 +27,7 @@ from dbbstation.files.formats.mapping import (
     in_run_units,
 )
 from dbbstation.files.recordings.entries import RunState, count_in
-from dbbstation.files.recordings.session_writer import FinishedRun
+from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.table_csv import MOST_FAULTS
 from dbbstation.imported.travel import UnusableTravelError, machine_angles, rises, travel
 from dbbstation.plan.circle import Circle, Direction

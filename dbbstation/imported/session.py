@@ -14,8 +14,8 @@ from dbbstation.errors import InputError, OutputError, Problem, TraceError
 from dbbstation.files.atomic import sync_folder
 from dbbstation.files.formats.mapping import mapping_text
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.new_session import write_session
 from dbbstation.files.recordings.session import read_session
-from dbbstation.files.recordings.session_writer import write_session
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:

@@ -58,7 +58,7 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
         reversals_deg: angles at which struts turn round; none where they are not known [deg].
     """
     rest = one.residual_um - gaussian(one.raw.phi_deg, one.residual_um, FORM_UPR)
-    near = _near(one.raw.theta_deg, reversals_deg)
+    near = near_reversals(one.raw.theta_deg, reversals_deg)
     peaks = [peak for width in WIDTHS_DEG for peak in _peaks(one, rest, near, width)]
     if not peaks:
         return found(Name.BUMP, 0.0, np.inf, "µm", "too few samples for stretches of 4 degrees", "")
@@ -75,12 +75,20 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
     )
 
 
-def _near(theta_deg: NDArray[np.float64], reversals_deg: Sequence[float]) -> NDArray[np.int64]:
-    """Number of the reversal that each sample lies beside, -1 for none, shape (n,)."""
+def near_reversals(
+    theta_deg: NDArray[np.float64], reversals_deg: Sequence[float], reach_deg: float = REVERSAL_DEG
+) -> NDArray[np.int64]:
+    """Return the number of the reversal that each sample lies beside, -1 for none, shape (n,).
+
+    Args:
+        theta_deg: angles of the samples, 0 to 360, shape (n,) [deg].
+        reversals_deg: angles at which struts turn round [deg].
+        reach_deg: how far beside a reversal counts [deg].
+    """
     near = np.full(len(theta_deg), -1, dtype=np.int64)
     for number, place in enumerate(reversals_deg):
         apart = np.abs(theta_deg - place % FULL_TURN_DEG)  # both within a turn: 0 to 360
-        near[(apart <= REVERSAL_DEG) | (apart >= FULL_TURN_DEG - REVERSAL_DEG)] = number
+        near[(apart <= reach_deg) | (apart >= FULL_TURN_DEG - reach_deg)] = number
     return near
 
 

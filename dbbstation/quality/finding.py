@@ -16,6 +16,7 @@ class Name(StrEnum):
     CLOSURE = "closure"
     DRIFT = "drift"
     BUMP = "bump"
+    SPIKE = "spike"
     DIRECTION = "direction"
     RADIUS = "radius"
     FEED = "feed"

@@ -10,6 +10,7 @@ from dbbstation.circles.noise import LEAST_UM
 from dbbstation.quality.bump import bump
 from dbbstation.quality.finding import Finding, Name, Verdict, found, undecided
 from dbbstation.quality.limits import FEWEST_OTHERS, joined, quantile, scale_of
+from dbbstation.quality.spike import spike
 from dbbstation.trace.cut import FEED_SIGMAS, FEED_TOLERANCE
 from dbbstation.trace.loss import AFTER_LOSS, share_lost
 
@@ -168,5 +169,6 @@ def by_itself(one: Seen, others: Others) -> tuple[Finding, ...]:
         closure(one.analysis, others),
         drift(one.analysis, others),
         bump(one.analysis, reversals),
+        spike(one.analysis, reversals),
         feed(one.run.circle, one.feed_mm_min),
     )

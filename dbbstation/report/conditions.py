@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from dbbstation.files.recordings.anchors import anchor_of
 from dbbstation.files.recordings.entries import RunState
 
 if TYPE_CHECKING:
@@ -111,5 +112,10 @@ def _logged(circles: Sequence[MeasuredCircle]) -> str:
 def _seal(session: SessionFolder) -> str:
     if session.seal is None:
         return "none"
-    chain = session.seal.chain_sha256[:16]
-    return f"{session.seal.runs} sealed runs, chain ends with {chain or 'nothing'}; unbroken when this was written"
+    told = (
+        f"{session.seal.runs} sealed runs, {session.seal.events} events"
+        if session.seal.events
+        else f"{session.seal.runs} sealed runs"
+    )
+    anchor = anchor_of(session.seal)
+    return f"{told}, anchor {anchor or 'none'}; unbroken when this was written"

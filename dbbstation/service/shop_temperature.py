@@ -9,6 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from dbbstation.files.formats.quantities import TemperatureDegc
 from dbbstation.files.recordings.entries import Note
+from dbbstation.files.recordings.lock import PATIENCE_S
 from dbbstation.files.recordings.session_writer import SessionWriter
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def note_temperature(folder: Path, degc: float) -> None:
         InputError: the session has faults.
         OutputError: another process writes into it, or the disk refuses.
     """
-    with SessionWriter.open(folder) as writer:
+    with SessionWriter.open(folder, PATIENCE_S) as writer:
         # On a virtual machine that runs faster than real time, runs and notes bear times ahead of the present.
         runs = [run.started for run in writer.runs if run.started is not None]
         notes = [note.made for note in writer.session.notes]

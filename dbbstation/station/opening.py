@@ -9,6 +9,8 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.machine import machine_data, machine_parts
 from dbbstation.files.formats.plan import plan_data, read_inline_plan
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.event_log import EVENTS_FILE
+from dbbstation.files.recordings.session_name import SESSION_FILE
 from dbbstation.files.recordings.session_writer import SessionWriter
 
 if TYPE_CHECKING:
@@ -54,7 +56,7 @@ def open_session(
         InputError: the folder holds another session, or one with faults.
         OutputError: it exists and is no session, or cannot be written.
     """
-    if not (folder / "session.yaml").is_file():
+    if not any((folder / name).is_file() for name in (SESSION_FILE, EVENTS_FILE)):
         return SessionWriter.create(folder, machine, plan, details)
     writer = SessionWriter.open(folder)
     try:

@@ -34,6 +34,8 @@ NO_TESTS = {
     "measure": "the operator skips tests with a key, and the session says which are missing",
     "station": "as measure",
     "session list": "lists all",
+    "session log": "lists all",
+    "session rebuild": "writes the whole session file",
     "session accept": "takes one run by its name",
     "session reject": "takes one run by its name",
     "session seal": "hashes all recordings",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -260,7 +261,7 @@ def test_files_in_each_others_places(run, fifteen, model):
     assert "this file is a machine (`dbb-machine/1`), a model (`dbb-model/4`) was expected" in outcome.err
     outcome = run("calibrate", model)
     assert outcome.code == FAILED
-    assert "this file is a model (`dbb-model/3`), a session (`dbb-session/4`) was expected" in outcome.err
+    assert "this file is a model (`dbb-model/3`), a session (`dbb-session/5`) was expected" in outcome.err
 
 
 @pytest.mark.parametrize(
@@ -297,8 +298,17 @@ def test_an_output_never_takes_the_place_of_an_input(run, spoilt):
     plan = (spoilt.folder / "plan.yaml").read_bytes()
     outcome = run("calibrate", spoilt.folder, "--out", spoilt.folder / "plan.yaml", "--force")
     assert (outcome.code, outcome.out) == (FAILED, "")
-    assert "was read just now" in outcome.err
+    assert "this lies in the session" in outcome.err
     assert (spoilt.folder / "plan.yaml").read_bytes() == plan
+
+
+def test_an_output_never_takes_the_place_of_a_file_that_was_read(run, tmp_path, model):
+    copy = Path(shutil.copyfile(model, tmp_path / "copy.yaml"))
+    before = copy.read_bytes()
+    session = shipped_folder("fixtures") / "sessions" / "small"
+    outcome = run("report", session, "--model", copy, "--out", copy, "--force")
+    assert outcome.code == FAILED
+    assert copy.read_bytes() == before
 
 
 def test_two_outputs_of_one_name_are_refused_before_the_work(run, spoilt, tmp_path):

@@ -34,6 +34,7 @@ STORED = {
     "dbb-session/2": FIXTURES / "sessions" / "small",
     "dbb-session/3": FIXTURES / "sessions" / "sealed",
     "dbb-session/4": FIXTURES / "sessions" / "begun",
+    "dbb-session/5": FIXTURES / "sessions" / "logged",
 }
 """One stored file of each version."""
 

@@ -66,7 +66,8 @@ def test_json_says_the_same(capsys, tmp_path: Path) -> None:
 
 def test_warnings_are_notes_and_no_failure(capsys, tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
-    path.write_text("t_s,length_mm,note\n0,150,x\n0.1,150,y\n")
+    rows = "".join(f"{k / 10},150,x\n" for k in range(8))
+    path.write_text(f"t_s,length_mm,note\n{rows}")
     code, out, err = run(capsys, path)
     assert code == 0
     assert out.startswith("ok  ")

@@ -127,6 +127,14 @@ def bumpy(recording: Recording, circle: Circle, um: float, at_deg: float = 112.0
     return _longer(recording, um * np.exp(-0.5 * (phi - place) ** 2))
 
 
+def spiky(recording: Recording, circle: Circle, um: float, at_deg: float = 112.0) -> Recording:
+    """One reading that stands off its neighbours."""
+    apart = np.abs(progress(recording, circle) - circle.phi_deg(np.array([at_deg]))[0])
+    one = np.zeros(len(recording))
+    one[int(np.argmin(apart))] = um
+    return _longer(recording, one)
+
+
 def quiet_deg(one: Run) -> float:
     """Angle of a circle that is farthest from reversals of struts, and from the start of the turn."""
     assert one.expected is not None
@@ -179,12 +187,13 @@ def oval(recording: Recording, circle: Circle, um: float) -> Recording:
     return _longer(recording, np.sqrt(2.0) * um * np.cos(2.0 * phi))
 
 
-SPOILERS: dict[Name, Callable[[Recording, Circle, float], Recording]] = {
+SPOILERS: dict[Name, Callable[..., Recording]] = {
     Name.LOST: lost,
     Name.NOISE: noisy,
     Name.CLOSURE: unclosed,
     Name.DRIFT: drifting,
     Name.BUMP: bumpy,
+    Name.SPIKE: spiky,
     Name.DIRECTION: mirrored,
     Name.RADIUS: larger,
     Name.FEED: at_feed,
@@ -227,8 +236,8 @@ def _spoilt(whole: Sound, run: int, name: Name, size: float) -> Judgement:
     one = whole.runs[run].run
     if name is Name.DIRECTION:
         return _wrong_way(whole, run, size)
-    if name is Name.BUMP:
-        return whole.with_spoilt(run, bumpy(one.recording, one.circle, size, quiet_deg(one)))
+    if name in {Name.BUMP, Name.SPIKE}:
+        return whole.with_spoilt(run, SPOILERS[name](one.recording, one.circle, size, quiet_deg(one)))
     return whole.with_spoilt(run, SPOILERS[name](one.recording, one.circle, size))
 
 

@@ -2,7 +2,7 @@
 
     pytest -m nightly tests/station/test_power_cuts.py -s        (as root: it mounts a loop device)
 
-ext4 with `data=writeback`, which may write a file's length before its content. A cut is a copy of the device's backing file while
+ext4 with `data=writeback`, which may write a file's length before its content, and XFS. A cut is a copy of the device's backing file while
 the process that records stands still: what the system holds in memory, its log among it, is not in it. The copy is then mounted as
 after a power cut, which replays the log.
 """
@@ -19,6 +19,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,7 +28,7 @@ import pytest
 from dbbstation.errors import InputError
 from dbbstation.files.recordings.run_csv import read_run
 from dbbstation.files.recordings.session import parse_session
-from tests.station.kills import SAMPLES, STEP_S, length_mm, record
+from tests.station.kills import SAMPLES, STEP_S, length_mm, missing, record
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +37,22 @@ if TYPE_CHECKING:
 PROMISED_S = 1.0
 CUTS = 50
 PACE_S = 0.002
-IMAGE_BYTES = 48_000_000
+
+
+@dataclass(frozen=True)
+class FileSystem:
+    """How one is made, and mounted while it is written and after the cut."""
+
+    make: tuple[str, ...]
+    image_bytes: int
+    written: str
+    after: str
+
+
+FILE_SYSTEMS = {
+    "ext4": FileSystem(("mkfs.ext4", "-q"), 48_000_000, "loop,data=writeback,commit=30", "loop"),
+    "xfs": FileSystem(("mkfs.xfs", "-q"), 320_000_000, "loop", "loop,nouuid"),
+}
 
 
 def run(*words: object) -> None:
@@ -55,13 +71,15 @@ def mounted(image: Path, at: Path, options: str) -> Iterator[Path]:
         run("umount", at)
 
 
-def made(image: Path) -> Path:
+def made(image: Path, kind: FileSystem) -> Path:
     """An empty file system, or a reason to skip."""
+    if shutil.which(kind.make[0]) is None:
+        pytest.skip(f"{kind.make[0]} is not installed")
     with image.open("wb") as file:
-        file.truncate(IMAGE_BYTES)
+        file.truncate(kind.image_bytes)
     try:
-        run("mkfs.ext4", "-q", image)
-        with mounted(image, image.with_suffix(".try"), "loop,data=writeback"):
+        run(*kind.make, image)
+        with mounted(image, image.with_suffix(".try"), kind.written):
             pass
     except OSError as error:
         pytest.skip(f"no loop device can be mounted here: {error}")
@@ -96,14 +114,14 @@ class Told:
                 self.lines += [(time.monotonic(), line.decode()) for line in whole]
 
 
-def lost_in(folder: Path, promised: list[str]) -> tuple[int, int]:
-    """How many samples that were promised are not there, and how many there are with another value."""
+def lost_in(folder: Path, promised: list[str], said: list[str]) -> tuple[int, int]:
+    """How many samples that were promised, and verdicts and notes that were told, are not there; how many samples are others."""
     faults = []
     session = parse_session(folder, faults)
     assert session is not None, faults
     assert faults == []
     files = {f"{run.test}-{run.direction}-{run.repeat}": run.path for run in session.runs}
-    lost = wrong = 0
+    lost, wrong = len(missing(session, said)), 0
     for name, count in Counter(line.split()[1] for line in promised if line.startswith("sample ")).items():
         there: dict[int, float] = {}
         with contextlib.suppress(InputError, KeyError):
@@ -119,15 +137,16 @@ def lost_in(folder: Path, promised: list[str]) -> tuple[int, int]:
 
 @pytest.mark.nightly
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="loop devices of Linux")
-def test_what_is_a_second_old_outlasts_a_power_cut(tmp_path: Path) -> None:
-    rng = random.Random(CUTS)  # noqa: S311 - moments, no secrets
-    image = made(tmp_path / "disk.img")
+@pytest.mark.parametrize("name", FILE_SYSTEMS)
+def test_what_is_a_second_old_outlasts_a_power_cut(tmp_path: Path, name: str) -> None:
+    rng, kind = random.Random(CUTS), FILE_SYSTEMS[name]  # noqa: S311 - moments, no secrets
+    image = made(tmp_path / "disk.img", kind)
     table: Counter[str] = Counter()
     followed = lost = wrong = 0
     out, told = os.pipe()
     lines = Told(out)
     with contextlib.ExitStack() as stack:
-        disk = stack.enter_context(mounted(image, tmp_path / "disk", "loop,data=writeback,commit=30"))
+        disk = stack.enter_context(mounted(image, tmp_path / "disk", kind.written))
         child = stack.enter_context(recording(disk / "session", told))
         for cut in range(CUTS):
             end_s = time.monotonic() + rng.uniform(1.2, 3.0)
@@ -137,11 +156,12 @@ def test_what_is_a_second_old_outlasts_a_power_cut(tmp_path: Path) -> None:
             os.kill(child.pid, signal.SIGSTOP)
             stopped_s = time.monotonic()
             copy = tmp_path / f"cut-{cut}.img"
-            shutil.copyfile(image, copy)
+            run("cp", "--sparse=always", image, copy)
             os.kill(child.pid, signal.SIGCONT)
             promised = [line for when_s, line in lines.lines if when_s < stopped_s - PROMISED_S]
-            with mounted(copy, tmp_path / "copy", "loop") as after:
-                gone, other = lost_in(after / "session", promised)
+            said = [line for _, line in lines.lines]
+            with mounted(copy, tmp_path / "copy", kind.after) as after:
+                gone, other = lost_in(after / "session", promised, said)
             copy.unlink()
             followed += sum(line.startswith("sample ") for line in promised)
             lost, wrong = lost + gone, wrong + other
@@ -150,5 +170,7 @@ def test_what_is_a_second_old_outlasts_a_power_cut(tmp_path: Path) -> None:
             table["while sealing" if at_end else "between samples" if last[0] == "sample" else f"behind {last[0]}"] += 1
     os.close(out)
     told_table = ", ".join(f"{count} {moment}" for moment, count in sorted(table.items()))
-    sys.stdout.write(f"\n{CUTS} power cuts ({told_table}): {followed} samples promised, {lost} lost, {wrong} wrong\n")
+    sys.stdout.write(
+        f"\n{name}: {CUTS} power cuts ({told_table}): {followed} samples promised, {lost} lost, {wrong} wrong\n"
+    )
     assert (lost, wrong) == (0, 0)

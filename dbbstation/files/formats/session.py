@@ -1,4 +1,4 @@
-"""`dbb-session/4`, which has all of `dbb-session/1` to `/3`: what was done in a session, one entry per run."""
+"""`dbb-session/5`, which has all of `dbb-session/1` to `/4`: what was done in a session, one entry per run."""
 
 from datetime import datetime
 from pathlib import PurePosixPath
@@ -34,6 +34,9 @@ def _moment(text: str) -> str:
 
 _NOT_READ = (None, None, None)
 
+BAR_LENGTH = Quantity("mm", 20, 2_000)
+"""Lengths that ball bars have."""
+
 InsidePath = Annotated[str, AfterValidator(_inside)]
 Moment = Annotated[str, AfterValidator(_moment), Field(json_schema_extra={"format": "date-time"})]
 Sha256Hex = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -44,7 +47,7 @@ class BarSchema(Schema):
 
     serial_number: str = ""
     """Of the bar."""
-    calibrated_length_mm: Annotated[float, Quantity("mm", 20, 2_000)]
+    calibrated_length_mm: Annotated[float, BAR_LENGTH]
     """Distance between the ball centres that the calibration found [mm]."""
     calibrator_uncertainty_mm: Annotated[float, Quantity("mm", 1e-6, 0.1, or_zero=True)]
     """Uncertainty of that length, one standard deviation [mm]."""
@@ -56,7 +59,7 @@ class BarSchema(Schema):
     """Temperature of the bar then [degC]."""
     expansion_um_m_k: ExpansionUmMK | None = None
     """Thermal expansion of the bar [µm/(m K)]."""
-    reading_mm: Annotated[float, Quantity("mm", 20, 2_000)] | None = None
+    reading_mm: Annotated[float, BAR_LENGTH] | None = None
     """What it read on its calibrator; the fit knows the difference, recorded lengths stay as read [mm]."""
     temp_uncertainty_k: Annotated[float, Quantity("K", 0.001, 10)] | None = None
     """Standard uncertainty of a temperature of the bar; where it is stated, the fit knows what the bar grew by [K]."""
@@ -148,6 +151,15 @@ class SetUpErrorsSchema(Schema):
     """Of each reading, one standard deviation [µm]."""
 
 
+class LogSchema(Schema):
+    """How far the event log of the session went when this file was written."""
+
+    events: Annotated[int, Field(ge=1)]
+    """Number of its events."""
+    sha256: Sha256Hex
+    """Link of the last of them."""
+
+
 class SealSchema(Schema):
     """What files beside the runs were when the session was sealed, and how many runs it has."""
 
@@ -157,6 +169,8 @@ class SealSchema(Schema):
     """Number of sealed runs."""
     chain_sha256: Sha256Hex | None = None
     """`chain_sha256` of the last of them; absent where there is none."""
+    log: LogSchema | None = None
+    """The event log that covers everything in this file; absent in sessions of older programs."""
 
 
 class AmendmentSchema(Schema):
@@ -190,7 +204,7 @@ class NoteSchema(Schema):
 class SessionFile(Schema):
     """What was done: where the machine and plan stand, the bar, one entry per run."""
 
-    format: Literal["dbb-session/1", "dbb-session/2", "dbb-session/3", "dbb-session/4"]
+    format: Literal["dbb-session/1", "dbb-session/2", "dbb-session/3", "dbb-session/4", "dbb-session/5"]
     """Name and version of this format."""
     machine: InsidePath
     """The nominal model that the controller had while measuring, `dbb-machine/1`."""
@@ -208,13 +222,13 @@ class SessionFile(Schema):
     """The bar."""
     bar_waiver: str = ""
     """Why it was measured without a fresh calibration of the bar."""
-    set_up_errors: tuple[SetUpErrorsSchema, ...] = ()
-    """Micrometer readings of balls that were put up under the spindle, one entry per mounting."""
     seal: SealSchema | None = None
     """What was sealed; absent in sessions of older programs and in those that were written by hand."""
     amendments: tuple[AmendmentSchema, ...] = ()
     """What was changed on purpose after it was sealed, oldest first."""
     notes: tuple[NoteSchema, ...] = ()
     """What was noted while it was measured, oldest first."""
+    set_up_errors: tuple[SetUpErrorsSchema, ...] = ()
+    """Micrometer readings of balls that were put up under the spindle, one entry per mounting."""
     runs: tuple[RunSchema, ...] = ()
     """Runs in the order they were started."""

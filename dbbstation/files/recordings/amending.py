@@ -7,22 +7,27 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.atomic import write_bytes, write_text
+from dbbstation.files.atomic import set_read_only, write_bytes, write_folder
 from dbbstation.files.formats.machine import machine_text, read_machine
 from dbbstation.files.formats.plan import plan_text, read_inline_plan
-from dbbstation.files.recordings.lock import SessionLock
+from dbbstation.files.recordings.event_log import EVENTS_FILE, read_event_log
+from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (
+    RUNS,
     Amendment,
     chain_faults,
     chained,
     copy_name,
     hashes,
+    is_copy,
     keep_copies,
     sealed_names,
     sealed_over,
 )
 from dbbstation.files.recordings.session import SESSION_FILE, parse_session
-from dbbstation.files.recordings.session_text import session_text
+from dbbstation.files.recordings.session_state import Stands, standing
+from dbbstation.files.recordings.session_store import SessionStore
+from dbbstation.files.recordings.session_text import session_data
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -31,9 +36,6 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.seal import Seal
     from dbbstation.files.recordings.session import SessionFolder
-
-RUNS = "runs"
-"""What an amendment of the list of runs is called."""
 
 
 def amend(
@@ -56,7 +58,8 @@ def amend(
         OutputError: another process writes into the session, or the disk refuses.
     """
     _whole(folder, plan, machine)  # no lock is left in what is no session
-    with SessionLock(folder):
+    with SessionLock(folder, PATIENCE_S):
+        store = SessionStore(folder, lambda: made)
         session, seal = _whole(folder, plan, machine)
         named = dict(zip((machine, plan), session.names, strict=True))
         new = {}
@@ -76,26 +79,48 @@ def amend(
         ]
         runs = session.runs
         if next(chain_faults(folder, seal, runs), None) is not None:
-            former = session_copy(folder, session)
             runs = chained([replace(run, chain_sha256="") for run in runs])
+            former = _copied(folder, SESSION_FILE, session.sha256)
             found.append(Amendment(RUNS, seal.chain_sha256, _last_link(runs), former, reason, made))
+        found += _logged_otherwise(folder, store, session, reason, made)
         if not found:
             what = "nothing differs from what was sealed"
             raise InputError([Problem(str(folder), 0, 0, what, "give --plan or --machine, or change the file first")])
         details = replace(session, seal=sealed_over(now, runs), amendments=(*session.amendments, *found))
         for name, content in new.items():
             write_bytes(folder / copy_name(name, now[name]), content, force=True, rewrites=True)
+            set_read_only(folder / copy_name(name, now[name]))
             write_bytes(folder / name, content, force=True, rewrites=True)
         keep_copies(folder, now)
-        text = session_text(folder, session.names, details, runs)
-        write_text(folder / SESSION_FILE, text, force=True, rewrites=True)
+        store.write(session_data(folder, session.names, details, runs), "amended")
     return tuple(found)
 
 
-def session_copy(folder: Path, session: SessionFolder) -> str:
-    """Keep a copy of the session file as it stands, and return where."""
-    keep_copies(folder, {SESSION_FILE: session.sha256})
-    return copy_name(SESSION_FILE, session.sha256)
+def _logged_otherwise(
+    folder: Path, store: SessionStore, session: SessionFolder, reason: str, made: datetime
+) -> list[Amendment]:
+    """Take the session file as it stands where its event log says otherwise; what either was is kept."""
+    log = read_event_log(folder, [])
+    stands = standing(store.data, log)
+    if stands.stands is not Stands.UNLIKE:
+        return []
+    if not stands.log_sound:
+        # The chain cannot go on from a log that is not what it was: another begins.
+        former_sha256 = "" if log is None else next(iter(hashes(folder, (EVENTS_FILE,)).values()), "")
+        former = _copied(folder, EVENTS_FILE, former_sha256) if former_sha256 else ""
+        store.begin_anew()
+        return [Amendment(EVENTS_FILE, former_sha256, "", former, reason, made)]
+    text = store.text_by_log()
+    name = copy_name(SESSION_FILE, hashlib.sha256(text).hexdigest())
+    write_folder(folder, {name: text}, force=True, own=True, read_only=is_copy)
+    store.go_on_from_log()
+    return [Amendment(SESSION_FILE, hashlib.sha256(text).hexdigest(), session.sha256, name, reason, made)]
+
+
+def _copied(folder: Path, name: str, sha256: str) -> str:
+    """Keep a copy of a file as it stands, and return where."""
+    keep_copies(folder, {name: sha256})
+    return copy_name(name, sha256)
 
 
 def _whole(folder: Path, plan: Path | None, machine: Path | None) -> tuple[SessionFolder, Seal]:

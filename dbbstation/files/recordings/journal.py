@@ -6,6 +6,7 @@ recorded the file ends in `.csv.part`; sealing renames it. Nothing is ever overw
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import time
@@ -14,10 +15,10 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError, Problem
-from dbbstation.files.atomic import sync_folder
+from dbbstation.files.atomic import set_read_only, sync_folder
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.run_csv import PART, RunFile, parse_run
-from dbbstation.files.source_text import read_bytes
+from dbbstation.files.refused import refusal
 from dbbstation.trace import columns
 
 if TYPE_CHECKING:
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
 
     from dbbstation.files.recordings.entries import Counts
     from dbbstation.plan.circle import Direction
+
+_LOG = logging.getLogger(__name__)
+
+_MANY = 1000
 
 SYNC_INTERVAL_S = 0.5
 """Time between two syncs. A sample is on the disk within a second: a sync itself and what comes in batches take time, too [s]."""
@@ -121,7 +126,7 @@ class RunWriter:
             raise OutputError("this run exists already", where=str(self.sealed_path), remedy="take the next repeat")
         with self._told():
             # Unbuffered: a killed program loses nothing, only a power cut can.
-            self._file = self.path.open("xb", buffering=0)
+            self._file = self.path.open("x+b", buffering=0)
             self._write(header)
             os.fsync(self._file.fileno())
             sync_folder(folder)
@@ -170,7 +175,42 @@ class RunWriter:
             return
         with self._told():
             os.fsync(self._file.fileno())
+            self._put_back()
         self._synced_at = self._clock()
+
+    def _put_back(self) -> None:
+        """Write the file anew where somebody has removed it: all of it can still be read through what is open."""
+        try:
+            there = self.path.lstat()
+        except FileNotFoundError:
+            there = None
+        if there is not None and os.path.samestat(there, os.fstat(self._file.fileno())):
+            return
+        lost, data = self._file, self._content()
+        if there is not None:
+            # Another file stands in its place: it keeps what it holds, under a name that is free.
+            number = next(k for k in range(1, _MANY) if not os.path.lexists(self._foreign(k)))
+            self.path.rename(self._foreign(number))
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = self.path.open("x+b", buffering=0)
+        self._write(data)
+        os.fsync(self._file.fileno())
+        sync_folder(self.path.parent)
+        lost.close()
+        _LOG.warning("%s was removed while it was recorded, and is written anew: nothing is lost", self.path)
+
+    def _foreign(self, number: int) -> Path:
+        return self.path.with_name(f"{self.path.name}.foreign-{number}")
+
+    def _content(self) -> bytes:
+        size = os.fstat(self._file.fileno()).st_size
+        self._file.seek(0)
+        pieces = []
+        while size > 0 and (piece := self._file.read(size)):
+            pieces.append(piece)
+            size -= len(piece)
+        self._file.seek(0, os.SEEK_END)
+        return b"".join(pieces)
 
     def read(self) -> RunFile:
         """Read what was written so far.
@@ -178,10 +218,11 @@ class RunWriter:
         Raises:
             InputError: it cannot be read, or not as it was written.
         """
-        faults: list[Problem] = []
-        data = read_bytes(self.path, faults, is_input=False)
-        if data is None:
-            raise InputError(faults)
+        try:
+            data = self._content()
+        except OSError as error:
+            why, remedy = refusal(error)
+            raise InputError([Problem(str(self.path), 0, 0, f"cannot be read: {why}", remedy)]) from error
         return parse_run(data, str(self.path))
 
     def seal(self, counts: Counts | None = None) -> str:
@@ -204,6 +245,7 @@ class RunWriter:
             digest = digest_of(self.path)
             if self.sealed_path.exists():
                 raise OutputError("this run exists already", where=str(self.sealed_path), remedy="take the next repeat")
+            set_read_only(self.path)
             self.path.rename(self.sealed_path)
             sync_folder(self.sealed_path.parent)
         return digest
@@ -225,6 +267,5 @@ class RunWriter:
             what = "this run is being recorded, or was when the station died"
             raise OutputError(what, where=str(self.path), remedy="take the next repeat") from error
         except OSError as error:
-            why = (error.strerror or str(error)).lower()
-            remedy = "free room on the disk or choose another folder"
+            why, remedy = refusal(error)
             raise OutputError(f"cannot be written: {why}", where=str(self.path), remedy=remedy) from error

@@ -12,9 +12,11 @@ import errno
 import os
 import socket
 import sys
+import time
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import OutputError
+from dbbstation.files.refused import refusal
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,6 +27,11 @@ if sys.platform != "win32":  # Windows has locks of its own
 LOCK_FILE = ".lock"
 """In the session folder; nothing reads it but this."""
 
+PATIENCE_S = 2.0
+"""How long a command that notes one thing waits for another that does [s]."""
+
+_PAUSE_S = 0.01
+
 _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS}
 
 
@@ -33,6 +40,7 @@ class SessionLock:
 
     Args:
         folder: of the session.
+        patience_s: how long another process may go on writing into it [s].
 
     Attributes:
         held: whether the file system gave a lock; False where it knows none.
@@ -41,17 +49,16 @@ class SessionLock:
         OutputError: another process writes into the session, or the folder cannot be written.
     """
 
-    def __init__(self, folder: Path) -> None:
-        path = folder / LOCK_FILE
-        try:
-            self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
-        except OSError as error:
-            why = (error.strerror or str(error)).lower()
-            raise OutputError(
-                f"cannot be written: {why}", where=str(path), remedy="check the folder's permissions"
-            ) from error
-        self.held = self._locked(folder)
-        if self.held:
+    def __init__(self, folder: Path, patience_s: float = 0.0) -> None:
+        self._file: int | None = None
+        until_s = time.monotonic() + patience_s
+        while True:
+            self._open(folder)
+            self.held = self._locked(folder, until_s)
+            if not self.held or self._in_place(folder):
+                break
+            self.close()  # somebody removed the file while it was waited for: the next one makes another
+        if self.held and self._file is not None:
             with contextlib.suppress(OSError):  # a full disk must not keep anybody from going on
                 os.ftruncate(self._file, 0)
                 os.pwrite(self._file, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
@@ -74,22 +81,44 @@ class SessionLock:
         if file is not None:
             os.close(file)
 
-    def _locked(self, folder: Path) -> bool:
-        if sys.platform == "win32" or self._file is None:
+    def _open(self, folder: Path) -> None:
+        path = folder / LOCK_FILE
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        except OSError as error:
+            why, remedy = refusal(error)
+            raise OutputError(f"cannot be written: {why}", where=str(path), remedy=remedy) from error
+
+    def _in_place(self, folder: Path) -> bool:
+        """Whether the file that is locked is the one that others would lock."""
+        if self._file is None:
             return False
         try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            who = os.pread(self._file, 200, 0).decode(errors="replace").strip()
-            self.close()
-            raise OutputError(
-                f"{who or 'another process'} writes into this session",
-                where=str(folder),
-                remedy="end it first, or measure into another folder",
-            ) from error
-        except OSError as error:
-            if error.errno in _NO_LOCKS:
-                return False
-            self.close()
-            raise OutputError(f"cannot be locked: {error.strerror}", where=str(folder)) from error
-        return True
+            return os.path.samestat(os.fstat(self._file), (folder / LOCK_FILE).lstat())
+        except OSError:
+            return False
+
+    def _locked(self, folder: Path, until_s: float) -> bool:
+        if sys.platform == "win32" or self._file is None:
+            return False
+        while True:
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                if time.monotonic() < until_s:
+                    time.sleep(_PAUSE_S)
+                    continue
+                who = os.pread(self._file, 200, 0).decode(errors="replace").strip()
+                self.close()
+                raise OutputError(
+                    f"{who or 'another process'} writes into this session",
+                    where=str(folder),
+                    remedy="end it first, or measure into another folder",
+                ) from error
+            except OSError as error:
+                if error.errno in _NO_LOCKS:
+                    return False
+                self.close()
+                why, remedy = refusal(error)
+                raise OutputError(f"cannot be locked: {why}", where=str(folder), remedy=remedy) from error
+            return True

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.errors import InputError, Problem, few
-from dbbstation.files.gateway import opened
+from dbbstation.files.gateway import digest_of, opened
 from dbbstation.files.inputs import note_input, note_read
 from dbbstation.files.recordings.run_lines import pieces_of
 from dbbstation.files.recordings.run_numbers import Numbers
@@ -89,6 +89,18 @@ def _hashed(blocks: Iterable[bytes], digest: hashlib._Hash) -> Iterator[bytes]:
     for block in blocks:
         digest.update(block)
         yield block
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        return digest_of(path)
+    except OSError as error:
+        raise InputError([unreadable(path, error)]) from error
 
 
 def sealed_or_part(path: Path) -> Path:

@@ -34,6 +34,12 @@ SEALED = "sealed"
 AMEND = "restore it, or say why it was changed: `dbbstation session amend {folder} --reason TEXT`"
 """What to do about a file that is not the sealed one."""
 
+RUNS = "runs"
+"""What an amendment of the list of runs is called."""
+
+_NAMED_DIGITS = 16
+"""Hex digits of its SHA-256 that stand in the name of a copy."""
+
 _MOST_NAMED = 4
 """Changed keys that are named; a file that was exchanged has hundreds."""
 
@@ -46,11 +52,15 @@ class Seal:
         files: SHA-256 by path as the session file names it.
         runs: number of sealed runs.
         chain_sha256: link of the last of them; empty where there is none.
+        events: number of events in the event log; zero where the session has none.
+        anchor: link of the last of them: who noted it elsewhere can tell whether anything was changed that stood there.
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
     runs: int = 0
     chain_sha256: str = ""
+    events: int = 0
+    anchor: str = ""
 
 
 @dataclass(frozen=True)
@@ -82,7 +92,10 @@ class Amendment:
 
 def seal_entry(seal: SealSchema | None) -> Seal | None:
     """Return the seal of a session file as the rest of the program takes it."""
-    return None if seal is None else Seal(seal.files, seal.runs, seal.chain_sha256 or "")
+    if seal is None:
+        return None
+    events, anchor = (0, "") if seal.log is None else (seal.log.events, seal.log.sha256)
+    return Seal(seal.files, seal.runs, seal.chain_sha256 or "", events, anchor)
 
 
 def amendment_entry(entry: AmendmentSchema) -> Amendment:
@@ -113,11 +126,12 @@ def hashes(folder: Path, names: Sequence[str]) -> dict[str, str]:
 def copy_name(name: str, sha256: str) -> str:
     """Return where a sealed file is kept in the session folder."""
     stem, dot, ending = name.rpartition("/")[2].rpartition(".")
-    return f"{SEALED}/{stem}-{sha256[:16]}{dot}{ending}" if dot else f"{SEALED}/{ending}-{sha256[:16]}"
+    part = sha256[:_NAMED_DIGITS]
+    return f"{SEALED}/{stem}-{part}{dot}{ending}" if dot else f"{SEALED}/{ending}-{part}"
 
 
 def keep_copies(folder: Path, sealed: Mapping[str, str]) -> None:
-    """Keep a copy of every sealed file in the session, so that nothing of it is lost when it changes.
+    """Keep a copy of every sealed file in the session, so that nothing of it is lost when it changes; put a spoilt one right.
 
     Args:
         folder: of the session.
@@ -126,10 +140,54 @@ def keep_copies(folder: Path, sealed: Mapping[str, str]) -> None:
     Raises:
         OutputError: the disk refuses.
     """
-    copies = {copy_name(name, digest): read_bytes(folder / name, []) for name, digest in sealed.items()}
-    write_folder(
-        folder, {copy: data for copy, data in copies.items() if data is not None and not (folder / copy).exists()}
-    )
+    copies = {}
+    for name, digest in sealed.items():
+        copy, data = copy_name(name, digest), read_bytes(folder / name, [])
+        sound = data is not None and hashlib.sha256(data).hexdigest() == digest
+        if data is not None and sound and hashes(folder, (copy,)).get(copy) != digest:
+            copies[copy] = data
+    if copies:
+        write_folder(folder, copies, force=True, own=True, read_only=is_copy)
+
+
+def is_copy(name: str) -> bool:
+    """Whether a path in a session is that of a kept copy."""
+    return name.startswith(f"{SEALED}/")
+
+
+def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> Iterator[Problem]:
+    """Yield what is wrong with the copies that are kept: spoilt, gone, or under a name that is none of theirs.
+
+    Args:
+        folder: of the session.
+        seal: of it.
+        amendments: by which further copies are known.
+    """
+    known = {copy_name(name, digest): digest for name, digest in seal.files.items()}
+    known |= {one.former: one.former_sha256 for one in amendments if is_copy(one.former) and one.what != RUNS}
+    there = {path.relative_to(folder).as_posix() for path in (folder / SEALED).rglob("*") if path.is_file()}
+    now = hashes(folder, sorted(there))
+    originals = {digest for name, digest in hashes(folder, tuple(seal.files)).items()}
+    for name in sorted(there | known.keys()):
+        digest, said = now.get(name), known.get(name, "")
+        if name not in there:
+            what = f"{name}, a copy of what was sealed, is not there"
+        elif digest is None:
+            what = f"{name}, a copy of what was sealed, cannot be read"
+        elif (said and digest != said) or not fits_name(name, digest):
+            what = f"{name} is not the copy that was kept: its SHA-256 is {digest}"
+        else:
+            continue
+        remedy = (
+            f"`dbbstation session seal {folder}` puts it right" if said in originals else "restore it from a backup"
+        )
+        yield Problem(str(folder / name), 0, 0, what, remedy)
+
+
+def fits_name(name: str, digest: str) -> bool:
+    """Whether a kept copy is the one that its name says."""
+    stem = name.rpartition("/")[2].partition(".")[0]
+    return stem.endswith(f"-{digest[:_NAMED_DIGITS]}")
 
 
 def link(before: str, run: RunEntry) -> str:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.atomic import write_text
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.recordings.entries import run_entry
+from dbbstation.files.recordings.event_log import read_event_log
+from dbbstation.files.recordings.lock import PATIENCE_S, SessionLock
 from dbbstation.files.recordings.seal import (
     Seal,
     chained,
+    copy_name,
     hashes,
     keep_copies,
     seal_entry,
@@ -24,6 +26,8 @@ from dbbstation.files.recordings.seal import (
     sealed_over,
 )
 from dbbstation.files.recordings.session import SESSION_FILE
+from dbbstation.files.recordings.session_state import SEALED, Stands, mark_of, standing
+from dbbstation.files.recordings.session_store import SessionStore, log_faults
 from dbbstation.files.recordings.session_text import seal_data
 from dbbstation.files.source_text import decode, read_bytes
 from dbbstation.files.yaml.out import yaml_text
@@ -31,10 +35,11 @@ from dbbstation.files.yaml.schema import format_for, validate
 from dbbstation.files.yaml.text import parse_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.recordings.event_log import EventLog
 
 
 @dataclass(frozen=True)
@@ -43,33 +48,64 @@ class Sealing:
 
     Attributes:
         path: of the session file.
-        text: its text with all hashes, the chain and the seal.
+        chained: its text with all hashes and the chain, its seal as it was.
         files: run files that got a hash, as the session file names them.
         linked: runs that came into the chain.
         seal: what the session carries then.
         before: text of the session file as it is.
+        logged: whether the session has an event log.
+        copies: kept copies of what is sealed that are spoilt or gone.
     """
 
     path: Path
-    text: str
+    chained: str
     files: tuple[str, ...]
     linked: tuple[str, ...]
     seal: Seal
     before: str
+    logged: bool
+    copies: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """Text of the session file with all hashes, the chain and the seal."""
+        return _with_seal(self.chained, self.seal)
 
     @property
     def anything(self) -> bool:
-        """Whether the session file lacks something."""
-        return self.text != self.before
+        """Whether the session lacks something."""
+        return self.text != self.before or not self.logged or bool(self.copies)
 
-    def write(self) -> None:
-        """Write the session file, and copies of what is sealed beside it first.
 
-        Raises:
-            OutputError: the disk refuses; the session file is as before then.
-        """
-        keep_copies(self.path.parent, self.seal.files)
-        write_text(self.path, self.text, force=True, rewrites=True)
+def seal_session(folder: Path) -> Sealing:
+    """Seal a session: the session file with all hashes, its event log, and copies of what is sealed.
+
+    Args:
+        folder: of the session, or its session file.
+
+    Returns:
+        What was done.
+
+    Raises:
+        InputError: as of `sealing`.
+        OutputError: another process writes into the session, or the disk refuses; the session file is as before then.
+    """
+    found = sealing(folder)  # no lock is left in what is no session
+    with SessionLock(found.path.parent, PATIENCE_S):
+        store = SessionStore(found.path.parent)
+        found = sealing(folder)
+        keep_copies(found.path.parent, found.seal.files)
+        document = parse_yaml(found.text, str(found.path), [])
+        if document is None:
+            raise ValueError("a session file that was sealed cannot be read")
+        store.write(document.data, SEALED, lambda said: _with_seal(found.chained, _marked(found.seal, said)))
+    return found
+
+
+def _marked(seal: Seal, said: Mapping[str, Any]) -> Seal:
+    """The seal with the end of the event log as the session file is to say it."""
+    mark = mark_of(said)
+    return seal if mark is None else replace(seal, events=mark[0], anchor=mark[1])
 
 
 def sealing(folder: Path) -> Sealing:
@@ -91,9 +127,14 @@ def sealing(folder: Path) -> Sealing:
     if text is None or parse_yaml(text, str(path), faults) is None:
         raise InputError(faults)
     hashed, files = _with_hashes(text, path)
-    runs, seal = _chain(hashed, path)
+    runs, seal, log = _chain(hashed, path)
     whole, linked = _with_links(hashed, path, runs)
-    return Sealing(path, _with_seal(whole, seal), files, linked, seal, text)
+    spoilt = [copy for copy, digest in _copies(seal).items() if hashes(path.parent, (copy,)).get(copy) != digest]
+    return Sealing(path, whole, files, linked, seal, text, log is not None and bool(log.events), tuple(spoilt))
+
+
+def _copies(seal: Seal) -> dict[str, str]:
+    return {copy_name(name, digest): digest for name, digest in seal.files.items()}
 
 
 def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
@@ -119,8 +160,8 @@ def _with_hashes(text: str, path: Path) -> tuple[str, tuple[str, ...]]:
     return _added(text, additions), tuple(named)
 
 
-def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal]:
-    """Runs of the text with all links, and the seal over them."""
+def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal, EventLog | None]:
+    """Runs of the text with all links, the seal over them, and the event log."""
     faults: list[Problem] = []
     document = parse_yaml(text, str(path), faults)
     session = None if document is None else validate(document, SessionFile, faults)
@@ -128,7 +169,10 @@ def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal]:
         raise InputError(faults)
     folder, names = path.parent, (session.machine, session.plan)
     runs = tuple(run_entry(run, folder) for run in session.runs)
-    seal = seal_entry(session.seal)
+    seal, log = seal_entry(session.seal), read_event_log(folder, faults)
+    # Hashes that are added now are no change of what was sealed.
+    if document is not None and standing(document.data, log, but_runs=True).stands is Stands.UNLIKE:
+        faults += log_faults(path, document.data, log, but_runs=True)
     if seal is None:
         sealed = sealed_names(folder, names)
         found = hashes(folder, sealed)
@@ -146,7 +190,8 @@ def _chain(text: str, path: Path) -> tuple[tuple[RunEntry, ...], Seal]:
         faults.append(Problem(str(path), 0, 0, what, "put them behind the runs that are sealed"))
     if faults:
         raise InputError(faults)
-    return linked, sealed_over(found, linked)
+    over = sealed_over(found, linked)
+    return linked, over if seal is None else replace(over, events=seal.events, anchor=seal.anchor), log
 
 
 def _with_links(text: str, path: Path, runs: Sequence[RunEntry]) -> tuple[str, tuple[str, ...]]:

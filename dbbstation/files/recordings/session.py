@@ -24,14 +24,16 @@ from dbbstation.files.recordings.entries import (
     note_entry,
     run_entry,
 )
+from dbbstation.files.recordings.event_log import EVENTS_FILE
 from dbbstation.files.recordings.run_csv import PART, RunFile, read_run
 from dbbstation.files.recordings.run_lines import split_file
 from dbbstation.files.recordings.seal import amendment_entry, seal_entry, seal_faults
 from dbbstation.files.recordings.session_checks import check_bar, check_runs
 from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.files.recordings.session_set_up import check_set_up_errors, mounted_name, set_up_readings
-from dbbstation.files.source_text import read_bytes
-from dbbstation.files.yaml.schema import read_document, validate
+from dbbstation.files.recordings.session_store import REBUILD, document_in_force, log_faults
+from dbbstation.files.source_text import read_bytes, unreadable
+from dbbstation.files.yaml.schema import validate
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
 from dbbstation.trace.cut import lost_on_turn, unusable_on_turn
@@ -219,6 +221,9 @@ def read_session(path: Path) -> SessionFolder:
 
 def no_session(folder: Path) -> Problem:
     """What is wrong with a folder that is no session, with the sessions that stand in it, around it or beside it."""
+    if (folder / EVENTS_FILE).is_file():
+        what = f"the session file {SESSION_FILE} is gone, its event log is there"
+        return Problem(str(folder), 0, 0, what, REBUILD.format(folder=folder))
     inside = sorted(file.parent for file in folder.glob(f"*/{SESSION_FILE}"))
     around = [folder.parent] if (folder.parent / SESSION_FILE).is_file() else []
     beside = sorted(file.parent for file in folder.parent.glob(f"*/{SESSION_FILE}"))
@@ -247,7 +252,7 @@ def parse_session(
         return None
     file = path / SESSION_FILE if path.is_dir() else path
     folder = file.parent
-    document = read_document(file, SessionFile, faults)
+    document, log = document_in_force(file, faults)
     if document is None:
         return None
     session = validate(document, SessionFile, faults)
@@ -265,11 +270,16 @@ def parse_session(
         return None
     entries = [run_entry(run, folder) for run in session.runs]
     seal = seal_entry(session.seal)
-    if seal is not None and as_sealed:
-        faults += seal_faults(folder, file, seal, (session.machine, session.plan), entries)
+    if as_sealed:
+        broken = [] if seal is None else seal_faults(folder, file, seal, (session.machine, session.plan), entries)
+        faults += [*broken, *log_faults(file, data, log, but_runs=any(one.file == str(file) for one in broken))]
     if machine is None or planned is None:
         return None
-    digest = digest_of(file)
+    try:
+        digest = digest_of(file)
+    except OSError as error:
+        faults.append(unreadable(file, error))
+        return None
     return SessionFolder(
         name=folder.resolve().name,
         folder=folder,

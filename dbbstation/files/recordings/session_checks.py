@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from dbbstation.plan.plan import Plan
 
 
+_RECORDING = "recording"
+
+
 def check_runs(document: YamlDocument, plan: Plan | None, folder: Path, faults: list[Problem]) -> None:
     """Check runs against each other, the plan and the disk, on the raw data: other faults must not hide these."""
     runs = document.entries("runs")
@@ -62,6 +65,8 @@ def _check_file(
     if not isinstance(file, str):
         return
     path = sealed_or_part(folder / file)
+    if not path.is_file() and entry.get("state") == _RECORDING:
+        return  # a run that died: nothing is worked out of it, `check` names it
     if not path.is_file():
         what = f"there is no file `{file}` in the session folder"
         faults.append(document.problem((*location, "file"), what, "restore it, or take the entry out"))

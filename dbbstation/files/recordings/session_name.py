@@ -1,3 +1,9 @@
-"""The file that makes a folder a session; whoever only looks for sessions need not read one."""
+"""Names in a session folder."""
 
-SESSION_FILE = "session.yaml"
+from dbbstation.files import recorded_ground
+
+SESSION_FILE = recorded_ground.SESSION_FILE
+"""What a session folder is known by."""
+
+MACHINE_FILE, PLAN_FILE, RUNS, PROGRAMS = "machine.yaml", "plan.yaml", "runs", "programs"
+"""What stands beside it in a session that this program makes."""

@@ -1,4 +1,4 @@
-"""The text of a session file: everything that a session notes, in the oldest version of the format that has it all."""
+"""What a session file says as plain data, and its text, in the oldest version of the format that has it all."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_for
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from dbbstation.files.recordings.entries import Note, RunEntry
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.session_details import SessionDetails
 
 
-def session_text(folder: Path, names: Sequence[str], details: SessionDetails, runs: Sequence[RunEntry]) -> str:
-    """Return the text of a session file.
+def session_data(
+    folder: Path, names: Sequence[str], details: SessionDetails, runs: Sequence[RunEntry]
+) -> dict[str, object]:
+    """Return what a session file says, without its format.
 
     Args:
         folder: of the session.
@@ -30,7 +32,6 @@ def session_text(folder: Path, names: Sequence[str], details: SessionDetails, ru
     """
     bar, seal = details.bar, details.seal
     data: dict[str, object] = {
-        "format": "",
         "machine": names[0],
         "plan": names[1],
         "serial_number": details.serial_number,
@@ -46,14 +47,19 @@ def session_text(folder: Path, names: Sequence[str], details: SessionDetails, ru
         "set_up_errors": [_without_none(asdict(readings)) for readings in details.set_up_errors] or None,
     }
     data = {key: _without_none(value) for key, value in data.items() if value is not None}
-    data["runs"] = [_without_none(_run_data(folder, run)) for run in runs]
-    data["format"] = format_for(SessionFile, data)
-    return yaml_text(data)
+    return {**data, "runs": [_without_none(_run_data(folder, run)) for run in runs]}
+
+
+def text_of(data: Mapping[str, object]) -> str:
+    """Return the text of a session file that says `data`, its keys in their usual order."""
+    ordered = {key: data[key] for key in SessionFile.model_fields if key in data}
+    return yaml_text({"format": format_for(SessionFile, ordered), **ordered})
 
 
 def seal_data(seal: Seal) -> dict[str, object]:
     """Return a seal as its file holds it."""
-    data = {"files": dict(seal.files), "runs": seal.runs, "chain_sha256": seal.chain_sha256 or None}
+    log = {"events": seal.events, "sha256": seal.anchor} if seal.anchor else None
+    data = {"files": dict(seal.files), "runs": seal.runs, "chain_sha256": seal.chain_sha256 or None, "log": log}
     return {key: value for key, value in data.items() if value is not None}
 
 

@@ -1,161 +1,37 @@
-"""Making a session folder and keeping its session file true while runs come in."""
+"""Keeping the session file of a session true while runs come in and are judged."""
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Self
 
 from dbbstation.errors import InputError, OutputError, Problem
-from dbbstation.files.atomic import remove_leftovers, write_bytes, write_folder, write_text
-from dbbstation.files.formats.machine import machine_text
-from dbbstation.files.formats.plan import plan_text
-from dbbstation.files.formats.session import SessionFile
-from dbbstation.files.gateway import content_of, digest_of
-from dbbstation.files.recordings.entries import Program, RunEntry, RunState
-from dbbstation.files.recordings.journal import RunWriter, run_header, run_line, run_name
+from dbbstation.files.atomic import remove_leftovers, write_bytes
+from dbbstation.files.recordings.entries import Note, Program, RunEntry, RunState
+from dbbstation.files.recordings.event_log import EVENTS_FILE
+from dbbstation.files.recordings.journal import RunWriter, run_name
 from dbbstation.files.recordings.lock import SessionLock
-from dbbstation.files.recordings.seal import chained, copy_name, hashes, keep_copies, sealed_names, sealed_over
-from dbbstation.files.recordings.session import SESSION_FILE, SessionFolder, part_entry, read_session
-from dbbstation.files.recordings.session_checks import check_bar
+from dbbstation.files.recordings.new_session import make_session_folder
+from dbbstation.files.recordings.run_csv import sha256_of
+from dbbstation.files.recordings.seal import chained, hashes, keep_copies, sealed_names, sealed_over
+from dbbstation.files.recordings.session import no_session, part_entry, read_session
 from dbbstation.files.recordings.session_details import SessionDetails
+from dbbstation.files.recordings.session_name import PROGRAMS, RUNS, SESSION_FILE
 from dbbstation.files.recordings.session_set_up import readings_in
-from dbbstation.files.recordings.session_text import session_text
-from dbbstation.files.yaml.schema import validate
-from dbbstation.files.yaml.text import parse_yaml
+from dbbstation.files.recordings.session_store import SessionStore, now
+from dbbstation.files.recordings.session_text import session_data
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Sequence
     from datetime import datetime
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.recordings.entries import Counts, Note
+    from dbbstation.files.recordings.entries import Counts
+    from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
-
-MACHINE_FILE, PLAN_FILE, RUNS, PROGRAMS = "machine.yaml", "plan.yaml", "runs", "programs"
-
-
-@dataclass(frozen=True, eq=False)
-class FinishedRun:
-    """A run that exists whole, such as a simulated one.
-
-    Attributes:
-        test: name of the test.
-        direction: sense of travel.
-        columns: by name, each of shape (n,), in the columns' units.
-        repeat: of this test and direction.
-        mounting: counts how often a ball was put up; None: one mounting per test.
-        started: when the first sample was taken; None where that means nothing.
-        program: name and bytes of the NC program that was commanded, None for the plan's circle.
-        model_sha256: of the model that the program was compensated with.
-        state: as the session notes it.
-        reason: why it was rejected; empty otherwise.
-        texts: columns that are no numbers, such as `status`, n texts each.
-        exact: write as many digits as it takes to read back the same bits, not those that instruments resolve.
-    """
-
-    test: str
-    direction: Direction
-    columns: Mapping[str, NDArray[np.float64]]
-    repeat: int = 1
-    mounting: int | None = None
-    started: datetime | None = None
-    program: tuple[str, bytes] | None = None
-    model_sha256: str = ""
-    state: RunState = RunState.ACCEPTED
-    reason: str = ""
-    texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    exact: bool = False
-
-
-def write_session(
-    folder: Path,
-    machine: Machine,
-    plan: InlinePlan,
-    runs: Sequence[FinishedRun],
-    details: SessionDetails | None = None,
-    more: Mapping[str, str | bytes] | None = None,
-) -> None:
-    """Write a whole session at once; all of it or nothing.
-
-    Args:
-        folder: of the session.
-        machine: nominal.
-        plan: as run.
-        runs: in order.
-        details: what it notes beside them.
-        more: further files by path in the folder.
-
-    Raises:
-        OutputError: the folder exists already, or cannot be written.
-    """
-    files: dict[str, str | bytes] = dict(more or {})
-    entries = []
-    for run in runs:
-        name = f"{RUNS}/{run_name(run.test, run.direction, run.repeat)}"
-        files[name] = data = _run_bytes(run)
-        program = None
-        if run.program is not None:
-            path = f"{PROGRAMS}/{run.program[0]}"
-            files[path] = run.program[1]
-            program = Program(folder / path, hashlib.sha256(run.program[1]).hexdigest(), run.model_sha256)
-        entry = RunEntry(
-            test=run.test,
-            direction=run.direction,
-            repeat=run.repeat,
-            mounting=run.mounting,
-            state=run.state,
-            reason=run.reason,
-            started=run.started,
-            path=folder / name,
-            sha256=hashlib.sha256(data).hexdigest(),
-            program=program,
-            centre_mm=None,
-        )
-        entries.append(entry)
-    _make_folder(folder, machine, plan, details or SessionDetails(), entries, files)
-
-
-def _make_folder(
-    folder: Path,
-    machine: Machine,
-    plan: InlinePlan,
-    details: SessionDetails,
-    entries: Sequence[RunEntry],
-    files: Mapping[str, str | bytes],
-) -> None:
-    if folder.exists():
-        raise OutputError("the session folder exists already", where=str(folder), remedy="choose another name")
-    whole: dict[str, str | bytes] = {f"{RUNS}/": "", f"{PROGRAMS}/": "", **files}
-    whole[MACHINE_FILE], whole[PLAN_FILE] = machine_text(machine), plan_text(plan)
-    sealed = {name: str(whole[name]).encode() for name in (MACHINE_FILE, PLAN_FILE)}
-    now = {name: hashlib.sha256(content).hexdigest() for name, content in sealed.items()}
-    whole |= {copy_name(name, now[name]): content for name, content in sealed.items()}
-    runs = chained(entries)
-    noted = replace(details, seal=sealed_over(now, runs))
-    whole[SESSION_FILE] = text = session_text(folder, (MACHINE_FILE, PLAN_FILE), noted, runs)
-    _check_details(text, folder, plan)
-    write_folder(folder, whole)
-
-
-def _check_details(text: str, folder: Path, plan: InlinePlan) -> None:
-    """Hold what a session notes against its format and plan before anything is written.
-
-    Raises:
-        InputError: everything that no session may say, such as a bar's length in metres.
-    """
-    faults: list[Problem] = []
-    document = parse_yaml(text, str(folder / SESSION_FILE), faults)
-    session = None if document is None else validate(document, SessionFile, faults)
-    if document is not None and session is not None and session.bar is not None:
-        check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, plan.to_domain(), faults)
-    if faults:
-        raise InputError([replace(fault, file=str(folder), line=0, column=0) for fault in faults])
 
 
 class SessionWriter:
@@ -166,8 +42,11 @@ class SessionWriter:
     are taken over; where they are wrong, the next step raises InputError and leaves the file as it is.
     """
 
-    def __init__(self, session: SessionFolder, lock: SessionLock) -> None:
-        self._session, self._lock = session, lock
+    def __init__(self, folder: Path, lock: SessionLock, clock: Callable[[], datetime]) -> None:
+        self._lock = lock
+        self._store = SessionStore(folder, clock)
+        self._clock = clock
+        self._session = self._kept = replace(read_session(folder), sha256=self._store.sha256)
 
     def __enter__(self) -> Self:
         """Return the writer."""
@@ -188,37 +67,73 @@ class SessionWriter:
 
     @classmethod
     def create(
-        cls, folder: Path, machine: Machine, plan: InlinePlan, details: SessionDetails | None = None
-    ) -> SessionWriter:
+        cls,
+        folder: Path,
+        machine: Machine,
+        plan: InlinePlan,
+        details: SessionDetails | None = None,
+        clock: Callable[[], datetime] = now,
+    ) -> Self:
         """Make a session folder with machine and plan in it and no runs.
 
+        Args:
+            folder: of the session.
+            machine: nominal.
+            plan: as run.
+            details: what it notes beside its runs.
+            clock: the time of day with its zone, for the event log.
+
         Raises:
-            OutputError: the folder exists already, or cannot be written.
+            InputError: what no session may note.
+            OutputError: the folder exists already, lies in another session, or cannot be written.
         """
-        _make_folder(folder, machine, plan, details or SessionDetails(), (), {})
-        return cls(read_session(folder), SessionLock(folder))
+        make_session_folder(folder, machine, plan, details or SessionDetails(), (), {}, clock())
+        return cls._locked(folder, 0.0, clock)
 
     @classmethod
-    def open(cls, folder: Path) -> Self:
+    def _locked(cls, folder: Path, patience_s: float, clock: Callable[[], datetime]) -> Self:
+        """Lock first, then read: what another process wrote until then is read."""
+        lock = SessionLock(folder, patience_s)
+        try:
+            writer = cls(folder, lock, clock)
+            writer._take_over()
+        except BaseException:
+            lock.close()
+            raise
+        return writer
+
+    @classmethod
+    def open(cls, folder: Path, patience_s: float = 0.0, clock: Callable[[], datetime] = now) -> Self:
         """Go on with a session: half-recorded runs are kept and listed as `recording`.
+
+        A session file that was spoilt is written anew from the event log.
+
+        Args:
+            folder: of the session.
+            patience_s: how long another process may go on writing into it [s].
+            clock: the time of day with its zone, for the event log.
 
         Raises:
             InputError: every fault of the session.
             OutputError: another process writes into it, or the session file cannot be written.
         """
-        read_session(folder)  # no lock is left in what is no session
-        writer = cls(read_session(folder), SessionLock(folder))
+        if not any((folder / name).is_file() for name in (SESSION_FILE, EVENTS_FILE)):
+            raise InputError([no_session(folder)])  # no lock is left in what is no session
+        return cls._locked(folder, patience_s, clock)
+
+    def _take_over(self) -> None:
+        """Put right what a process left that died."""
+        folder = self._session.folder
         for inner in (folder, folder / RUNS, folder / PROGRAMS):
             remove_leftovers(inner)
         # A run that was sealed when the station died only lacks its hash.
-        for run in writer.runs:
-            if run.state is RunState.RECORDING and run.path.suffix == ".csv":
-                digest = digest_of(run.path)
+        for run in self.runs:
+            if run.state is RunState.RECORDING and run.path.suffix == ".csv" and run.path.is_file():
+                digest = sha256_of(run.path)
                 found = part_entry(run.path)
                 counts = None if found is None else found.counts
-                writer._put(replace(run, state=RunState.COMPLETE, sha256=digest, counts=counts))
-        writer._write()
-        return writer
+                self._put(replace(run, state=RunState.COMPLETE, sha256=digest, counts=counts))
+        self._write("taken over")
 
     @property
     def session(self) -> SessionFolder:
@@ -285,7 +200,7 @@ class SessionWriter:
             centre_mm=centre_mm,
         )
         self._put(entry)
-        self._write()
+        self._write("run started")
         return writer
 
     def finish_run(self, writer: RunWriter, counts: Counts | None = None) -> RunEntry:
@@ -301,7 +216,7 @@ class SessionWriter:
         entry = next(run for run in self.runs if run.path == writer.path)
         digest = writer.seal(counts)
         done = self._put(replace(entry, state=RunState.COMPLETE, path=writer.sealed_path, sha256=digest, counts=counts))
-        self._write()
+        self._write("run sealed")
         return done
 
     def judge(self, run: RunEntry, *, accepted: bool, reason: str = "") -> RunEntry:
@@ -314,7 +229,7 @@ class SessionWriter:
             raise OutputError("a run that is not complete cannot be judged", where=run.label, remedy="run it again")
         state = RunState.ACCEPTED if accepted else RunState.REJECTED
         judged = self._put(replace(run, state=state, reason="" if accepted else reason))
-        self._write()
+        self._write(state.value)
         return judged
 
     def note(self, note: Note) -> None:
@@ -324,7 +239,7 @@ class SessionWriter:
             OutputError: the disk refuses.
         """
         self._session = replace(self._session, notes=(*self._session.notes, note))
-        self._write()
+        self._write("noted")
 
     def take_in(self, path: Path) -> RunEntry:
         """List a sealed run that lies in the folder and is in no list, as `complete`: it is still to be judged.
@@ -344,11 +259,11 @@ class SessionWriter:
         ):
             what = f"the session lists another run {found.label}"
             raise InputError([Problem(file, 1, 0, what, "give one of them another repeat")])
-        digest = digest_of(path)
+        digest = sha256_of(path)
         entry = replace(found, state=RunState.COMPLETE, sha256=digest)
         self._session.load(entry)
         taken = self._put(entry)
-        self._write()
+        self._write("taken in")
         return taken
 
     def add_program(self, name: str, content: bytes, *, model_sha256: str = "") -> Program:
@@ -358,9 +273,10 @@ class SessionWriter:
             OutputError: another program has that name, or the disk refuses.
         """
         path = self._session.folder / PROGRAMS / name
-        if not (path.is_file() and content_of(path) == content):
-            write_bytes(path, content)
-        return Program(path, hashlib.sha256(content).hexdigest(), model_sha256)
+        digest = hashlib.sha256(content).hexdigest()
+        if not (path.is_file() and sha256_of(path) == digest):
+            write_bytes(path, content, rewrites=True)
+        return Program(path, digest, model_sha256)
 
     def _seal(self) -> None:
         """Seal a session of an older program before more is recorded into it."""
@@ -381,18 +297,29 @@ class SessionWriter:
         self._session = replace(self._session, runs=runs, seal=seal)
         return next(run for run in runs if (run.test, run.direction, run.repeat) == key)
 
-    def _write(self) -> None:
-        file, session = self._session.folder / SESSION_FILE, self._session
-        if file.is_file() and digest_of(file) != session.sha256:
-            # Somebody wrote micrometer readings into it while runs come in; nothing else may be changed there.
-            session = replace(session, set_up_errors=readings_in(file, session.plan))
-        text = session_text(session.folder, session.names, session, session.runs)
-        write_text(file, text, force=True, rewrites=True)
-        self._session = replace(session, sha256=hashlib.sha256(text.encode()).hexdigest())
+    def _write(self, what: str) -> None:
+        """Log and write what the session is now; where that fails it is as it was written last."""
+        try:
+            self._take_readings()
+            session = self._session
+            self._store.write(session_data(session.folder, session.names, session, session.runs), what)
+        except BaseException:
+            self._session = self._kept
+            raise
+        seal = session.seal
+        if seal is not None:
+            seal = replace(seal, events=len(self._store.log.events), anchor=self._store.log.links[-1])
+        self._session = self._kept = replace(session, sha256=self._store.sha256, seal=seal)
 
-
-def _run_bytes(run: FinishedRun) -> bytes:
-    names = (*run.columns, *run.texts)
-    rows = zip(*(values.tolist() for values in run.columns.values()), *run.texts.values(), strict=True)
-    header = run_header(run.test, run.direction, run.repeat, names)
-    return header + b"".join([run_line(row, names, exact=run.exact) for row in rows])
+    def _take_readings(self) -> None:
+        """Take over micrometer readings that somebody wrote into the session file while runs come in; nothing else."""
+        other = self._store.changed_meanwhile()
+        if other is not None:
+            readings = readings_in(self._session.folder / SESSION_FILE, self._session.plan)
+            self._store.accept_readings(other)
+            self._session = replace(self._session, set_up_errors=readings)
+        if self._store.put_aside is not None:
+            where = f"; as it was: {self._store.put_aside}" if self._store.put_aside else ""
+            text = f"the session file could not be read and was written anew{where}"
+            self._session = replace(self._session, notes=(*self._session.notes, Note(self._clock(), text)))
+            self._store.put_aside = None

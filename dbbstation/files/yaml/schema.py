@@ -61,6 +61,7 @@ SINCE: dict[str, dict[str, int]] = {
         "counts": 3,
         "notes": 3,
         "job": 4,
+        "log": 5,
         **dict.fromkeys(_OF_BARS, 3),
     },
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},

@@ -16,9 +16,10 @@ from dbbstation.errors import InputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.recordings.amending import amend
+from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_details import SessionDetails
-from dbbstation.files.recordings.session_writer import FinishedRun, SessionWriter, write_session
+from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
@@ -203,7 +204,7 @@ def test_a_session_of_an_older_program_is_sealed_before_more_is_recorded_into_it
             writer.finish_run(journal)
     session = read_session(folder)
     assert session.seal.runs == 8
-    assert (folder / "session.yaml").read_text(encoding="utf-8").startswith("format: dbb-session/3\n")
+    assert (folder / "session.yaml").read_text(encoding="utf-8").startswith("format: dbb-session/5\n")
 
 
 def test_amending_keeps_the_former_file_and_notes_why(folder):
@@ -279,5 +280,7 @@ def test_check_says_what_was_amended_and_what_carries_no_seal(folder, capsys):
     assert left.value.code == 0
     assert "machine.yaml was changed on purpose" in printed.err
     assert "joint 3 measured again" in printed.err
-    assert re.search(r"session: 6 runs \(6 accepted\); sealed$", printed.out, re.MULTILINE)
+    assert re.search(
+        r"session: 6 runs \(6 accepted\); sealed, 2 events, anchor [0-9a-f]{16}$", printed.out, re.MULTILINE
+    )
     assert "it carries no seal" in printed.out

@@ -12,9 +12,10 @@ from dbbstation.errors import InputError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_details import SessionDetails
-from dbbstation.files.recordings.session_writer import FinishedRun, SessionWriter, write_session
+from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Direction
@@ -50,7 +51,7 @@ def reread(writer: SessionWriter) -> list[tuple[str, str, str]]:
 def test_a_new_session_holds_machine_and_plan(writer: SessionWriter, machine) -> None:
     session = read_session(writer.session.folder)
     assert sorted(path.name for path in session.folder.iterdir()) == [
-        ".lock", "machine.yaml", "plan.yaml", "programs", "runs", "sealed", "session.yaml"
+        ".lock", "events.log", "machine.yaml", "plan.yaml", "programs", "runs", "sealed", "session.yaml"
     ]  # fmt: skip
     assert session.plan == PLAN.to_domain()
     assert np.array_equal(session.machine.hexapod.base_joints_mm, machine.hexapod.base_joints_mm)
@@ -129,11 +130,12 @@ def test_the_station_died_while_recording(writer: SessionWriter) -> None:
 
 def test_the_station_died_before_the_part_was_noted(writer: SessionWriter) -> None:
     folder = writer.session.folder
-    before = (folder / "session.yaml").read_bytes()
+    before = {name: (folder / name).read_bytes() for name in ("session.yaml", "events.log")}
     journal = writer.start_run("low", Direction.CW, COLUMNS, started=BEGUN)
     fill(journal)
     journal.close()
-    (folder / "session.yaml").write_bytes(before)
+    for name, data in before.items():
+        (folder / name).write_bytes(data)
     writer.close()
     again = SessionWriter.open(folder)
     assert reread(again) == [("low cw 1", "recording", "low-cw-1.csv.part")]
@@ -144,9 +146,10 @@ def test_the_station_died_between_sealing_and_noting_it(writer: SessionWriter) -
     folder = writer.session.folder
     journal = writer.start_run("low", Direction.CW, COLUMNS, started=BEGUN)
     fill(journal)
-    noted = (folder / "session.yaml").read_bytes()
+    noted = {name: (folder / name).read_bytes() for name in ("session.yaml", "events.log")}
     done = writer.finish_run(journal)
-    (folder / "session.yaml").write_bytes(noted)
+    for name, data in noted.items():
+        (folder / name).write_bytes(data)
     assert read_session(folder).runs[0].state is RunState.RECORDING
     writer.close()
     again = SessionWriter.open(folder)

@@ -1,0 +1,49 @@
+"""Where results must not go: into a session folder, where recordings lie. The one place for this rule, used by all that writes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import OutputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SESSION_FILE = "session.yaml"
+"""What a session folder is known by."""
+
+_MARK, _WITHIN = b"dbb-session/", 4096
+"""How a session file begins, and within how many bytes."""
+
+
+def session_around(path: Path) -> Path | None:
+    """Return the session folder that a path lies in; None where it lies in none.
+
+    Links are followed: what counts is where the file would come to lie. A session file that was spoilt still marks its folder.
+    """
+    return next((folder for folder in path.resolve().parents if _is_session(folder)), None)
+
+
+def refuse_recorded(path: Path) -> None:
+    """Refuse to write a result into a session folder, whether or not it would replace something there.
+
+    Raises:
+        OutputError: the path lies in a session folder.
+    """
+    session = session_around(path)
+    if session is not None:
+        what = f"this lies in the session {session}, where only recordings lie"
+        raise OutputError(what, where=str(path), remedy="name a file outside of it, such as one beside it")
+
+
+def _is_session(folder: Path) -> bool:
+    file = folder / SESSION_FILE
+    try:
+        if not file.is_file():
+            return False
+        if (folder / "runs").is_dir():
+            return True
+        with file.open("rb") as text:
+            return _MARK in text.read(_WITHIN)
+    except OSError:
+        return False

@@ -1,0 +1,53 @@
+"""Anchors: the link of a session's last event, noted elsewhere, tells later whether anything was changed that stood there then."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import Problem
+from dbbstation.files.recordings.event_log import read_event_log
+from dbbstation.files.recordings.session_name import SESSION_FILE
+from dbbstation.files.yaml.text import load_yaml
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.files.recordings.seal import Seal
+
+SHORTEST = 16
+"""Hex digits of an anchor that are enough: nobody finds another log with the same sixteen."""
+
+
+def anchor_of(seal: Seal | None) -> str:
+    """Return the anchor of a session; of one without an event log the end of its chain of runs, empty where it has no seal."""
+    return "" if seal is None else seal.anchor or seal.chain_sha256
+
+
+def links_of(folder: Path) -> tuple[str, ...]:
+    """Return every anchor that a session has ever had, as far as its files say."""
+    log = read_event_log(folder, [])
+    document = load_yaml(folder / SESSION_FILE, [])
+    runs = () if document is None else document.entries("runs")
+    chain = tuple(str(run["chain_sha256"]) for _, run in runs if "chain_sha256" in run)
+    return (*chain, *(() if log is None else log.links))
+
+
+def anchor_told(folder: Path, anchor: str) -> Problem:
+    """Return what a noted anchor says of a session; with a remedy where the session is not what it was then.
+
+    Args:
+        folder: of the session.
+        anchor: as it was noted, `SHORTEST` digits or more of it.
+    """
+    log = read_event_log(folder, [])
+    events = () if log is None else log.events
+    for number, event in enumerate(events, start=1):
+        if event.link.startswith(anchor):
+            when = "" if event.at is None else f", {event.at:%Y-%m-%d %H:%M %Z}"
+            what = f"the anchor {anchor[:SHORTEST]} is event {number} of {len(events)}{when}: nothing before it was changed"
+            return Problem(str(folder), 0, 0, what)
+    if any(link.startswith(anchor) for link in links_of(folder)):
+        what = f"the anchor {anchor[:SHORTEST]} is in the chain of its runs: no recording before it was changed"
+        return Problem(str(folder), 0, 0, what)
+    what = f"the anchor {anchor[:SHORTEST]} is not in this session: it is another one, or was written anew since"
+    return Problem(str(folder), 0, 0, what, "compare it with a backup")

@@ -1,0 +1,275 @@
+"""The event log of a session: every verdict, reason, condition and amendment, one line each, chained.
+
+    7c3f…  {"at": "2026-11-20T08:06:02Z", "what": "rejected", "runs": [{"test": "a", …}]}
+
+A line begins with its link, 64 hex digits: the SHA-256 of the link of the line before it (nothing for the first), a line feed,
+the JSON text of the line and a line feed, in UTF-8. Lines are only appended. What the session file says is the sum of all lines:
+who edits it disagrees with the log, who edits the log breaks the chain, and a session file that was spoilt can be written anew.
+A line is on the disk before the session file says what it says.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import re
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.errors import OutputError, Problem
+from dbbstation.files.atomic import sync_folder
+from dbbstation.files.refused import refusal
+from dbbstation.files.source_text import read_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+EVENTS_FILE = "events.log"
+"""In the session folder."""
+
+_LINK_LENGTH = 64
+_LINE = re.compile(rb"([0-9a-f]{64})  (\{.*\})")
+
+
+@dataclass(frozen=True)
+class Event:
+    """One line of the log.
+
+    Attributes:
+        what: in a word or two, such as `rejected`.
+        at: when; None where a whole session was made at once, such as a simulated one.
+        set_to: keys of the session file that took a value, None for those that were taken out.
+        runs: entries that took the place of those of the same test, direction and repeat, or came behind all others.
+        all_runs: the whole list, where it was put together otherwise; None where it was not.
+        link: of the line.
+    """
+
+    what: str
+    at: datetime | None
+    set_to: Mapping[str, Any]
+    runs: tuple[Mapping[str, Any], ...]
+    all_runs: tuple[Mapping[str, Any], ...] | None
+    link: str
+
+
+@dataclass(frozen=True)
+class EventLog:
+    """The log as it was read.
+
+    Attributes:
+        path: of its file.
+        events: the lines up to the first that is not as it was written.
+        end: bytes of these lines.
+        size: bytes of the file.
+    """
+
+    path: Path
+    events: tuple[Event, ...] = ()
+    end: int = 0
+    size: int = 0
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Link of every event."""
+        return tuple(event.link for event in self.events)
+
+    def state(self, count: int | None = None) -> dict[str, Any]:
+        """Return what the session file says after the first `count` events; None: after all."""
+        state: dict[str, Any] = {}
+        runs: dict[tuple[str, str, int], Mapping[str, Any]] = {}
+        for event in self.events[:count]:
+            state |= event.set_to
+            if event.all_runs is not None:
+                runs = {run_key(run): run for run in event.all_runs}
+            runs |= {run_key(run): run for run in event.runs}
+        state = {key: value for key, value in state.items() if value is not None}
+        return {**state, "runs": list(runs.values())} if runs else state
+
+
+def run_key(run: Mapping[str, Any]) -> tuple[str, str, int]:
+    """Return what an entry of the list of runs is known by."""
+    return run["test"], run["direction"], run["repeat"]
+
+
+def change(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the members of an event that leads from one state to another; empty where they are the same."""
+    keys = [key for key in (*after, *(key for key in before if key not in after)) if key != "runs"]
+    set_to = {key: after.get(key) for key in keys if before.get(key) != after.get(key)}
+    old = {run_key(run): run for run in before.get("runs", ())}
+    new = {run_key(run): run for run in after.get("runs", ())}
+    put = [run for key, run in new.items() if old.get(key) != run]
+    found: dict[str, Any] = {"set": set_to} if set_to else {}
+    if list(old | new) != list(new) or len(new) != len(after.get("runs", ())):
+        return {**found, "all_runs": list(after.get("runs", ()))}
+    return {**found, "runs": put} if put else found
+
+
+def read_event_log(folder: Path, faults: list[Problem]) -> EventLog | None:
+    """Return the event log of a session; None where it has none, or where it cannot be read, with the reason in `faults`."""
+    path = folder / EVENTS_FILE
+    if not os.path.lexists(path):
+        return None
+    data = read_bytes(path, faults, is_input=False)
+    return None if data is None else _parsed(path, data)
+
+
+def _parsed(path: Path, data: bytes) -> EventLog:
+    events: list[Event] = []
+    end, before = 0, ""
+    for line in data.splitlines(keepends=True):
+        event = _event(line, before)
+        if event is None:
+            break
+        events.append(event)
+        end, before = end + len(line), event.link
+    return EventLog(path, tuple(events), end, len(data))
+
+
+def _event(line: bytes, before: str) -> Event | None:
+    """Return what a line says; None where it is not as it was written."""
+    parts = _LINE.fullmatch(line.removesuffix(b"\n"))
+    if parts is None or not line.endswith(b"\n") or link(before, parts[2]) != parts[1].decode():
+        return None
+    try:
+        said = json.loads(parts[2])
+        at = said.get("at")
+        runs, all_runs = said.get("runs", ()), said.get("all_runs")
+        for run in (*runs, *(all_runs or ())):
+            run_key(run)
+        return Event(
+            what=str(said["what"]),
+            at=None if at is None else datetime.fromisoformat(at),
+            set_to=dict(said.get("set", {})),
+            runs=tuple(runs),
+            all_runs=None if all_runs is None else tuple(all_runs),
+            link=parts[1].decode(),
+        )
+    except (KeyError, TypeError, ValueError, RecursionError):
+        return None
+
+
+def link(before: str, text: bytes) -> str:
+    """Return the link of a line: the SHA-256 of the link before it and of its JSON text, each with a line feed behind it."""
+    return hashlib.sha256(before.encode() + b"\n" + text + b"\n").hexdigest()
+
+
+def line_of(before: str, what: str, at: datetime | None, members: Mapping[str, Any]) -> bytes:
+    """Return a line of the log.
+
+    Args:
+        before: link of the line before it; empty for the first.
+        what: happened, in a word or two.
+        at: when; None where that means nothing.
+        members: from `change`.
+    """
+    moment = {} if at is None else {"at": at.astimezone(UTC).isoformat().replace("+00:00", "Z")}
+    text = json.dumps({**moment, "what": what, **members}, ensure_ascii=False, allow_nan=False).encode()
+    return f"{link(before, text)}  ".encode() + text + b"\n"
+
+
+def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str, Any]) -> EventLog:
+    """Append an event, on the disk when this returns; arguments as of `line_of`.
+
+    A last line that was never finished, because the power went, is cut off.
+
+    Raises:
+        OutputError: the log is not as it was read, or the disk refuses; it is as before then.
+    """
+    line = line_of(log.links[-1] if log.events else "", what, at, members)
+    event = _event(line, log.links[-1] if log.events else "")
+    if event is None:
+        raise ValueError(f"{members} is no change of a session file")
+    try:
+        handle = os.open(log.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    except OSError as error:
+        raise _refused(log, error) from error
+    try:
+        _refuse_another(log, handle)
+        try:
+            if log.size > log.end:
+                os.ftruncate(handle, log.end)
+            _write(handle, line, log.end)
+            os.fsync(handle)
+            if not log.size:
+                sync_folder(log.path.parent)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(handle, log.end)
+            raise _refused(log, error) from error
+    finally:
+        with contextlib.suppress(OSError):  # it is on the disk, or the reason is told already
+            os.close(handle)
+    end = log.end + len(line)
+    return replace(log, events=(*log.events, event), end=end, size=end)
+
+
+def taken_back(log: EventLog) -> None:
+    """Take back what was appended behind a log, as far as the disk allows: what could not be noted did not happen."""
+    with contextlib.suppress(OSError):
+        handle = os.open(log.path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
+        try:
+            os.ftruncate(handle, log.end)
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def _refuse_another(log: EventLog, handle: int) -> None:
+    """Never write behind lines that were not read.
+
+    Raises:
+        OutputError: the file has another size, or another last line.
+    """
+    size = os.fstat(handle).st_size
+    last = log.links[-1] if log.events else ""
+    begin = max(log.end - _LONGEST_LAST, 0)
+    there = os.pread(handle, log.end - begin, begin).splitlines()
+    if size != log.size or (last and (not there or not _ends_with(there[-1], last))):
+        raise OutputError(
+            "another program has written into this session since it was read",
+            where=str(log.path),
+            remedy="end it, then do this again",
+        )
+
+
+_LONGEST_LAST = 1_000_000
+"""Bytes of the last line that are looked at: an event with a list of a thousand runs has half of them."""
+
+
+def _ends_with(line: bytes, last: str) -> bool:
+    return line.startswith(last.encode()) or len(line) >= _LONGEST_LAST
+
+
+def _write(handle: int, data: bytes, at: int) -> None:
+    left = memoryview(data)
+    while left:
+        done = os.pwrite(handle, left, at)
+        left, at = left[done:], at + done
+
+
+def _refused(log: EventLog, error: OSError) -> OutputError:
+    why, remedy = refusal(error)
+    return OutputError(f"cannot be written: {why}", where=str(log.path), remedy=remedy)
+
+
+def runs_told(event: Event) -> str:
+    """Return which runs an event is about, in words, with the reasons of verdicts."""
+    told = []
+    for run in event.runs:
+        name = f"{run['test']}-{run['direction']}-{run['repeat']}"
+        told.append(f"{name}: {run['reason']}" if run.get("reason") else name)
+    if event.all_runs is not None:
+        told.append(f"list of {len(event.all_runs)} runs")
+    return ", ".join(told)
+
+
+def keys_told(event: Event) -> Sequence[str]:
+    """Return which keys beside the runs an event is about; not those that change with every run."""
+    return [key for key in event.set_to if key != "seal" or event.what not in _OF_RUNS]
+
+
+_OF_RUNS = frozenset({"run started", "run sealed", "taken in"})

@@ -1,0 +1,181 @@
+"""Making a session folder: an empty one to be recorded into, or a whole one at once, such as of a simulation."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, OutputError, Problem
+from dbbstation.files.atomic import write_folder
+from dbbstation.files.formats.machine import machine_text
+from dbbstation.files.formats.plan import plan_text
+from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.recorded_ground import refuse_recorded
+from dbbstation.files.recordings.entries import Program, RunEntry, RunState
+from dbbstation.files.recordings.event_log import EVENTS_FILE
+from dbbstation.files.recordings.journal import run_header, run_line, run_name
+from dbbstation.files.recordings.seal import chained, copy_name, is_copy, sealed_over
+from dbbstation.files.recordings.session_checks import check_bar
+from dbbstation.files.recordings.session_details import SessionDetails
+from dbbstation.files.recordings.session_name import MACHINE_FILE, PLAN_FILE, PROGRAMS, RUNS, SESSION_FILE
+from dbbstation.files.recordings.session_store import first_log
+from dbbstation.files.recordings.session_text import session_data, text_of
+from dbbstation.files.yaml.schema import validate
+from dbbstation.files.yaml.text import parse_yaml
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from datetime import datetime
+    from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.plan.circle import Direction
+
+
+@dataclass(frozen=True, eq=False)
+class FinishedRun:
+    """A run that exists whole, such as a simulated one.
+
+    Attributes:
+        test: name of the test.
+        direction: sense of travel.
+        columns: by name, each of shape (n,), in the columns' units.
+        repeat: of this test and direction.
+        mounting: counts how often a ball was put up; None: one mounting per test.
+        started: when the first sample was taken; None where that means nothing.
+        program: name and bytes of the NC program that was commanded, None for the plan's circle.
+        model_sha256: of the model that the program was compensated with.
+        state: as the session notes it.
+        reason: why it was rejected; empty otherwise.
+        texts: columns that are no numbers, such as `status`, n texts each.
+        exact: write as many digits as it takes to read back the same bits, not those that instruments resolve.
+    """
+
+    test: str
+    direction: Direction
+    columns: Mapping[str, NDArray[np.float64]]
+    repeat: int = 1
+    mounting: int | None = None
+    started: datetime | None = None
+    program: tuple[str, bytes] | None = None
+    model_sha256: str = ""
+    state: RunState = RunState.ACCEPTED
+    reason: str = ""
+    texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    exact: bool = False
+
+
+def write_session(
+    folder: Path,
+    machine: Machine,
+    plan: InlinePlan,
+    runs: Sequence[FinishedRun],
+    details: SessionDetails | None = None,
+    more: Mapping[str, str | bytes] | None = None,
+) -> None:
+    """Write a whole session at once; all of it or nothing.
+
+    Args:
+        folder: of the session.
+        machine: nominal.
+        plan: as run.
+        runs: in order.
+        details: what it notes beside them.
+        more: further files by path in the folder.
+
+    Raises:
+        OutputError: the folder exists already, lies in another session, or cannot be written.
+    """
+    files: dict[str, str | bytes] = dict(more or {})
+    entries = []
+    for run in runs:
+        name = f"{RUNS}/{run_name(run.test, run.direction, run.repeat)}"
+        files[name] = data = _run_bytes(run)
+        program = None
+        if run.program is not None:
+            path = f"{PROGRAMS}/{run.program[0]}"
+            files[path] = run.program[1]
+            program = Program(folder / path, hashlib.sha256(run.program[1]).hexdigest(), run.model_sha256)
+        entry = RunEntry(
+            test=run.test,
+            direction=run.direction,
+            repeat=run.repeat,
+            mounting=run.mounting,
+            state=run.state,
+            reason=run.reason,
+            started=run.started,
+            path=folder / name,
+            sha256=hashlib.sha256(data).hexdigest(),
+            program=program,
+            centre_mm=None,
+        )
+        entries.append(entry)
+    make_session_folder(folder, machine, plan, details or SessionDetails(), entries, files)
+
+
+def make_session_folder(
+    folder: Path,
+    machine: Machine,
+    plan: InlinePlan,
+    details: SessionDetails,
+    entries: Sequence[RunEntry],
+    files: Mapping[str, str | bytes],
+    at: datetime | None = None,
+) -> None:
+    """Make the folder of a session, sealed and with its event log; all of it or nothing.
+
+    Args:
+        folder: of the session.
+        machine: nominal.
+        plan: as run.
+        details: what it notes beside the runs.
+        entries: of its runs.
+        files: content by path in the folder, of everything but machine, plan and session file.
+        at: when, for the log; None for a session that is computed: the same one has the same bytes then.
+
+    Raises:
+        InputError: what no session may note.
+        OutputError: the folder exists already, lies in another session, or cannot be written.
+    """
+    refuse_recorded(folder)
+    if folder.exists():
+        raise OutputError("the session folder exists already", where=str(folder), remedy="choose another name")
+    whole: dict[str, str | bytes] = {f"{RUNS}/": "", f"{PROGRAMS}/": "", **files}
+    whole[MACHINE_FILE], whole[PLAN_FILE] = machine_text(machine), plan_text(plan)
+    sealed = {name: str(whole[name]).encode() for name in (MACHINE_FILE, PLAN_FILE)}
+    now = {name: hashlib.sha256(content).hexdigest() for name, content in sealed.items()}
+    whole |= {copy_name(name, now[name]): content for name, content in sealed.items()}
+    runs = chained(entries)
+    noted = replace(details, seal=sealed_over(now, runs))
+    said = session_data(folder, (MACHINE_FILE, PLAN_FILE), noted, runs)
+    _check_details(text_of(said), folder, plan)
+    whole[EVENTS_FILE], marked = first_log(said, at)
+    whole[SESSION_FILE] = text_of(marked)
+    write_folder(folder, whole, read_only=lambda name: is_copy(name) or name.startswith(f"{RUNS}/"))
+
+
+def _check_details(text: str, folder: Path, plan: InlinePlan) -> None:
+    """Hold what a session notes against its format and plan before anything is written.
+
+    Raises:
+        InputError: everything that no session may say, such as a bar's length in metres.
+    """
+    faults: list[Problem] = []
+    document = parse_yaml(text, str(folder / SESSION_FILE), faults)
+    session = None if document is None else validate(document, SessionFile, faults)
+    if document is not None and session is not None and session.bar is not None:
+        check_bar(document, session.bar.calibrated_length_mm, session.bar.stroke_mm, plan.to_domain(), faults)
+    if faults:
+        raise InputError([replace(fault, file=str(folder), line=0, column=0) for fault in faults])
+
+
+def _run_bytes(run: FinishedRun) -> bytes:
+    names = (*run.columns, *run.texts)
+    rows = zip(*(values.tolist() for values in run.columns.values()), *run.texts.values(), strict=True)
+    header = run_header(run.test, run.direction, run.repeat, names)
+    return header + b"".join([run_line(row, names, exact=run.exact) for row in rows])

@@ -1,0 +1,155 @@
+"""What a session file says as one state, held against its event log: which of the two is ahead, and what differs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.files.recordings.event_log import EVENTS_FILE, EventLog
+from dbbstation.files.yaml.changes import changes
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+READINGS = "set_up_errors"
+"""The one list that people write into a session file: what is added to it is no change of what was sealed."""
+
+BEGUN, SEALED = "log begun", "sealed"
+"""First events of a session that had no log: it was sealed by an older program; it had no seal."""
+
+_MOST_NAMED = 6
+"""Changes that are named; a session file that was exchanged has hundreds."""
+
+
+def session_state(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the data of a session file say, one way of writing it: lists, no empty values, no format, no mark of the log."""
+    seal = data.get("seal")
+    plain = {key: value for key, value in data.items() if key != "format"}
+    if isinstance(seal, dict):
+        plain["seal"] = {key: value for key, value in seal.items() if key != "log"}
+    state: dict[str, Any] = _plain(plain)
+    return state
+
+
+def _plain(value: object) -> Any:  # noqa: ANN401 - as plain as it came
+    if isinstance(value, dict):
+        told = {str(key): _plain(item) for key, item in value.items()}
+        return {key: item for key, item in told.items() if item is not None and item not in ("", [], {})}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def mark_of(data: Mapping[str, Any]) -> tuple[int, str] | None:
+    """Return how far the log went by the data of a session file: number of events, link of the last; None where it has no log."""
+    seal = data.get("seal")
+    mark = seal.get("log") if isinstance(seal, dict) else None
+    return (mark["events"], mark["sha256"]) if isinstance(mark, dict) and {"events", "sha256"} <= mark.keys() else None
+
+
+class Stands(Enum):
+    """How a session file and its event log stand to one another."""
+
+    ALONE = auto()
+    """There is no log: a session of an older program, or one without a seal."""
+    SAME = auto()
+    """The file says what the log says."""
+    BEHIND = auto()
+    """The file says what the log said some events ago: its writer died in between, or a former copy was restored."""
+    UNLIKE = auto()
+    """Anything else: one of the two was changed."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a session file and its event log stand to one another.
+
+    Attributes:
+        stands: in a word.
+        differences: what is not as the log has it, in words, where they are unlike.
+        log_sound: whether the log itself can be relied on.
+    """
+
+    stands: Stands
+    differences: tuple[str, ...] = ()
+    log_sound: bool = True
+
+
+def standing(data: Mapping[str, Any], log: EventLog | None, *, but_runs: bool = False) -> Standing:
+    """Hold a session file against its event log.
+
+    Args:
+        data: of the file.
+        log: as it was read; None where there is none.
+        but_runs: leave the list of runs out, whose own chain has told already what is wrong with it.
+    """
+    mark, state = mark_of(data), session_state(data)
+    events = () if log is None else log.events
+    if mark is None:
+        return Standing(Stands.ALONE) if log is None or not events else _unmarked(state, log)
+    if log is None or mark[0] > len(events) or log.links[mark[0] - 1] != mark[1]:
+        return Standing(Stands.UNLIKE, (_log_fault(mark[0], log),), log_sound=False)
+    found = differences(log.state(mark[0]), state, but_runs=but_runs)
+    if found:
+        return Standing(Stands.UNLIKE, found)
+    return Standing(Stands.SAME if mark[0] == len(events) else Stands.BEHIND)
+
+
+def _log_fault(count: int, log: EventLog | None) -> str:
+    """What is wrong with a log that the seal does not know."""
+    if log is None:
+        return f"{EVENTS_FILE}, which the seal covers, is not there"
+    if count > len(log.events):
+        cut = "is not as it was written" if log.size > log.end else "is not there"
+        return f"{EVENTS_FILE} has {len(log.events)} of {count} events: line {len(log.events) + 1} {cut}"
+    return f"{EVENTS_FILE} is not the log that was sealed: event {count} had another link"
+
+
+def _unmarked(state: Mapping[str, Any], log: EventLog) -> Standing:
+    """A log beside a file that does not know of it: it was begun and the writer died, or the seal was taken out."""
+    first = log.state(1)
+    if len(log.events) == 1 and log.events[0].what == BEGUN and not differences(first, state):
+        return Standing(Stands.BEHIND)
+    if len(log.events) == 1 and log.events[0].what == SEALED and not differences(_unsealed(first), _unsealed(state)):
+        return Standing(Stands.BEHIND)
+    what = "the seal was taken out" if "seal" not in state else f"the seal does not cover {EVENTS_FILE} any more"
+    return Standing(Stands.UNLIKE, (f"{what}: {EVENTS_FILE} has {len(log.events)} events of this session",))
+
+
+def _unsealed(state: Mapping[str, Any]) -> dict[str, Any]:
+    bare = {key: value for key, value in state.items() if key != "seal"}
+    bare["runs"] = [
+        {key: run[key] for key in run if key not in {"sha256", "chain_sha256"}} for run in state.get("runs", ())
+    ]
+    return bare
+
+
+def differences(before: Mapping[str, Any], after: Mapping[str, Any], *, but_runs: bool = False) -> tuple[str, ...]:
+    """Return what a session file says otherwise than the log, in words; readings that were added are nothing."""
+    old, new = _by_run(before), _by_run(after)
+    for state in (old, new):
+        state.pop(READINGS, None)
+        if but_runs:
+            state.pop("runs", None)
+    there = after.get(READINGS, ())
+    found = [
+        f"{READINGS} of test {one.get('test')} are not as read" for one in before.get(READINGS, ()) if one not in there
+    ]
+    found += changes(old, new)
+    more = len(found) - _MOST_NAMED
+    return (*found[:_MOST_NAMED], f"and {more} more") if more > 0 else tuple(found)
+
+
+def _by_run(state: Mapping[str, Any]) -> dict[str, Any]:
+    """The state with runs by their names, so that a change is told of the run that it is of."""
+    runs = state.get("runs", ())
+    if not runs:
+        return dict(state)
+    named = [{"name": f"{run.get('test')}-{run.get('direction')}-{run.get('repeat')}", **run} for run in runs]
+    return {**state, "runs": named}
+
+
+def with_readings(state: Mapping[str, Any], data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a state with the readings that a session file has."""
+    readings = session_state(data).get(READINGS)
+    bare = {key: value for key, value in state.items() if key != READINGS}
+    return {**bare, READINGS: readings} if readings else bare

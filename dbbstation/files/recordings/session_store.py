@@ -1,0 +1,320 @@
+"""The session file and its event log, read and written together; every writer of a session file goes this way.
+
+Whoever writes holds the lock of the session first, then reads, then writes. An event is on the disk before the session file says
+what it says: a writer that died in between left the file behind its log, and it is put forward from there. The file is written only
+where it is the one that was read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.errors import InputError, OutputError, Problem
+from dbbstation.files.atomic import write_folder, write_text
+from dbbstation.files.formats.session import SessionFile
+from dbbstation.files.recordings.event_log import (
+    EVENTS_FILE,
+    EventLog,
+    appended,
+    change,
+    line_of,
+    read_event_log,
+    taken_back,
+)
+from dbbstation.files.recordings.seal import AMEND, copy_name
+from dbbstation.files.recordings.session_name import SESSION_FILE
+from dbbstation.files.recordings.session_state import (
+    BEGUN,
+    READINGS,
+    SEALED,
+    Stands,
+    differences,
+    mark_of,
+    session_state,
+    standing,
+    with_readings,
+)
+from dbbstation.files.recordings.session_text import text_of
+from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.files.yaml.schema import read_document, validate
+from dbbstation.files.yaml.text import parse_yaml
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from dbbstation.files.yaml.text import YamlDocument
+
+_LOG = logging.getLogger(__name__)
+
+REBUILD = "`dbbstation session rebuild {folder}` writes it as the event log has it"
+"""What to do about a session file that is not as it was."""
+
+
+def now() -> datetime:
+    """Return the time of day with its zone, to the second."""
+    return datetime.now(UTC).replace(microsecond=0)
+
+
+def marked(state: Mapping[str, Any], log: EventLog) -> dict[str, Any]:
+    """Return a state with the mark of how far its log goes, as the session file has it."""
+    if not log.events or not isinstance(state.get("seal"), dict):
+        return dict(state)
+    mark = {"events": len(log.events), "sha256": log.links[-1]}
+    return {"runs": [], **state, "seal": {**state["seal"], "log": mark}}
+
+
+def first_log(data: Mapping[str, Any], at: datetime | None) -> tuple[bytes, dict[str, Any]]:
+    """Return the log of a session that is made, and what its session file says.
+
+    Args:
+        data: what the session file says, without the mark of the log.
+        at: when; None where that means nothing.
+    """
+    state = session_state(data)
+    line = line_of("", "created", at, change({}, state))
+    return line, {**data, "seal": {**state["seal"], "log": {"events": 1, "sha256": line[:64].decode()}}}
+
+
+def document_in_force(file: Path, faults: list[Problem]) -> tuple[YamlDocument | None, EventLog | None]:
+    """Read a session file and its event log; no document, with every fault added to `faults`, where it cannot be read.
+
+    Of a file that its writer left behind the log, what the log has comes back: nobody needs to do anything.
+    """
+    found: list[Problem] = []
+    document = read_document(file, SessionFile, found)
+    log = read_event_log(file.parent, found)
+    if document is None and log is not None and log.events:
+        found = [replace(each, remedy=_rebuild(file)) for each in found]
+    faults += found
+    if log is None and found:
+        return None, None
+    if document is None or found or validate(document, SessionFile, []) is None:
+        return document, log
+    if log is not None and standing(document.data, log).stands is Stands.BEHIND:
+        text = text_of(marked(with_readings(log.state(), document.data), log))
+        return parse_yaml(text, str(file), faults), log
+    return document, log
+
+
+def log_faults(file: Path, data: Mapping[str, Any], log: EventLog | None, *, but_runs: bool) -> list[Problem]:
+    """Return what a session file says otherwise than its event log.
+
+    Args:
+        file: the session file.
+        data: what it says, as its format has it.
+        log: as it was read; None where there is none.
+        but_runs: leave the list of runs out, whose own chain has told already what is wrong with it.
+    """
+    stands = standing(data, log, but_runs=but_runs)
+    remedy = AMEND.format(folder=file.parent)
+    if not stands.log_sound:
+        return [Problem(str(file.parent / EVENTS_FILE), 0, 0, what, remedy) for what in stands.differences]
+    remedy = remedy.replace("restore it", _rebuild(file))
+    return [Problem(str(file), 0, 0, f"{what}, by the event log", remedy) for what in stands.differences]
+
+
+def _rebuild(file: Path) -> str:
+    return REBUILD.format(folder=file.parent)
+
+
+class SessionStore:
+    """Reads and writes one session file with its log, for whoever holds the lock of the session.
+
+    A session file that cannot be read, or is gone, is written anew from the log; what stood there is kept. One that its writer left
+    behind the log is put forward.
+
+    Args:
+        folder: of the session.
+        clock: the time of day with its zone, for the log.
+        anew: write the session file as the log has it, whatever it says.
+
+    Attributes:
+        log: the event log, without events where the session has none yet.
+        sha256: of the session file as it was read or written last.
+        state: what it says, as the log goes on from it.
+        data: what the session file said when it was read.
+        put_aside: where the file is kept that took the place of the session file; empty where it was gone, None where none did.
+
+    Raises:
+        InputError: there is no session, or neither its file nor its log can be read.
+        OutputError: the disk refuses.
+    """
+
+    def __init__(self, folder: Path, clock: Callable[[], datetime] = now, *, anew: bool = False) -> None:
+        self._file = folder / SESSION_FILE
+        self._clock = clock
+        self.put_aside: str | None = None
+        faults: list[Problem] = []
+        self.log = read_event_log(folder, faults) or EventLog(folder / EVENTS_FILE)
+        if faults:
+            raise InputError(faults)
+        found, data = self._on_disk(faults)
+        self.data: dict[str, Any] = data or {}
+        if (data is None or anew) and self.log.events:
+            self._rebuild(found)
+            return
+        if data is None or found is None:
+            raise InputError(faults)
+        self.sha256 = hashlib.sha256(found).hexdigest()
+        self.state = session_state(data)
+        if _valid(data) and standing(data, self.log).stands is Stands.BEHIND:
+            self.state = with_readings(self.log.state(), data)
+            self.data = marked(self.state, self.log)
+            self._put(text_of(self.data))
+
+    def write(self, data: Mapping[str, Any], what: str, text: Callable[[Mapping[str, Any]], str] = text_of) -> None:
+        """Log what has changed, then write the session file.
+
+        Args:
+            data: what the session file is to say, without the mark of the log.
+            what: happened, in a word or two.
+            text: makes the text of the session file of what it says.
+
+        Raises:
+            OutputError: somebody else has written the file since it was read, or the disk refuses; both are as before then.
+        """
+        state = session_state(data)
+        if not self.log.events and "seal" in self.state and what != SEALED:
+            # Sealed by an older program: what it is now is the first thing that is known.
+            self._write_both(self.state, self.state, BEGUN, change({}, self.state), text_of)
+        if not self.log.events and "seal" in state:
+            self._write_both(data, state, SEALED, change({}, state), text)
+        elif members := change(self.state, state):
+            self._write_both(data, state, what, members, text)
+
+    def _write_both(
+        self,
+        data: Mapping[str, Any],
+        state: dict[str, Any],
+        what: str,
+        members: Mapping[str, Any],
+        text: Callable[[Mapping[str, Any]], str],
+    ) -> None:
+        if self.changed_meanwhile() is not None:
+            raise self._another("")
+        before = self.log
+        if "seal" in state:
+            self.log = appended(before, what, self._clock(), members)
+        said = text({**data, **({"seal": marked(state, self.log)["seal"]} if "seal" in state else {})})
+        try:
+            self._put(said)
+        except BaseException as error:
+            # In its place, and in the log on the disk: what failed is only to make the new name last, which the log does as well.
+            if self.log is before or not isinstance(error, OutputError) or self._on_disk([])[0] != said.encode():
+                if self.log is not before:
+                    taken_back(before)
+                    self.log = replace(before, size=before.end)
+                raise
+            _LOG.warning("%s", error)
+            self.sha256 = hashlib.sha256(said.encode()).hexdigest()
+        self.state = state
+
+    def text_by_log(self) -> bytes:
+        """Return the text that the session file has by its log."""
+        return text_of(marked(self.log.state(), self.log)).encode()
+
+    def go_on_from_log(self) -> None:
+        """Take what is written next for a change of what the log says, not of what the session file said."""
+        self.state = self.log.state()
+
+    def begin_anew(self) -> None:
+        """Take away a log that cannot be relied on; whoever calls this has kept it under another name."""
+        (self._file.parent / EVENTS_FILE).unlink(missing_ok=True)
+        self.log = EventLog(self._file.parent / EVENTS_FILE)
+
+    def changed_meanwhile(self) -> dict[str, Any] | None:
+        """Return what the session file says where somebody has written it since; None where nobody has.
+
+        One that cannot be read, or is gone, is put aside: the next writing puts the right one there.
+
+        Raises:
+            InputError: it is there and cannot be read.
+            OutputError: the disk refuses.
+        """
+        found, data = self._on_disk([])
+        if found is not None and hashlib.sha256(found).hexdigest() == self.sha256:
+            return None
+        if data is None:
+            self.put_aside = self._kept(found)
+            self.sha256 = "" if found is None else hashlib.sha256(found).hexdigest()
+        return data
+
+    def accept_readings(self, data: Mapping[str, Any]) -> None:
+        """Go on from a session file into which somebody wrote readings, and nothing else.
+
+        Args:
+            data: what it says, as `changed_meanwhile` returned it.
+
+        Raises:
+            OutputError: something else was changed in it, too.
+        """
+        # Whoever opened the file in an editor some runs ago saves what it said then.
+        known, mark = self.state, mark_of(data)
+        if mark is not None and mark[0] <= len(self.log.events):
+            known = self.log.state(mark[0])
+        found = differences(_bare(known), _bare(session_state(data)))
+        if found:
+            raise self._another(f": {'; '.join(found)}")
+        there = read_bytes(self._file, [], is_input=False)
+        self.sha256 = "" if there is None else hashlib.sha256(there).hexdigest()
+
+    def _another(self, what: str) -> OutputError:
+        return OutputError(
+            f"somebody has changed the session file since it was read{what}",
+            where=str(self._file),
+            remedy=f"nothing was written over it; {_rebuild(self._file)}",
+        )
+
+    def _on_disk(self, faults: list[Problem]) -> tuple[bytes | None, dict[str, Any] | None]:
+        """Return bytes and data of the session file; no data, with the reason in `faults`, where it is none or is gone.
+
+        Raises:
+            InputError: it is there and cannot be read.
+        """
+        found = read_bytes(self._file, faults, is_input=False)
+        text = None if found is None else decode(found, str(self._file), faults)
+        document = None if text is None else parse_yaml(text, str(self._file), faults)
+        if found is None and os.path.lexists(self._file):
+            raise InputError(faults)  # it may hold what somebody has written: it is not taken for gone
+        if document is None:
+            return found, None
+        if not isinstance(document.data, dict) or "format" not in document.data:
+            faults.append(document.problem((), "this is no session file", "restore it"))
+            return found, None
+        return found, document.data
+
+    def _rebuild(self, found: bytes | None) -> None:
+        """Write the session file from the log."""
+        self.state = self.log.state()
+        self.data = marked(self.state, self.log)
+        self.put_aside = self._kept(found)
+        self._put(text_of(self.data))
+
+    def _kept(self, found: bytes | None) -> str:
+        """Keep what stands in the place of the session file, and return where."""
+        if not found:
+            return ""
+        name = copy_name(SESSION_FILE, hashlib.sha256(found).hexdigest())
+        if not (self._file.parent / name).exists():
+            write_folder(self._file.parent, {name: found}, own=True)
+        _LOG.warning("%s is written anew; as it was: %s", self._file, name)
+        return name
+
+    def _put(self, text: str) -> None:
+        write_text(self._file, text, force=True, rewrites=True)
+        self.sha256 = hashlib.sha256(text.encode()).hexdigest()
+
+
+def _valid(data: Mapping[str, Any]) -> bool:
+    document = parse_yaml(text_of(data), SESSION_FILE, [])
+    return document is not None and validate(document, SessionFile, []) is not None
+
+
+def _bare(state: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in state.items() if key != READINGS}

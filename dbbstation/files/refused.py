@@ -1,0 +1,29 @@
+"""What the system says when it refuses, in words: why, and what to do about it."""
+
+from __future__ import annotations
+
+import errno
+
+_REMEDIES = {
+    errno.ENOSPC: "free room on the disk, then try again",
+    errno.EDQUOT: "free room in your share of the disk, then try again",
+    errno.EROFS: "name a place that can be written: this one can only be read",
+    errno.EIO: "check the disk and its cable, and copy what is on it before you go on",
+    errno.EACCES: "check the permissions of file and folder",
+    errno.EPERM: "check the permissions of file and folder",
+    errno.EMFILE: "close other programs: too many files are open",
+    errno.ENFILE: "close other programs: too many files are open",
+}
+
+_OTHERWISE = "check that the folder exists, its permissions and the disk"
+
+
+def refusal(error: OSError) -> tuple[str, str]:
+    """Return why the system refused, such as `no space left on device`, and what to do."""
+    return (error.strerror or str(error)).lower(), _REMEDIES.get(error.errno or 0, _OTHERWISE)
+
+
+def in_a_sentence(error: OSError) -> str:
+    """Return the same as one sentence, for what nobody has turned into words before."""
+    why, remedy = refusal(error)
+    return f"{error.filename or 'the output, or a file'}: {why}; {remedy}"

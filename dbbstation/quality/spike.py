@@ -1,0 +1,134 @@
+"""Single readings that leave the path of their neighbours: a bad contact, a cable, a knock shorter than any bump."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.circles.noise import LEAST_UM
+from dbbstation.quality.bump import FEWEST, near_reversals
+from dbbstation.quality.finding import Finding, Name, found, undecided
+from dbbstation.quality.limits import ROBUST_SHARE, largest_of, scale_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.circles.analysis import CircleAnalysis
+
+BESIDE = 2
+"""Readings on either side whose median a reading is held against: a spike of one or two readings does not move it, and what is
+straight over five readings leaves nothing."""
+
+SMALLEST_BLOCK, LARGEST_BLOCK, BLOCKS = 20, 100, 36
+"""Readings of a stretch whose scatter is its own, and about how many stretches a turn has: where the machine shakes for a while,
+readings are held against that."""
+
+TAIL, TAIL_SIGMAS = 0.99, 2.575829
+"""Share of the readings whose differences are looked at, too, and how many sigmas normal ones have there: readings in coarse steps
+have more differences of nothing than normal ones have small ones, and fewer than one in a hundred is a spike."""
+
+REVERSAL_DEG = 1.0
+"""How far beside a strut's reversal its own spike may stand: nothing is filtered here, so that only lag and clock move it [deg]."""
+
+UNEVEN = 1.5
+"""Readings that lie further apart than this many usual steps have lost others between them: their neighbours say nothing."""
+
+
+def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
+    """Return the reading that leaves its neighbours most, against what chance does to the largest of all.
+
+    Each reading is held against the median of the two before and the two behind it. The scatter of these differences is read off
+    their sizes, of the whole turn or of the stretch about the reading, whichever is larger: single spikes do not make it larger.
+    The step in which an instrument reads is added to the limit. Beside reversals of struts, where a machine has spikes of its
+    own, the limit is what the other reversals of the turn show, as for a bump. A sound run of normal readings has a finding with
+    the probability `limits.SHARE`.
+
+    Args:
+        one: the circle.
+        reversals_deg: angles at which struts turn round; none where they are not known [deg].
+    """
+    apart, sound = _apart(one.residual_um, one.raw.phi_deg)
+    if int(sound.sum()) < LARGEST_BLOCK:
+        return undecided(Name.SPIKE, "too few samples to hold single readings against their neighbours", "µm")
+    near = near_reversals(one.raw.theta_deg, reversals_deg, REVERSAL_DEG)
+    scale, freedom = _scales(apart, sound & (near < 0))
+    rounding = one.noise.resolution_um
+    away = np.flatnonzero(sound & (near < 0))
+    candidates: list[tuple[float, float, int]] = []
+    if len(away) >= LARGEST_BLOCK:
+        limits = largest_of(len(away), freedom) * scale[away] + rounding
+        worst = int(np.argmax(np.abs(apart[away]) / limits))
+        candidates.append((abs(float(apart[away[worst]])), float(limits[worst]), int(away[worst])))
+    tops = [_top(apart, np.flatnonzero(sound & (near == number))) for number in np.unique(near[sound & (near >= 0)])]
+    for k, top in enumerate(tops):
+        others = [float(apart[other]) for j, other in enumerate(tops) if j != k]
+        if len(others) >= FEWEST:
+            usual, known = scale_of(others)
+            limit = largest_of(len(tops), known) * max(usual, float(scale[top])) + rounding
+            candidates.append((abs(float(apart[top])), limit, top))
+    if not candidates:
+        return undecided(Name.SPIKE, "a strut turns round everywhere: single readings cannot be judged", "µm")
+    height_um, limit_um, at = max(candidates, key=lambda each: each[0] / each[1])
+    place = f"{apart[at]:+.1f} µm beside its neighbours at {one.raw.theta_deg[at]:.1f} degrees"
+    more = sum(size > limit for size, limit, _ in candidates)
+    over = int(np.sum(np.abs(apart[away]) > limits)) if len(away) >= LARGEST_BLOCK else 0
+    many = f", one of {max(over, more)}" if max(over, more) > 1 else ""
+    return found(
+        Name.SPIKE,
+        height_um,
+        limit_um,
+        "µm",
+        f"no reading leaves its neighbours: at most {place}",
+        f"a reading stands {place}{many}: G holds it; look after plug, cable and earth of the gauge, and repeat the run",
+    )
+
+
+def _apart(
+    values_um: NDArray[np.float64], phi_deg: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Difference of each reading from the median of its neighbours, and whether these lie evenly about it, shape (n,) each."""
+    count = len(values_um)
+    apart, sound = np.zeros(count), np.zeros(count, dtype=np.bool_)
+    if count <= 2 * BESIDE:
+        return apart, sound
+    windows = np.lib.stride_tricks.sliding_window_view(values_um, 2 * BESIDE + 1)
+    beside = np.delete(windows, BESIDE, axis=1)
+    inner = slice(BESIDE, count - BESIDE)
+    apart[inner] = values_um[inner] - np.median(beside, axis=1)
+    steps = np.diff(phi_deg)
+    even = np.abs(steps) <= UNEVEN * float(np.median(np.abs(steps)))
+    sound[inner] = np.lib.stride_tricks.sliding_window_view(even, 2 * BESIDE).all(axis=1)
+    return apart, sound
+
+
+def _scales(apart: NDArray[np.float64], among: NDArray[np.bool_]) -> tuple[NDArray[np.float64], float]:
+    """Standard deviation of the differences about each reading, shape (n,) [µm], and its degrees of freedom.
+
+    Args:
+        apart: differences, shape (n,) [µm].
+        among: which of them count.
+    """
+    count = len(apart)
+    whole, _ = scale_of(list(apart[among]))
+    if among.any():
+        whole = max(whole, float(np.quantile(np.abs(apart[among]), TAIL)) / TAIL_SIGMAS)
+    block = min(max(count // BLOCKS, SMALLEST_BLOCK), LARGEST_BLOCK)
+    blocks = max(count // block, 1)
+    edges = np.linspace(0, count, blocks + 1).astype(np.int64)
+    own = np.full(blocks, whole)
+    for k, (begin, end) in enumerate(pairwise(edges)):
+        there = apart[begin:end][among[begin:end]]
+        if len(there) >= SMALLEST_BLOCK // 2:
+            own[k], _ = scale_of(list(there))
+    beside = np.maximum(own, np.maximum(np.append(own[1:], own[-1]), np.insert(own[:-1], 0, own[0])))
+    each = np.repeat(np.maximum(beside, whole), np.diff(edges))
+    # Neighbours share readings: about every second difference is independent.
+    return np.maximum(each, LEAST_UM), ROBUST_SHARE * float(among.sum()) / 2.0
+
+
+def _top(apart: NDArray[np.float64], among: NDArray[np.int64]) -> int:
+    return int(among[int(np.argmax(np.abs(apart[among])))])

@@ -46,6 +46,9 @@ STEPS = np.array([-9.0, -6.0, -4.0, -2.5, -1.0, 0.5, 2.0, 3.5])
 """Sizes that are tried, as what was read and so many standard deviations of one sample's noise. Noise of a range of many thousand
 samples adds less than nine of them."""
 
+CERTAIN = 3.0
+"""Standard deviations beyond which no further size is tried."""
+
 SEED = 4
 """Of the draws: the same recording gives the same figures."""
 
@@ -157,8 +160,18 @@ def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
     sigma_um = max(path.sigma_um for path in paths)
     if not sigma_um > 0.0 or not of_form > 0.0:
         return Estimate(as_read_um, 0.0, as_read_um)
-    sizes = np.unique(np.maximum(as_read_um + STEPS * sigma_um, 0.0))
-    shown = np.array([at(size / of_form, noisy=True) for size in sizes])
+    tried: dict[float, NDArray[np.float64]] = {}
+    # Upwards until no draw worth counting shows less than what was read, downwards until none shows more.
+    for steps, side in ((STEPS[STEPS > 0.0], -1.0), (STEPS[STEPS < 0.0][::-1], 1.0)):
+        for step in steps:
+            size = max(as_read_um + float(step) * sigma_um, 0.0)
+            if size not in tried:
+                tried[size] = at(size / of_form, noisy=True)
+            beyond = tried[size].mean() + side * CERTAIN * tried[size].std() - as_read_um
+            if side * beyond <= 0.0:
+                break
+    sizes = np.array(sorted(tried))
+    shown = np.array([tried[size] for size in sizes])
     mean, spread = shown.mean(axis=1), shown.std(axis=1)
     # Extremes are skewed, alike at all sizes: their percentiles are those of all draws together.
     ends = np.quantile((shown - mean[:, None]) / spread[:, None], [0.975, 0.025])

@@ -93,6 +93,7 @@ def quick_look_summary(found: QuickLook | None) -> dict[str, Any]:
                 "place": one.place or None,
                 "value": one.value,
                 "u": one.u,
+                "below": one.below,
                 "unit": one.unit,
                 "seen": one.seen,
                 "text": one.text or None,

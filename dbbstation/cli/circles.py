@@ -251,6 +251,7 @@ def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
 
 def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
+    from dbbstation.digits import with_uncertainty
 
     rows: list[list[object]] = []
     for look in looks:
@@ -264,8 +265,7 @@ def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
                     *name,
                     one["signature"],
                     one["place"] or "",
-                    _digits(one["value"]) if known else "-",
-                    _digits(COVERAGE_FACTOR * one["u"]) if known else "-",
+                    *(with_uncertainty(one["value"], COVERAGE_FACTOR * one["u"]) if known else ("-", "-")),
                     one["unit"],
                     ("yes" if one["seen"] else "no") if known else "-",
                     one["text"] or "",
@@ -274,10 +274,6 @@ def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
     click.echo(f"\nquick look at the signatures of serial axes, {EXPANDED}")
     click.echo("On a hexapod these are symptoms, no causes: it has no axes X and Y. Causes: `dbbstation diagnose`.")
     print_table(["test", "dir", "n", "signature", "at", "value", "U", "unit", "seen", ""], rows)
-
-
-def _digits(value: float) -> str:
-    return f"{value:.3g}" if abs(value) < 1.0 else f"{value:.1f}"
 
 
 def _flat(runs: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[object]]]:

@@ -76,7 +76,7 @@ def tolerated_circles(circles: Iterable[MeasuredCircle]) -> tuple[ToleratedCircl
             one.entry.test,
             str(one.entry.direction),
             one.entry.repeat,
-            _sizes(refiltered(one.analysis, TOLERATED), one.known),
+            sizes_of(refiltered(one.analysis, TOLERATED), one.known),
         )
         for one in circles
         if one.analysis is not None
@@ -87,7 +87,7 @@ TOLERATED = Filter.UPR_30
 """Filter of the circular deviation that a tolerance is for: the one that `evaluate` compares with predictions."""
 
 
-def _sizes(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, Size]:
+def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, Size]:
     """Sizes with their uncertainties."""
     found = budgets(one, known, (Quantity.G_LS, Quantity.MEAN_RADIAL, Quantity.X, Quantity.Y))
     g, radial = found[Quantity.G_LS], found[Quantity.MEAN_RADIAL]

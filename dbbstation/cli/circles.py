@@ -107,7 +107,6 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
     from dbbstation.cli.output import EXPANDED, print_table
 
     click.echo(f"figures of {summary['edition']}, filter: {summary['filter']}, lengths in µm, {EXPANDED}")
-    click.echo("G, F and H without what noise adds to them; with it, and what it adds: --budget")
     head = ["session"] if several else []
     rows: list[list[object]] = []
     for run in summary["runs"]:
@@ -172,6 +171,7 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
                 ]
             )
         print_table([*head, *["test", "n", "G(b)", "U", "G(b)(LS)", "D", "U", "H", "U"], "at [deg]"], rows)
+    click.echo("\nWhat noise adds to G, F and H is taken off; --budget says how much that is.")
     _print_why_not([*summary["runs"], *summary["pairs"]])
 
 
@@ -192,7 +192,7 @@ def _print_why_not(runs: Sequence[Mapping[str, Any]]) -> None:
             if budget["why_not"]:
                 of.setdefault(budget["why_not"], {})[figure] = None
     for why, figures in of.items():
-        click.echo(f"\n{', '.join(figures)}: {why}")
+        click.echo(f"{', '.join(figures)}: {why}")
 
 
 def _noise(run: Mapping[str, Any]) -> object:

@@ -44,8 +44,15 @@ class SerialMachine:
     square_um_m: float = 0.0
     spike_deg: float = 3.0
 
-    def length_mm(self, theta_deg: FloatArray, radius_mm: float, feed_mm_min: float, sense: int) -> FloatArray:
-        """Distance of the tool from the centre of the circle `(n,)` at commanded angles, `sense` +1 counter-clockwise."""
+    def length_mm(
+        self,
+        theta_deg: FloatArray,
+        radius_mm: float,
+        feed_mm_min: float,
+        sense: int,
+        ball_mm: tuple[float, float] = (0.0, 0.0),
+    ) -> FloatArray:
+        """Distance of the tool from a ball near the centre `(n,)` at commanded angles, `sense` +1 counter-clockwise."""
         theta = np.radians(theta_deg)
         speed_rad_s = feed_mm_min / 60.0 / radius_mm
         x, y = (
@@ -53,7 +60,7 @@ class SerialMachine:
             for axis, quarter in ((self.x, 0.0), (self.y, np.pi / 2))
         )
         tilt = 1e-6 * self.square_um_m
-        return np.hypot(x - y * np.sin(tilt), y * np.cos(tilt))
+        return np.hypot(x - y * np.sin(tilt) - ball_mm[0], y * np.cos(tilt) - ball_mm[1])
 
     def _goes(
         self, axis: Axis, theta: FloatArray, radius_mm: float, sense: int, speed_rad_s: float, quarter: float

@@ -134,10 +134,28 @@ def load_circles(
         progress(len(used), len(used))
         circles += of_session
         pairs += _pairs(session, of_session)
+        warnings += _many(session, used)
     if not circles:
         places = ", ".join(str(session.folder) for session in sessions)
         raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
     return Circled(tuple(circles), tuple(pairs), tuple(warnings), tuple(sessions))
+
+
+def _many(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
+    """Say which circle has so many accepted runs that one of them may be a mistake: the plan asks for one of each direction."""
+    of: dict[str, list[str]] = {}
+    for run in runs:
+        of.setdefault(f"{run.test} {run.direction}", []).append(str(run.repeat))
+    return [
+        f"{session.name}: {len(repeats)} runs of {circle} are accepted ({', '.join(sorted(repeats, key=int))}): all are shown, and a fit "
+        "takes all of them"
+        for circle, repeats in of.items()
+        if len(repeats) >= MANY
+    ]
+
+
+MANY = 3
+"""Accepted runs of one circle in one direction that are said."""
 
 
 def _judged(

@@ -41,8 +41,8 @@ LEVELS_UM = (0.1, 0.3, 1.0)
 COLOURS = {"white": (1.0, 0.0), "correlated": (0.6, 0.8)}
 """Shares of white noise and of noise that remembers eight tenths of the sample before."""
 
-KINDS = {"perfect": 0.0, "as large as noise": 0.0, "machine": 1.0}
-"""Sizes of the faults: none, such that the form is about as large as the noise, and those of a worn machine."""
+KINDS = ("perfect", "as large as noise", "worn machine")
+"""Faults: none, such that the form is about as large as the noise, and those of a worn machine."""
 
 FILTERS = (Filter.UPR_15, Filter.UPR_50, Filter.UPR_150)
 GAUSSIAN = "G, Gaussian filters"
@@ -93,9 +93,9 @@ def coverage_of_circles(
                 hits[row].append(inside)
             done += 1
             progress(done)
-        for (figure, kind), inside in hits.items():
+        for (figure, kind), held in hits.items():
             by_noise = rows.setdefault(figure, {}).setdefault(f"{cell.colour} {cell.level_um:g} µm", {})
-            by_noise[kind] = {"inside": int(np.sum(inside)), "draws": len(inside)}
+            by_noise[kind] = {"inside": sum(held), "draws": len(held)}
     return {"draws": draws, "rows": rows}
 
 
@@ -113,8 +113,8 @@ def pooled(row: dict[str, Any], noise: str = "", kind: str = "") -> tuple[int, i
 def _drawn(cell: Cell, seed: int) -> list[tuple[tuple[str, str], bool]]:
     """One machine: its circle in both directions, noise and errors of bar and ball drawn; rows and whether they hold."""
     rng = np.random.default_rng([seed, int(1000 * cell.level_um), len(cell.colour)])
-    kind = list(KINDS)[seed % len(KINDS)]
-    size = {"perfect": 0.0, "as large as noise": 0.3 * cell.level_um, "machine": 1.0}[kind]
+    kind = KINDS[seed % len(KINDS)]
+    size = dict(zip(KINDS, (0.0, 0.3 * cell.level_um, 1.0), strict=True))[kind]
     machine = _machine(rng, size)
     centre_mm = 0.02 * size * rng.standard_normal(2)
     radius_um = 5.0 * size * rng.standard_normal()
@@ -137,12 +137,8 @@ def _drawn(cell: Cell, seed: int) -> list[tuple[tuple[str, str], bool]]:
         u_ball_z_um=U_BALL_UM,
     )
     found = [*_of_one(read[0], true[0], known, seed), *_of_both(analyse_pair(*read), analyse_pair(*true), known)]
-    if seed % QUICK_EVERY == 0 or kind == "machine":
-        found += _of_look(read, machine)
+    found += _of_look(read, machine)
     return [((figure, kind), inside) for figure, inside in found]
-
-
-QUICK_EVERY = 2
 
 
 def _machine(rng: np.random.Generator, size: float) -> SerialMachine:
@@ -168,7 +164,7 @@ def _machine(rng: np.random.Generator, size: float) -> SerialMachine:
 
 def _turn(machine: SerialMachine, direction: Direction, ball_mm: tuple[float, ...], radius_um: float) -> RawCircle:
     circle = Circle((0, 0, 0), (0, 0, 0), RADIUS_MM, (0, 0, 0), FEED_MM_MIN, 0.0, 0.0, 1.5, 0.0, direction)
-    phi_deg = np.arange(SAMPLES) * (360.0 / SAMPLES)
+    phi_deg = np.arange(0.0, 360.0, 360.0 / SAMPLES)
     length_mm = machine.length_mm(
         circle.theta_deg(phi_deg), RADIUS_MM, FEED_MM_MIN, int(direction.sign), (ball_mm[0], ball_mm[1])
     )

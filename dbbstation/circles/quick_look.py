@@ -286,7 +286,7 @@ def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
         period_mm = diameter_mm / periods
         waves = np.vstack([cyclic_shapes(turn.theta_deg, turn.one.raw.circle, axis, period_mm) for turn in turns])
         beside = waves - fit.basis @ (fit.basis.T @ waves)
-        size = np.linalg.solve(beside.T @ beside, beside.T @ fit.left_um)
+        size = np.asarray(np.linalg.solve(beside.T @ beside, beside.T @ fit.left_um), dtype=np.float64)
         return _Trial(float(fit.left_um @ beside @ size), period_mm, size, waves, beside)
 
     coarse = max((trial(float(periods)) for periods in PERIODS), key=lambda one: one.gained)

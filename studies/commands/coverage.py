@@ -15,18 +15,30 @@ PLANS = {"elevated": "table2-elevated", "level": "table2"}
 )
 @click.option("--plan", type=click.Choice(sorted(PLANS)), help="One of the two plans only.")
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
+@click.option(
+    "--part",
+    type=click.Choice(["machines", "circles"]),
+    help="Calibrations of machines, or figures of circles, only.",
+)
+@click.option(
+    "--draws", default=1000, show_default=True, type=click.IntRange(min=3), help="Circles for each of six noises."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
-def coverage(*, machines: int, plan: str | None, seed: int, as_json: bool) -> None:
+def coverage(*, machines: int, plan: str | None, seed: int, part: str | None, draws: int, as_json: bool) -> None:
     r"""Calibrate many random machines and count how often the 95 % intervals contain the truth.
 
     On the plan with five raised bars all 24 parameters; on the level plan those combinations that level bars see, on
     machines without a common height of their base joints. Mountings, CMM, bar and noise scatter as plan and session
     state. Predicted positions are looked at 150 mm and 10 degrees about the middle of the travel.
 
+    Figures of circles: of machines with serial axes that tests/plant makes, perfect, as good as the noise and worn, with three
+    sizes of white and of correlated noise, with errors of bar, temperatures and ball drawn as they are stated.
+
     \b
     Examples:
       dbbstation study coverage
       dbbstation study coverage --machines 100 --plan elevated --json
+      dbbstation study coverage --part circles --draws 300
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import progress_bar
@@ -37,15 +49,46 @@ def coverage(*, machines: int, plan: str | None, seed: int, as_json: bool) -> No
 
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     found: dict[str, Any] = {"seed": seed}
-    for name in sorted(PLANS) if plan is None else [plan]:
+    plans = sorted(PLANS) if plan is None else [plan]
+    for name in [] if part == "circles" else plans:
         what = read_plan(shipped_folder("protocols") / "plans" / f"{PLANS[name]}.yaml")
         with progress_bar(f"{name} plan", machines) as advance:
             covered = experiment(machine, what, range(seed, seed + machines), advance, level=name == "level")
         found[name] = covered.numbers()
         if not as_json:
             _print(name, found[name])
+    if part != "machines" and plan is None:
+        found["circles"] = _circles(draws, seed, as_json=as_json)
     if as_json:
         print_json(found)
+
+
+def _circles(draws: int, seed: int, *, as_json: bool) -> dict[str, Any]:
+    """Draw circles, and print how often U about each figure contains the truth."""
+    from dbbstation.cli.output import print_table
+    from dbbstation.cli.progress import progress_bar
+    from studies.coverage_circles import CELLS, KINDS, coverage_of_circles, pooled
+
+    with progress_bar("circles", draws * len(CELLS)) as advance:
+        found = coverage_of_circles(draws, seed, advance)
+    if as_json:
+        return found
+    noises = [f"{cell.colour} {cell.level_um:g} µm" for cell in CELLS]
+
+    def percent(counts: tuple[int, int]) -> str:
+        return "-" if not counts[1] else f"{100 * counts[0] / counts[1]:.1f}"
+
+    click.echo(f"figures of circles, {draws} draws for each noise from seed {seed}: truth within U = 2 u, in percent")
+    rows = [
+        [
+            name,
+            *(percent(pooled(row, noise=noise)) for noise in noises),
+            *(percent(pooled(row, kind=kind)) for kind in KINDS),
+        ]
+        for name, row in found["rows"].items()
+    ]
+    print_table(["figure", *noises, *KINDS], rows)
+    return found
 
 
 def _print(name: str, numbers: dict[str, Any]) -> None:

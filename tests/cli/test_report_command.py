@@ -219,8 +219,11 @@ def test_before_and_now_stand_side_by_side_as_measured(session, better, tmp_path
     centres = {
         name: [
             np.sqrt(
-                np.hypot(run["centre_um"]["x"], run["centre_um"]["y"]) ** 2
-                - sum(run["uncertainty"][axis]["u_um"] ** 2 for axis in "XY")
+                max(
+                    np.hypot(run["centre_um"]["x"], run["centre_um"]["y"]) ** 2
+                    - sum(run["uncertainty"][axis]["u_um"] ** 2 for axis in "XY"),
+                    0.0,
+                )
             )
             for run in call("circles", folder, "--json").data["runs"]
         ]

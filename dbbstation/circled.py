@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from dbbstation.circles.path import Filter
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.plan.bar import Bar
     from dbbstation.quality.judge import Judgement
     from dbbstation.trace.recording import Recording
 
@@ -133,10 +134,28 @@ def load_circles(
         progress(len(used), len(used))
         circles += of_session
         pairs += _pairs(session, of_session)
+        warnings += _many(session, used)
     if not circles:
         places = ", ".join(str(session.folder) for session in sessions)
         raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
     return Circled(tuple(circles), tuple(pairs), tuple(warnings), tuple(sessions))
+
+
+def _many(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
+    """Say which circle has so many accepted runs that one of them may be a mistake: the plan asks for one of each direction."""
+    of: dict[str, list[str]] = {}
+    for run in runs:
+        of.setdefault(f"{run.test} {run.direction}", []).append(str(run.repeat))
+    return [
+        f"{session.name}: {len(repeats)} runs of {circle} are accepted ({', '.join(sorted(repeats, key=int))}): all are shown, and a fit "
+        "takes all of them"
+        for circle, repeats in of.items()
+        if len(repeats) >= MANY
+    ]
+
+
+MANY = 3
+"""Accepted runs of one circle in one direction that are said."""
 
 
 def _judged(
@@ -153,10 +172,8 @@ def _measured(
     session: SessionFolder, run: RunEntry, recording: Recording, chosen: Filter, judgement: Judgement | None
 ) -> MeasuredCircle:
     known = _known(session, run, recording)
-    if judgement is not None and judgement.analysis is not None and not chosen:
-        return MeasuredCircle(session.name, run, judgement.analysis, "", known, judgement)  # without a filter already
     try:
-        named = replace(recording, name=run.label)
+        named = replace(_corrected(session, recording), name=run.label)
         analysis = analyse(cut(named, session.circle(run)), named, chosen)
     except TraceError as error:
         problem = f"{error.what}; {error.remedy}" if error.remedy else error.what
@@ -164,21 +181,34 @@ def _measured(
     return MeasuredCircle(session.name, run, analysis, "", known, judgement)
 
 
+def _corrected(session: SessionFolder, recording: Recording) -> Recording:
+    """Return a recording less what its bar reads too long, as a fit takes it into account (`Setup.bar_reads_long_mm`)."""
+    if session.bar is None:
+        return recording
+    long_mm, _ = session.bar.reads_long_mm(session.bar_temp_c(recording.temperature_degc))
+    return recording if long_mm == 0.0 else replace(recording, length_mm=recording.length_mm - long_mm)
+
+
 def _known(session: SessionFolder, run: RunEntry, recording: Recording) -> SetUpKnowledge:
     """What the session states of bar and ball of a run."""
     bar, setup = session.bar, session.setup(run)
-    logged = recording.temperature_degc.get("bar")
-    measured = session.ambient_temp_c if logged is None else float(np.mean(logged))
+    measured_c = session.bar_temp_c(recording.temperature_degc)
+    grown_mm = None if bar is None else bar.grown_uncertainty_mm(measured_c)
     scatter = np.zeros(3) + setup.mounting_repeatability_mm
     ball_um = 1e3 * np.hypot(scatter, setup.ball_uncertainty_mm)
     return SetUpKnowledge(
         u_bar_um=None if bar is None else 1e3 * bar.calibrator_uncertainty_mm,
-        expansion_um_m_k=None if bar is None else bar.expansion_um_m_k,
-        calibrated_degc=None if bar is None else bar.temp_c,
-        measured_degc=measured,
+        u_temperature_um=None if grown_mm is None else 1e3 * grown_mm,
+        not_absolute=_not_absolute(bar, measured_c),
         u_ball_um=float(max(ball_um[:2])) if setup.place_known else None,
         u_ball_z_um=float(ball_um[2]) if setup.place_known else None,
     )
+
+
+def _not_absolute(bar: Bar | None, measured_c: float | None) -> str:
+    """Why lengths that a bar measured are not absolute; empty where they are."""
+    lacks = ("calibrated length of the bar",) if bar is None else bar.lacks(measured_c)
+    return f"not absolute, because the session does not state: {', '.join(lacks)}" if lacks else ""
 
 
 def _pairs(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[MeasuredPair]:

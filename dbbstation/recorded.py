@@ -101,7 +101,9 @@ def load_sessions(
 
 
 def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Observation:
-    observation = Observation(run.test, run.repeat, raw, session.setup(run), session.started_s(run))
+    observation = Observation(
+        run.test, run.repeat, raw, session.setup(run, raw.temperature_degc), session.started_s(run)
+    )
     if run.program is None:
         return observation
     path, faults = run.program.path, list[Problem]()

@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from dbbstation.circled import load_circles
-from dbbstation.circles.budget import Quantity, budgets
-from dbbstation.circles.path import Filter
+from dbbstation.circles.budget import budgets
+from dbbstation.circles.quantity import Quantity
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.gateway import digest_of
 from dbbstation.files.inputs import input_book
@@ -20,7 +20,7 @@ from dbbstation.history.order import moment_words
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.sources.contract import Owner
-from dbbstation.tolerated import tolerated_circles
+from dbbstation.tolerated import TOLERATED, tolerated_circles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -43,7 +43,7 @@ def session_figures(folder: Path) -> SessionFigures:
         InputError: every fault of its files; no accepted run.
     """
     with input_book():  # recordings are inputs of what is kept, not of the command that happens to read them
-        found = load_circles([folder], Filter.NONE)
+        found = load_circles([folder], TOLERATED)
     session = found.sessions[0]
     shown = [one for one in found.circles if one.analysis is not None]
     runs = tuple(map(_figures, shown, tolerated_circles(shown)))
@@ -69,7 +69,7 @@ def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
     analysis = one.analysis
     if analysis is None:
         raise ValueError("a run without a circle has no figures")
-    known = budgets(analysis, one.known)
+    known = budgets(analysis, one.known, (Quantity.X, Quantity.Y))
     x_mm, y_mm = analysis.centre_mm
     g, centre, radial = (
         tolerated.sizes[figure]
@@ -80,11 +80,11 @@ def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
         direction=str(one.entry.direction),
         circle=_in_words(analysis.raw.circle),
         figures=(
-            Figure("G", g.um, g.u_um),
-            Figure("X", 1e3 * x_mm, known[Quantity.X].u_um),
-            Figure("Y", 1e3 * y_mm, known[Quantity.Y].u_um),
-            Figure("R", analysis.mean_radial_error_um, radial.u_um),
-            Figure("C", centre.um, centre.u_um),
+            Figure("G", g.um, g.known_um),
+            Figure("X", 1e3 * x_mm, known[Quantity.X].known_um),
+            Figure("Y", 1e3 * y_mm, known[Quantity.Y].known_um),
+            Figure("R", analysis.mean_radial_error_um, radial.known_um),
+            Figure("C", centre.um, centre.known_um),
         ),
     )
 

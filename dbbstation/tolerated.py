@@ -7,18 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.reporting.prediction import smooth_circularity_um
-from dbbstation.circles.budget import Quantity, budgets
+from dbbstation.circles.analysis import refiltered
+from dbbstation.circles.budget import budgets
+from dbbstation.circles.path import Filter
+from dbbstation.circles.quantity import Quantity
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.quality.conformity import Conformity, Size, conformity
-from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from dbbstation.circled import MeasuredCircle
     from dbbstation.circles.analysis import CircleAnalysis
-    from dbbstation.circles.budget import Budget
+    from dbbstation.circles.budget import Budget, SetUpKnowledge
     from dbbstation.plan.tolerance import Tolerance
 
 
@@ -31,7 +32,7 @@ class ToleratedCircle:
         test: name of its test.
         direction: `ccw` or `cw`.
         repeat: counts runs of this test and direction.
-        sizes: by figure; G is that of readings up to 30 undulations per revolution, as in `evaluate`.
+        sizes: by figure; G is about the least-squares circle, up to 30 undulations per revolution.
     """
 
     session: str
@@ -75,31 +76,41 @@ def tolerated_circles(circles: Iterable[MeasuredCircle]) -> tuple[ToleratedCircl
             one.entry.test,
             str(one.entry.direction),
             one.entry.repeat,
-            _sizes(one.analysis, budgets(one.analysis, one.known)),
+            sizes_of(refiltered(one.analysis, TOLERATED), one.known),
         )
         for one in circles
         if one.analysis is not None
     )
 
 
-def _sizes(one: CircleAnalysis, known: Mapping[Quantity, Budget]) -> dict[CircleFigure, Size]:
-    """Sizes with their uncertainties.
+TOLERATED = Filter.UPR_30
+"""Filter of the circular deviation that a tolerance is for: the one that `evaluate` compares with predictions."""
 
-    That of G is of G with all its noise, and that of the mean radial error of the radius in the plane of the circle: neither is
-    smaller than the figure's own.
-    """
-    measured = figures(one.raw)
-    off = np.array(measured.centre_mm)
-    u_centre = np.array([known[Quantity.X].u_um, known[Quantity.Y].u_um])
-    # A centre that is not off has no direction: either axis may be the one that counts.
-    along = np.abs(off) / np.hypot(*off) if np.any(off) else np.array([1.0, 1.0])
+
+def sizes_of(one: CircleAnalysis, known: SetUpKnowledge) -> dict[CircleFigure, Size]:
+    """Sizes with their uncertainties."""
+    found = budgets(one, known, (Quantity.G_LS, Quantity.MEAN_RADIAL, Quantity.X, Quantity.Y))
+    g, radial = found[Quantity.G_LS], found[Quantity.MEAN_RADIAL]
     return {
-        CircleFigure.CIRCULAR_DEVIATION: Size(
-            smooth_circularity_um(one.raw, one.raw.length_mm), known[Quantity.G].u_um
-        ),
-        CircleFigure.CENTRE_DEVIATION: Size(measured.centre_deviation_um, float(np.linalg.norm(along * u_centre))),
-        CircleFigure.MEAN_RADIAL_ERROR: Size(abs(measured.mean_radial_error_um), known[Quantity.RADIUS].u_um),
+        CircleFigure.CIRCULAR_DEVIATION: Size(g.value_um, g.u_um, g.why_not, g.known_um),
+        CircleFigure.CENTRE_DEVIATION: _off_centre(found[Quantity.X], found[Quantity.Y]),
+        CircleFigure.MEAN_RADIAL_ERROR: Size(abs(radial.value_um), radial.u_um, radial.why_not, radial.known_um),
     }
+
+
+def _off_centre(x: Budget, y: Budget) -> Size:
+    """Length of a centre offset, less what its uncertainty adds to it.
+
+    The square of the length of a vector is larger than the true one by the sum of the variances. Taken off, the interval of 2 u about
+    the length holds the truth in 95 of 100 cases at an offset of zero too: it reaches to zero up to sqrt(6) u, which a Rayleigh
+    distribution passes in exp(-3) of all cases.
+    """
+    off, u = np.array([x.value_um, y.value_um]), np.array([x.known_um, y.known_um])
+    length = float(np.hypot(*off))
+    # A centre that is not off has no direction: either axis may be the one that counts.
+    along = np.abs(off) / length if length > 0.0 else np.sqrt([0.5, 0.5])
+    u_along = float(np.linalg.norm(along * u))
+    return Size(float(np.sqrt(max(length**2 - float(u @ u), 0.0))), u_along, "", u_along)
 
 
 def held_against(

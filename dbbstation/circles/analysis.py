@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -129,6 +129,26 @@ def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter =
     )
 
 
+def refiltered(one: CircleAnalysis, chosen: Filter) -> CircleAnalysis:
+    """Return a circle with another filter of G, F and H.
+
+    Raises:
+        TraceError: the points do not determine a circle.
+    """
+    if chosen is one.chosen:
+        return one
+    path = path_of(one.raw, chosen)
+    return replace(
+        one,
+        chosen=chosen,
+        path=path,
+        g_um=1e3 * path.zone().width_mm,
+        g_least_squares_um=1e3 * float(np.ptp(path.least_squares.deviation_mm)),
+        f_centred=_extremes(one.radius_error_um + 1e3 * path.least_squares.deviation_mm),
+        f_commanded=_extremes(1e3 * (path.about_ball_mm - path.radius_mm)),
+    )
+
+
 def _without_drift(raw: RawCircle, residual_um: NDArray[np.float64]) -> NDArray[np.float64]:
     """Deviations of a turn whose end meets its beginning: a step there would raise every line of the spectrum."""
     apart = closure_of(raw, residual_um, 0.0)
@@ -157,6 +177,7 @@ class PairAnalysis:
     Attributes:
         one: in the sense that was run first.
         other: in the other sense.
+        together: both paths as one, that of `one` first.
         g_um: bi-directional circular deviation G(b), minimum zone of both paths [µm].
         g_least_squares_um: the same about the least-squares circle of both paths [µm].
         d_um: mean bi-directional radial deviation D: radius of the least-squares circle of both paths less the nominal
@@ -167,6 +188,7 @@ class PairAnalysis:
 
     one: CircleAnalysis
     other: CircleAnalysis
+    together: CirclePath
     g_um: float
     g_least_squares_um: float
     d_um: float
@@ -191,6 +213,7 @@ def analyse_pair(one: CircleAnalysis, other: CircleAnalysis) -> PairAnalysis:
     return PairAnalysis(
         one=one,
         other=other,
+        together=together,
         g_um=1e3 * together.zone().width_mm,
         g_least_squares_um=1e3 * float(np.ptp(together.least_squares.deviation_mm)),
         d_um=1e3 * (together.least_squares.radius_mm - together.radius_mm),

@@ -5,30 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from dbbstation.circles.noise import ROUNDING
-from dbbstation.trace.gaussian import gaussian
+from dbbstation.circles.estimates import estimate_of, pair_estimate
+from dbbstation.circles.noise import FEWEST_SAMPLES, ROUNDING
+from dbbstation.circles.quantity import ABSOLUTE, Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
-
-
-class Quantity(StrEnum):
-    """What a budget is for."""
-
-    G = "G"
-    F = "F"
-    RADIUS = "radius"
-    X = "X"
-    Y = "Y"
-    G_BOTH = "G(b)"
-    D = "D"
-    H = "H"
 
 
 class Cause(StrEnum):
@@ -36,7 +23,6 @@ class Cause(StrEnum):
 
     NOISE = "noise of the readings"
     RESOLUTION = "step of the readings"
-    SAMPLING = "peaks between samples"
     CLOSURE = "drift over the turn"
     ANGLE = "where the turn begins"
     BAR = "calibrated length of the bar"
@@ -44,7 +30,7 @@ class Cause(StrEnum):
     MOUNTING = "place of the ball"
 
 
-NOT_STATED = (
+NOT_STATED: tuple[str, ...] = (
     "form of both balls",
     "how fast the gauge follows",
     "heat of the machine between runs",
@@ -58,17 +44,15 @@ class SetUpKnowledge:
 
     Attributes:
         u_bar_um: standard uncertainty of the bar's calibrated length [µm].
-        expansion_um_m_k: thermal expansion of the bar [µm/(m K)].
-        calibrated_degc: temperature of the bar at its calibration [degC].
-        measured_degc: temperature of the bar, or of the shop, at the measurement [degC].
+        u_temperature_um: standard uncertainty of what the bar has grown by since, which readings were corrected by [µm].
+        not_absolute: why figures that rest on the bar's length have no uncertainty; empty where they have one.
         u_ball_um: standard uncertainty of the ball's place in X and in Y, coordinate and mounting together [µm].
         u_ball_z_um: the same for its height [µm].
     """
 
     u_bar_um: float | None = None
-    expansion_um_m_k: float | None = None
-    calibrated_degc: float | None = None
-    measured_degc: float | None = None
+    u_temperature_um: float | None = None
+    not_absolute: str = ""
     u_ball_um: float | None = None
     u_ball_z_um: float | None = None
 
@@ -79,71 +63,113 @@ class Budget:
 
     Attributes:
         quantity: which.
-        terms_um: standard uncertainty by cause [µm].
+        terms_um: standard uncertainty by cause, as far as it is known [µm].
         missing: causes that count for it and that nobody stated.
-        noise_adds_um: how much larger noise alone makes it, not taken off [µm].
+        value_um: the figure, without what noise adds to it [µm].
+        as_read_um: the figure of the readings [µm].
+        why_not: why it has no uncertainty; empty where it has one.
     """
 
     quantity: Quantity
     terms_um: Mapping[Cause, float]
-    missing: tuple[str, ...] = ()
-    noise_adds_um: float = 0.0
+    missing: tuple[str, ...]
+    value_um: float
+    as_read_um: float
+    why_not: str = ""
 
     @property
-    def u_um(self) -> float:
-        """Root of the sum of squares of its terms [µm]."""
+    def known_um(self) -> float:
+        """Root of the sum of squares of the terms that are known [µm]."""
         return float(np.sqrt(sum(term**2 for term in self.terms_um.values())))
 
+    @property
+    def u_um(self) -> float | None:
+        """Standard uncertainty [µm]; None where a cause of unknown size counts."""
+        return None if self.why_not else self.known_um
 
-@dataclass
-class _Draft:
-    terms: dict[Cause, float] = field(default_factory=dict)
-    missing: list[str] = field(default_factory=list)
+
+TOO_FEW = f"fewer than {FEWEST_SAMPLES} samples do not separate noise from form"
+"""Why a range of few samples has no uncertainty."""
+
+RANGES = (Quantity.G, Quantity.G_LS, Quantity.F_MAX, Quantity.F_MIN)
+"""Figures of one circle that are extremes of its path."""
 
 
-def budgets(one: CircleAnalysis, known: SetUpKnowledge) -> dict[Quantity, Budget]:
-    """Return the budgets of G, F about the centre, radius, X and Y of a circle.
+def budget_of(one: CircleAnalysis, quantity: Quantity, known: SetUpKnowledge) -> Budget:
+    """Return the budget of a figure of one circle.
 
     Args:
         one: the circle.
+        quantity: which figure.
         known: what the session states.
     """
+    if quantity in RANGES:
+        return _range(one, quantity, known)
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm  # a raised bar: 1 / cos e
-    count, sigma = len(one.raw), along * one.noise.sigma_um
-    peak = _peak_noise_um(one)
-    shape = {
-        Cause.NOISE: peak,
-        Cause.RESOLUTION: along * one.noise.resolution_um / ROUNDING,
-        Cause.SAMPLING: _between_samples_um(one) / np.sqrt(3.0),
-        Cause.CLOSURE: _closure_um(one) / ROUNDING,
+    sigma = one.noise.sigma_um
+    if quantity in ABSOLUTE:
+        # The mean of readings is along the bar, the radius in the plane of the circle.
+        scale = 1.0 if quantity is Quantity.MEAN_RADIAL else along
+        value = one.mean_radial_error_um if quantity is Quantity.MEAN_RADIAL else one.radius_error_um
+        length = _length_terms(one, known, scale)
+        terms = {Cause.NOISE: scale * sigma / np.sqrt(len(one.raw)), **length.terms}
+        return Budget(quantity, terms, (*length.missing, *NOT_STATED), value, value, known.not_absolute)
+    axis = 0 if quantity is Quantity.X else 1
+    across_um = 1e3 * one.centre_mm[1 - axis]
+    value = 1e3 * one.centre_mm[axis]
+    terms = {
+        Cause.NOISE: along * sigma * np.sqrt(2.0 / len(one.raw)),
+        Cause.ANGLE: abs(across_um) * np.radians(one.raw.start_uncertainty_deg),
+        # A drift c over the turn is a sawtooth, whose first harmonic is c / pi across the start.
+        Cause.CLOSURE: _closure_um(one) / np.pi / np.sqrt(3.0),
     }
-    length = _length_terms(one, known, along)
-    adds = 2.0 * peak * _expected_extreme(one)
-    ranges = {cause: size if cause is Cause.SAMPLING else np.sqrt(2.0) * size for cause, size in shape.items()}
-    found = {
-        Quantity.G: Budget(Quantity.G, ranges, NOT_STATED, adds),
-        Quantity.F: Budget(Quantity.F, {**shape, **length.terms}, (*length.missing, *NOT_STATED), 0.5 * adds),
-        Quantity.RADIUS: Budget(
-            Quantity.RADIUS,
-            {Cause.NOISE: sigma / np.sqrt(count), **length.terms},
-            (*length.missing, *NOT_STATED),
-        ),
+    missing = [*NOT_STATED]
+    if known.u_ball_um is None:
+        missing.insert(0, Cause.MOUNTING.value)
+    else:
+        terms[Cause.MOUNTING] = known.u_ball_um
+    return Budget(quantity, terms, tuple(missing), value, value)
+
+
+def _range(one: CircleAnalysis, quantity: Quantity, known: SetUpKnowledge) -> Budget:
+    """Budget of an extreme of the path, or of the difference of two."""
+    along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
+    two = np.sqrt(2.0) if quantity in {Quantity.G, Quantity.G_LS} else 1.0
+    terms = {
+        Cause.RESOLUTION: two * along * one.noise.resolution_um / ROUNDING,
+        Cause.CLOSURE: two * _closure_um(one) / ROUNDING,
     }
-    across_um = 1e3 * np.array([one.centre_mm[1], one.centre_mm[0]])
-    for quantity, off_um in zip((Quantity.X, Quantity.Y), across_um, strict=True):
-        terms = {
-            Cause.NOISE: sigma * np.sqrt(2.0 / count),
-            Cause.ANGLE: abs(float(off_um)) * np.radians(one.raw.start_uncertainty_deg),
-            # A drift c over the turn is a sawtooth, whose first harmonic is c / pi across the start.
-            Cause.CLOSURE: _closure_um(one) / np.pi / np.sqrt(3.0),
-        }
-        missing = [*NOT_STATED]
-        if known.u_ball_um is None:
-            missing.insert(0, Cause.MOUNTING.value)
-        else:
-            terms[Cause.MOUNTING] = known.u_ball_um
-        found[quantity] = Budget(quantity, terms, tuple(missing))
-    return found
+    missing, why = NOT_STATED, ""
+    if quantity in ABSOLUTE:
+        length = _length_terms(one, known, along)
+        terms |= {Cause.NOISE: along * one.noise.sigma_um / np.sqrt(len(one.raw)), **length.terms}
+        missing, why = (*length.missing, *NOT_STATED), known.not_absolute
+    found = estimate_of(one, quantity)
+    if found is None:
+        read = _as_read(one)[quantity]
+        return Budget(quantity, terms, missing, read, read, TOO_FEW)
+    terms[Cause.NOISE] = float(np.hypot(found.u_um, terms.get(Cause.NOISE, 0.0)))
+    return Budget(quantity, terms, missing, found.value_um, found.as_read_um, why)
+
+
+def _as_read(one: CircleAnalysis) -> dict[Quantity, float]:
+    return {
+        Quantity.G: one.g_um,
+        Quantity.G_LS: one.g_least_squares_um,
+        Quantity.F_MAX: one.f_centred.largest_um,
+        Quantity.F_MIN: one.f_centred.least_um,
+    }
+
+
+OF_ONE = (*RANGES, Quantity.RADIUS, Quantity.MEAN_RADIAL, Quantity.X, Quantity.Y)
+OF_BOTH = (Quantity.G_BOTH, Quantity.G_BOTH_LS, Quantity.D, Quantity.H)
+
+
+def budgets(
+    one: CircleAnalysis, known: SetUpKnowledge, quantities: Iterable[Quantity] = OF_ONE
+) -> dict[Quantity, Budget]:
+    """Return the budgets of figures of a circle, all or some; arguments as of `budget_of`."""
+    return {quantity: budget_of(one, quantity, known) for quantity in quantities}
 
 
 def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[Quantity, Budget]:
@@ -153,35 +179,45 @@ def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[Quantity, Bu
         pair: the circle in both directions.
         known: what the session states; bar and ball are the same in both.
     """
-    each = [budgets(one, known) for one in (pair.one, pair.other)]
-    g, radius = [one[Quantity.G] for one in each], [one[Quantity.RADIUS] for one in each]
-    turned = float(np.hypot(pair.one.raw.start_uncertainty_deg, pair.other.raw.start_uncertainty_deg))
-    slope_um = _slope_um_per_deg(pair)
-    both_g = {cause: float(np.sqrt(np.mean([b.terms_um[cause] ** 2 for b in g]))) for cause in g[0].terms_um}
+    radius = [budget_of(one, Quantity.RADIUS, known) for one in (pair.one, pair.other)]
     noise = float(np.hypot(radius[0].terms_um[Cause.NOISE], radius[1].terms_um[Cause.NOISE])) / 2.0
     shared: dict[Cause, float] = {cause: size for cause, size in radius[0].terms_um.items() if cause is not Cause.NOISE}
-    adds = max(b.noise_adds_um for b in g)
-    return {
-        Quantity.G_BOTH: Budget(Quantity.G_BOTH, {**both_g, Cause.ANGLE: slope_um * turned}, g[0].missing, adds),
-        Quantity.D: Budget(Quantity.D, {Cause.NOISE: noise, **shared}, radius[0].missing),
-        Quantity.H: Budget(Quantity.H, {**both_g, Cause.ANGLE: slope_um * turned}, NOT_STATED, adds),
+    d_terms = {Cause.NOISE: noise, **shared}
+    found = {quantity: _pair_range(pair, quantity) for quantity in (Quantity.G_BOTH, Quantity.G_BOTH_LS, Quantity.H)}
+    found[Quantity.D] = Budget(Quantity.D, d_terms, radius[0].missing, pair.d_um, pair.d_um, known.not_absolute)
+    return {quantity: found[quantity] for quantity in OF_BOTH}
+
+
+def _pair_range(pair: PairAnalysis, quantity: Quantity) -> Budget:
+    each = [_range(one, Quantity.G, SetUpKnowledge()).terms_um for one in (pair.one, pair.other)]
+    turned = float(np.hypot(pair.one.raw.start_uncertainty_deg, pair.other.raw.start_uncertainty_deg))
+    terms = {
+        cause: float(np.sqrt(np.mean([terms[cause] ** 2 for terms in each])))
+        for cause in (Cause.RESOLUTION, Cause.CLOSURE)
     }
+    terms[Cause.ANGLE] = _slope_um_per_deg(pair) * turned
+    read = {Quantity.G_BOTH: pair.g_um, Quantity.G_BOTH_LS: pair.g_least_squares_um, Quantity.H: pair.h_um}[quantity]
+    found = pair_estimate(pair, quantity)
+    if found is None:
+        return Budget(quantity, terms, NOT_STATED, read, read, TOO_FEW)
+    terms[Cause.NOISE] = found.u_um
+    return Budget(quantity, terms, NOT_STATED, found.value_um, read)
 
 
-def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, along: float) -> _Draft:
-    """What bar and height of the ball do to lengths in the plane of the circle."""
+@dataclass
+class _Draft:
+    terms: dict[Cause, float] = field(default_factory=dict)
+    missing: list[str] = field(default_factory=list)
+
+
+def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, scale: float) -> _Draft:
+    """What bar and height of the ball do to lengths in the plane of the circle, or along the bar."""
     draft = _Draft()
-    if known.u_bar_um is None:
-        draft.missing.append(Cause.BAR.value)
-    else:
-        draft.terms[Cause.BAR] = along * known.u_bar_um
-    stated = (known.expansion_um_m_k, known.calibrated_degc, known.measured_degc)
-    if any(value is None for value in stated):
-        draft.missing.append(Cause.TEMPERATURE.value)
-    else:
-        expansion, calibrated, measured = (float(value) for value in stated if value is not None)
-        # Nothing is added to readings: they hold what the bar grew, perhaps all of it.
-        draft.terms[Cause.TEMPERATURE] = along * abs(expansion * (measured - calibrated)) * one.raw.circle.bar_mm / 1e3
+    for cause, size in ((Cause.BAR, known.u_bar_um), (Cause.TEMPERATURE, known.u_temperature_um)):
+        if size is None:
+            draft.missing.append(cause.value)
+        else:
+            draft.terms[cause] = scale * size
     if one.raw.circle.elevation_deg:
         draft.missing.append("height of the tool tip above the ball")
         if known.u_ball_z_um is not None:
@@ -191,52 +227,14 @@ def _length_terms(one: CircleAnalysis, known: SetUpKnowledge, along: float) -> _
 
 
 def _closure_um(one: CircleAnalysis) -> float:
-    """Size of what drifted over the turn: by the overlap where there is one, else by the ends of the turn [µm]."""
+    """Size of what drifted over the turn beyond noise: by the overlap where there is one, else by the ends of the turn [µm]."""
     if one.passes is not None:
-        return abs(one.passes.mean_um)
-    return 0.0 if one.closure is None else abs(one.closure.height_um)
-
-
-def _passing(one: CircleAnalysis) -> float:
-    """Undulations per revolution that the figure's noise reaches to."""
-    most = len(one.raw) / 2.0
-    if not one.chosen:
-        return most
-    # Integral of the squared transmission 2^(-2 x²) over x from 0 to infinity.
-    return min(most, float(one.chosen) * 0.5 * float(np.sqrt(np.pi / (2.0 * np.log(2.0)))))
-
-
-def _peak_noise_um(one: CircleAnalysis) -> float:
-    """Standard deviation of the noise of one point of the path, filtered [µm]."""
-    along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
-    if not one.chosen:
-        return along * float(np.nan_to_num(one.noise.reading_um))
-    return along * one.noise.sigma_um * float(np.sqrt(2.0 * _passing(one) / len(one.raw)))
-
-
-def _expected_extreme(one: CircleAnalysis) -> float:
-    """Expected greatest of as many independent normal values as noise has over the turn, in standard deviations.
-
-    sqrt(2 ln n), first order of the theory of extremes. It holds for a circle that is round beyond its noise; a form that
-    stands out has few points near its peaks and gains less: an upper bound.
-    """
-    return float(np.sqrt(2.0 * np.log(max(2.0 * _passing(one), 2.0))))
-
-
-def _between_samples_um(one: CircleAnalysis) -> float:
-    """Height that a peak may have between two samples, of the form up to 50 undulations per revolution [µm]."""
-    if one not in _BETWEEN:
-        form = gaussian(one.path.theta_deg, 1e3 * one.path.least_squares.deviation_mm, _FORM_UPR)
-        _BETWEEN[one] = float(np.abs(np.diff(form, 2)).max(initial=0.0)) / 8.0
-    return _BETWEEN[one]
-
-
-_BETWEEN: WeakKeyDictionary[CircleAnalysis, float] = WeakKeyDictionary()
-"""Such heights, which the budgets of a circle, of its pair and of a tolerance ask for."""
-
-
-_FORM_UPR = 50.0
-"""Undulations per revolution up to which form counts between samples: what is shorter is noise, and has its own term."""
+        drift, u = one.passes.mean_um, one.passes.u_mean_um(one.noise.sigma_um)
+    elif one.closure is not None:
+        drift, u = one.closure.height_um, one.closure.u_um
+    else:
+        return 0.0
+    return float(np.sqrt(max(drift**2 - u**2, 0.0)))
 
 
 def _slope_um_per_deg(pair: PairAnalysis) -> float:

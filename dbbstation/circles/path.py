@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.harmonics import smooth
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.trace.analysis import BallPath, best_circle, horizontal_radius_mm, measured_path, path_about_ball
-from dbbstation.trace.gaussian import gaussian
+from dbbstation.trace.gaussian import gaussian, transmission
 from dbbstation.trace.minimum_zone import MinimumZone, minimum_zone
 
 if TYPE_CHECKING:
@@ -20,17 +21,41 @@ if TYPE_CHECKING:
 
 
 class Filter(IntEnum):
-    """Cut-off in undulations per revolution (UPR)."""
+    """Cut-off in undulations per revolution (UPR): Gaussian, but for 30, which is the sharp one of predictions and tolerances."""
 
     NONE = 0
     UPR_15 = 15
+    UPR_30 = 30
     UPR_50 = 50
     UPR_150 = 150
 
     @property
     def words(self) -> str:
         """As it is written beside a figure."""
+        if self is Filter.UPR_30:
+            return "30 UPR, cut off sharply"
         return f"Gaussian, {self.value} UPR" if self else "none"
+
+    def passed(self, undulations: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Share of the amplitude of undulations that passes, shape (k,)."""
+        if not self:
+            return np.ones(len(undulations))
+        if self is Filter.UPR_30:
+            return np.where(undulations <= self.value, 1.0, 0.0)
+        return transmission(undulations, self.value)
+
+    def through(self, theta_deg: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return deviations of a full turn as the filter passes them, at the same angles, shape (n,)."""
+        if not self:
+            return values
+        if self is Filter.UPR_30:
+            highest = min(self.value, max(len(values) // SAMPLES_PER_UNDULATION, 2))
+            return smooth(values, np.radians(theta_deg), highest)
+        return gaussian(theta_deg, values, self.value)
+
+
+SAMPLES_PER_UNDULATION = 4
+"""Samples per undulation that the sharp filter passes, at the least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +99,7 @@ def path_of(raw: RawCircle, chosen: Filter = Filter.NONE) -> CirclePath:
     about_ball = horizontal_radius_mm(raw, raw.length_mm)
     path = measured_path(raw)
     if chosen:
-        about_ball = about_ball - path.deviation_mm + gaussian(path.theta_deg, path.deviation_mm, chosen)
+        about_ball = about_ball - path.deviation_mm + chosen.through(path.theta_deg, path.deviation_mm)
         path = path_about_ball(raw.theta_deg, about_ball)
     return CirclePath(raw.circle.radius_mm, path.theta_deg, about_ball, path)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.optimize import minimize_scalar
 
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.circles.signatures import Shape, Signature, cyclic_shapes, shapes_of
@@ -30,6 +31,9 @@ periods over the diameter, loses 0.3 % of its amplitude."""
 SPIKES_DEG = (1.5, 2.1, 3.0, 4.2, 6.0, 8.5, 12.0)
 """Lengths that reversal spikes may have, the same at all four ends; figures are means over them [deg]."""
 
+FINER = (2.0**0.2, 2.0**0.06)
+"""Ratios of lengths that are tried about the likeliest one, one round after the other."""
+
 FREE = 10
 """Undulations per revolution, from 3, that the turn may have in both senses alike without being a signature: the form that any
 machine has. It is fitted beside them and not reported. Without it a signature would be fitted to it."""
@@ -44,6 +48,9 @@ than the start of the turn and the place of the ball [deg]."""
 
 SEEN = 4.0
 """Standard uncertainties from which a figure counts as seen: by chance one look of 11 figures in 1400 has one (normal)."""
+
+ONE_SIDED = 1.645
+"""Standard deviations of a 95 % bound [normal distribution]."""
 
 CHANCE = 1e-3
 """Chance at which noise alone shows a cyclic error somewhere in the scan."""
@@ -64,6 +71,7 @@ class Symptom:
         unit: of both.
         seen: whether it is larger than four times its uncertainty.
         text: further information, such as the period of a cyclic error.
+        below: with 95 % probability it is less, where it is not seen and only that can be told; None otherwise.
     """
 
     signature: Signature
@@ -73,6 +81,7 @@ class Symptom:
     unit: str
     seen: bool
     text: str = ""
+    below: float | None = None
 
 
 @dataclass(frozen=True)
@@ -164,8 +173,13 @@ def _turn(one: CircleAnalysis) -> _Turn:
 
 
 def _fits(turns: Sequence[_Turn], waves: Sequence[NDArray[np.float64]] = ()) -> list[_Fit]:
-    """Return a fit with spikes of each length."""
-    return [_fitted(turns, spike_deg, waves) for spike_deg in SPIKES_DEG]
+    """Return fits with spikes of each length, and of lengths about the likeliest one: high spikes show theirs to a percent."""
+    found = [_fitted(turns, spike_deg, waves) for spike_deg in SPIKES_DEG]
+    for finer in FINER:
+        middle = _best(found).spike_deg
+        lengths = [middle * finer**step for step in (-2, -1, 1, 2)]
+        found += [_fitted(turns, length, waves) for length in lengths if SPIKES_DEG[0] <= length <= SPIKES_DEG[-1]]
+    return sorted(found, key=lambda one: one.spike_deg)
 
 
 def _best(fits: Sequence[_Fit]) -> _Fit:
@@ -182,7 +196,9 @@ def _over_lengths(fits: Sequence[_Fit], sigma_um: float) -> tuple[NDArray[np.flo
     """
     squares = np.array([one.left_um @ one.left_um for one in fits]) / sigma_um**2
     spread = np.array([np.linalg.slogdet(one.unit_covariance)[1] for one in fits])
-    log_weight = 0.5 * (spread - squares)
+    # Lengths are tried closer to each other where they are likely: each stands for its part of the logarithmic scale.
+    part = np.gradient(np.log([one.spike_deg for one in fits]))
+    log_weight = 0.5 * (spread - squares) + np.log(np.maximum(part, np.finfo(float).tiny))
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
     values = np.array([one.value for one in fits])
@@ -265,31 +281,50 @@ class _Wave:
 def _cyclic(turns: Sequence[_Turn], fit: _Fit, axis: str) -> _Wave:
     """Search the period of a cyclic error of an axis, beside all other signatures."""
     diameter_mm = 2.0 * turns[0].one.raw.circle.radius_mm
-    trials = []
-    for period_mm in diameter_mm / PERIODS:
-        waves = np.vstack(
-            [cyclic_shapes(turn.theta_deg, turn.one.raw.circle, axis, float(period_mm)) for turn in turns]
-        )
+
+    def trial(periods: float) -> _Trial:
+        period_mm = diameter_mm / periods
+        waves = np.vstack([cyclic_shapes(turn.theta_deg, turn.one.raw.circle, axis, period_mm) for turn in turns])
         beside = waves - fit.basis @ (fit.basis.T @ waves)
-        size = np.linalg.solve(beside.T @ beside, beside.T @ fit.left_um)
-        trials.append((float(fit.left_um @ beside @ size), float(period_mm), size, waves, beside))
-    gained, period_mm, size, waves, beside = max(trials, key=lambda trial: trial[0])
+        size = np.asarray(np.linalg.solve(beside.T @ beside, beside.T @ fit.left_um), dtype=np.float64)
+        return _Trial(float(fit.left_um @ beside @ size), period_mm, size, waves, beside)
+
+    coarse = max((trial(float(periods)) for periods in PERIODS), key=lambda one: one.gained)
+    near = diameter_mm / coarse.period_mm
+    step = float(PERIODS[1] - PERIODS[0])
+    fine = minimize_scalar(lambda periods: -trial(periods).gained, bounds=(near - step, near + step), method="bounded")
+    found = max(coarse, trial(float(fine.x)), key=lambda one: one.gained)
+    gained, size, waves, beside = found.gained, found.size, found.waves, found.beside
     sigma_um = _sigma_um(turns, replace(fit, left_um=fit.left_um - beside @ size))
     covariance = sigma_um**2 * np.linalg.inv(beside.T @ beside)
     amplitude = float(np.hypot(*size))
     along = size / max(amplitude, np.finfo(float).tiny)
+    across = np.array([-along[1], along[0]])
+    u = float(np.sqrt(along @ covariance @ along))
     # Half of the squares gained is exponentially distributed in each trial [two degrees of freedom].
     limit = 2.0 * float(np.log(2 * len(PERIODS) / CHANCE)) * sigma_um**2
-    symptom = Symptom(
-        Signature.CYCLIC,
-        axis,
-        amplitude,
-        float(np.sqrt(along @ covariance @ along)),
-        "µm",
-        seen=gained > limit,
-        text=f"every {period_mm:.1f} mm",
-    )
+    if gained <= limit:
+        # The strongest of so many waves is no estimate of one that nobody sees; it bounds what may be there.
+        below = amplitude + ONE_SIDED * u
+        symptom = Symptom(
+            Signature.CYCLIC, axis, None, None, "µm", seen=False, text=f"below {below:.2g} µm", below=below
+        )
+        return _Wave(symptom, waves, gained)
+    # Noise across a wave makes it longer by its variance over twice its size.
+    size_um = float(np.sqrt(max(amplitude**2 - across @ covariance @ across, 0.0)))
+    symptom = Symptom(Signature.CYCLIC, axis, size_um, u, "µm", seen=True, text=f"every {found.period_mm:.1f} mm")
     return _Wave(symptom, waves, gained)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A wave of one period: what it takes off the squares, its sine and cosine."""
+
+    gained: float
+    period_mm: float
+    size: NDArray[np.float64]
+    waves: NDArray[np.float64]
+    beside: NDArray[np.float64]
 
 
 def _rms(values: NDArray[np.float64]) -> float:

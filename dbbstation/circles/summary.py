@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dbbstation.circles.quantity import Quantity
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from dbbstation.circles.analysis import CircleAnalysis, Deviations, PairAnalysis
-    from dbbstation.circles.budget import Budget, Quantity
+    from dbbstation.circles.budget import Budget
     from dbbstation.circles.quick_look import QuickLook
     from dbbstation.circles.reversals import Step
 
@@ -27,9 +29,9 @@ def circle_summary(one: CircleAnalysis, budgets: Mapping[Quantity, Budget]) -> d
         "feed_mm_min": one.raw.circle.feed_mm_min,
         "samples": len(one.raw),
         "samples_lost": one.lost,
-        "g_um": one.g_um,
-        "g_least_squares_um": one.g_least_squares_um,
-        "f_um": _deviations(one.f_centred),
+        "g_um": budgets[Quantity.G].value_um,
+        "g_least_squares_um": budgets[Quantity.G_LS].value_um,
+        "f_um": {"max": budgets[Quantity.F_MAX].value_um, "min": budgets[Quantity.F_MIN].value_um},
         "f_about_commanded_centre_um": _deviations(one.f_commanded),
         "radius_error_um": one.radius_error_um,
         "mean_radial_error_um": one.mean_radial_error_um,
@@ -56,23 +58,25 @@ def circle_summary(one: CircleAnalysis, budgets: Mapping[Quantity, Budget]) -> d
 def pair_summary(pair: PairAnalysis, budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
     """Figures of both directions of a circle [µm]."""
     return {
-        "g_um": pair.g_um,
-        "g_least_squares_um": pair.g_least_squares_um,
+        "g_um": budgets[Quantity.G_BOTH].value_um,
+        "g_least_squares_um": budgets[Quantity.G_BOTH_LS].value_um,
         "d_um": pair.d_um,
-        "h_um": pair.h_um,
+        "h_um": budgets[Quantity.H].value_um,
         "h_deg": pair.h_deg,
         "uncertainty": budget_summary(budgets),
     }
 
 
 def budget_summary(budgets: Mapping[Quantity, Budget]) -> dict[str, Any]:
-    """Standard uncertainty u, its terms, and what is missing, by figure [µm]."""
+    """Standard uncertainty u, its terms, what is missing, and the figure with its noise, by figure [µm]; u is None where why_not says why."""
     return {
         str(quantity): {
             "u_um": budget.u_um,
             "terms_um": {str(cause): float(size) for cause, size in budget.terms_um.items()},
             "missing": list(budget.missing),
-            "noise_adds_up_to_um": budget.noise_adds_um,
+            "why_not": budget.why_not or None,
+            "value_um": budget.value_um,
+            "as_read_um": budget.as_read_um,
         }
         for quantity, budget in budgets.items()
     }
@@ -89,6 +93,7 @@ def quick_look_summary(found: QuickLook | None) -> dict[str, Any]:
                 "place": one.place or None,
                 "value": one.value,
                 "u": one.u,
+                "below": one.below,
                 "unit": one.unit,
                 "seen": one.seen,
                 "text": one.text or None,

@@ -105,7 +105,7 @@ def circles(
 
 
 def _print(summary: Mapping[str, Any], *, several: bool) -> None:
-    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
+    from dbbstation.cli.output import EXPANDED, print_table
 
     echo(f"figures of {summary['edition']}, filter: {summary['filter']}, lengths in µm, {EXPANDED}")
     head = ["session"] if several else []
@@ -118,9 +118,11 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
         "U",
         "G(LS)",
         "Fmax",
+        "U",
         "Fmin",
         "U",
         "X",
+        "U",
         "Y",
         "U",
         "step",
@@ -134,21 +136,17 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
         if run["problem"]:
             rows.append([*name, *["-"] * (len(head) + len(titles) - len(name))])
             continue
-        u = {figure: COVERAGE_FACTOR * budget["u_um"] for figure, budget in run["uncertainty"].items()}
         steps = [abs(step["height_um"]) for step in run["reversal_steps"]]
         drift = run["drift_um_per_turn"]
         rows.append(
             [
                 *name,
-                run["g_um"],
-                u["G"],
-                run["g_least_squares_um"],
-                run["f_um"]["max"],
-                run["f_um"]["min"],
-                u["F"],
-                run["centre_um"]["x"],
-                run["centre_um"]["y"],
-                u["X"],
+                *_figure(run, "G", run["g_um"]),
+                _figure(run, "G(LS)", run["g_least_squares_um"])[0],
+                *_figure(run, "Fmax", run["f_um"]["max"]),
+                *_figure(run, "Fmin", run["f_um"]["min"]),
+                *_figure(run, "X", run["centre_um"]["x"]),
+                *_figure(run, "Y", run["centre_um"]["y"]),
                 max(steps) if steps else "-",
                 "-" if run["closure"] is None else run["closure"]["height_um"],
                 "-" if drift is None else drift,
@@ -156,28 +154,46 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
             ]
         )
     print_table([*head, *titles], rows)
-    if not summary["pairs"]:
-        return
-    echo("\nboth directions")
-    rows = []
-    for pair in summary["pairs"]:
-        u = {figure: COVERAGE_FACTOR * budget["u_um"] for figure, budget in pair["uncertainty"].items()}
-        name = [pair["session"]] if several else []
-        rows.append(
-            [
-                *name,
-                pair["test"],
-                pair["repeat"],
-                pair["g_um"],
-                u["G(b)"],
-                pair["g_least_squares_um"],
-                pair["d_um"],
-                u["D"],
-                pair["h_um"],
-                pair["h_deg"],
-            ]
-        )
-    print_table([*head, "test", "n", "G(b)", "U", "G(b)(LS)", "D", "U", "H", "at [deg]"], rows)
+    if summary["pairs"]:
+        echo("\nboth directions")
+        rows = []
+        for pair in summary["pairs"]:
+            name = [pair["session"]] if several else []
+            rows.append(
+                [
+                    *name,
+                    pair["test"],
+                    pair["repeat"],
+                    *_figure(pair, "G(b)", pair["g_um"]),
+                    _figure(pair, "G(b)(LS)", pair["g_least_squares_um"])[0],
+                    *_figure(pair, "D", pair["d_um"]),
+                    *_figure(pair, "H", pair["h_um"]),
+                    pair["h_deg"],
+                ]
+            )
+        print_table([*head, *["test", "n", "G(b)", "U", "G(b)(LS)", "D", "U", "H", "U"], "at [deg]"], rows)
+    echo("\nWhat noise adds to G, F and H is taken off; --budget says how much that is.")
+    _print_why_not([*summary["runs"], *summary["pairs"]])
+
+
+def _figure(run: Mapping[str, Any], name: str, value: float) -> tuple[str, str]:
+    """Return a figure and its U as they are printed."""
+    from dbbstation.cli.output import COVERAGE_FACTOR
+    from dbbstation.digits import with_uncertainty
+
+    u = run["uncertainty"][name]["u_um"]
+    return with_uncertainty(value, None if u is None else COVERAGE_FACTOR * u)
+
+
+def _print_why_not(runs: Sequence[Mapping[str, Any]]) -> None:
+    """Say which figures have no U, and why."""
+    of: dict[str, dict[str, None]] = {}
+    for run in runs:
+        for figure, budget in run.get("uncertainty", {}).items():
+            if budget["why_not"]:
+                of.setdefault(budget["why_not"], {})[figure] = None
+    for why, figures in of.items():
+        echo(f"{', '.join(figures)}: {why}")
 
 
 def _noise(run: Mapping[str, Any]) -> object:
@@ -194,7 +210,11 @@ def _print_budgets(summary: Mapping[str, Any]) -> None:
         for figure, budget in run.get("uncertainty", {}).items():
             name = [run["test"], run.get("direction", "both"), run["repeat"], figure]
             rows += [[*name, cause, f"{size:.3f}"] for cause, size in budget["terms_um"].items()]
-            rows.append([*name, "u, all together", f"{budget['u_um']:.3f}"])
+            u = budget["u_um"]
+            rows.append([*name, "u, all together", "-" if u is None else f"{u:.3f}"])
+            if budget["as_read_um"] != budget["value_um"]:
+                taken = abs(budget["as_read_um"] - budget["value_um"])
+                rows.append([*name, "added by noise, taken off", f"{taken:.3f}"])
             missing |= dict.fromkeys(budget["missing"])
     echo("\nstandard uncertainties u [µm]")
     print_table(["test", "dir", "n", "figure", "term", "u"], rows)
@@ -232,6 +252,7 @@ def _print_findings(runs: Sequence[Mapping[str, Any]]) -> None:
 
 def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
+    from dbbstation.digits import with_uncertainty
 
     rows: list[list[object]] = []
     for look in looks:
@@ -245,8 +266,7 @@ def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
                     *name,
                     one["signature"],
                     one["place"] or "",
-                    _digits(one["value"]) if known else "-",
-                    _digits(COVERAGE_FACTOR * one["u"]) if known else "-",
+                    *(with_uncertainty(one["value"], COVERAGE_FACTOR * one["u"]) if known else ("-", "-")),
                     one["unit"],
                     ("yes" if one["seen"] else "no") if known else "-",
                     one["text"] or "",
@@ -255,10 +275,6 @@ def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
     echo(f"\nquick look at the signatures of serial axes, {EXPANDED}")
     echo("On a hexapod these are symptoms, no causes: it has no axes X and Y. Causes: `dbbstation diagnose`.")
     print_table(["test", "dir", "n", "signature", "at", "value", "U", "unit", "seen", ""], rows)
-
-
-def _digits(value: float) -> str:
-    return f"{value:.3g}" if abs(value) < 1.0 else f"{value:.1f}"
 
 
 def _flat(runs: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[object]]]:
@@ -287,7 +303,8 @@ def _flattened(run: Mapping[str, Any]) -> dict[str, object]:
     if run.get("noise_um"):
         found["noise_um"] = run["noise_um"]["of_a_reading"] or ""
     for figure, budget in run.get("uncertainty", {}).items():
-        found[f"u_{figure.lower()}_um"] = budget["u_um"]
+        plain = figure.lower().replace("(", "_").replace(")", "").replace(" ", "_")
+        found[f"u_{plain}_um"] = "" if budget["u_um"] is None else budget["u_um"]
     for finding in run.get("findings", ()):
         found[f"finding_{finding['name'].replace(' ', '_')}"] = finding["verdict"]
     return found

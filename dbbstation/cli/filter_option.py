@@ -1,4 +1,4 @@
-"""`--filter`: the Gaussian filter of G, F and H, alike in every command that works out circles."""
+"""`--filter`: the filter of G, F and H, alike in every command that works out circles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
-FILTERS = {"none": 0, "15": 15, "50": 50, "150": 150}
+FILTERS = {"none": 0, "15": 15, "30": 30, "50": 50, "150": 150}
 
 
 def filter_option(function: _Function) -> _Function:
@@ -24,7 +24,7 @@ def filter_option(function: _Function) -> _Function:
         type=click.Choice(list(FILTERS)),
         default="none",
         show_default=True,
-        help="Gaussian filter of G, F and H: its cut-off in undulations per revolution.",
+        help="Filter of G, F and H: its cut-off in undulations per revolution. Gaussian; 30 is cut off sharply, as for tolerances.",
     )(function)
 
 

@@ -157,7 +157,8 @@ def _read(
     mapping, inline, nominal = chosen(), read_inline_plan(plan), read_machine(machine)
     planned = inline.to_domain()
     told = _told(files, named, planned)
-    reader = Reader(mapping, planned)
+    reader = _with_span(asker, Reader(mapping, planned), list(tables.values()))
+    mapping = reader.mapping
     runs: list[ImportedRun] = []
     for path, table in tables.items():
         runs += reader.read(table, told.get(path) or _asked_run(asker, reader, table, planned))
@@ -260,6 +261,26 @@ def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) ->
         if found is not None:
             return found
         echo(f"the plan's tests: {', '.join(plan.tests)}; directions: ccw, cw", err=True)
+
+
+def _with_span(asker: Asker, reader: Reader, tables: Sequence[ForeignTable]) -> Reader:
+    """Have a span of angles confirmed that no circle of the plan has; in a pipe `--angle-span-deg` says it."""
+    from dataclasses import replace
+
+    angle = reader.mapping.angle
+    if angle is None or angle.span_deg is not None or not asker.terminal:
+        return reader
+    spans = {path.table.file: span for path in tables if (span := reader.asked_span_deg(path)) is not None}
+    if not spans:
+        return reader
+    file, span = next(iter(spans.items()))
+    question = (
+        f"the angles of {Path(file).name} span {span:.0f} degrees, those of no circle of the plan do: is that right"
+    )
+    if not click.confirm(f"{question} (one turn counts)", err=True):
+        raise click.UsageError("check plan and files: a run has a turn, or a turn with the plan's overshoot")
+    stated = angle.model_copy(update={"span_deg": round(span, 1)})
+    return replace(reader, mapping=reader.mapping.model_copy(update={"angle": stated}))
 
 
 def _statements(mapping: MappingFile, runs: Sequence[ImportedRun], unknown: Sequence[str]) -> list[str]:

@@ -47,6 +47,11 @@ _OPTIONS = (
         help="Sense in which the files' angles grow, seen from +Z.",
     ),
     click.option(
+        "--angle-span-deg",
+        type=Finite(300, 3600),
+        help="What the angles of a run span, where that is neither a turn nor the plan's path; one turn of it counts.",
+    ),
+    click.option(
         "--trace",
         type=click.Choice(["whole", "turn"]),
         help="Files without angles: the whole run with feed-in and feed-out, or the full turn alone.",
@@ -71,6 +76,7 @@ MAPPING_OPTIONS = (
     "columns",
     "angle_zero_deg",
     "angle_grows",
+    "angle_span_deg",
     "trace",
     "zero_mm",
     "file_name",
@@ -168,6 +174,7 @@ def chosen_mapping(
     data: dict[str, Any] = {"columns": columns, "trace": options["trace"], "file_name": options["file_name"]}
     if ANGLE in means:
         data["angle"] = {"zero_deg": 0.0, "grows": "ccw"} if own else _angle(options, asker)
+        data["angle"] |= {"span_deg": options["angle_span_deg"]}
     elif not own and options["trace"] is None:
         question = "the files have no angles: are they the whole run with feed-in and feed-out, or the turn alone"
         data["trace"] = asker.text(question, "--trace", ["whole", "turn"])

@@ -63,7 +63,6 @@ def report(
       dbbstation report verified --before measured --model joint.yaml --out report.html
       dbbstation report session --job "spindle exchanged" --out report.html --pdf report.pdf
     """
-    from dbbstation.circles.path import Filter
     from dbbstation.cli.output import COVERAGE_FACTOR, print_json, say
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.shop import shop_settings
@@ -73,13 +72,14 @@ def report(
     from dbbstation.report.content import Reported, content_of, numbers_of
     from dbbstation.report.html import report_html
     from dbbstation.report.pdf import chromium, printed
+    from dbbstation.tolerated import TOLERATED
 
     refuse_outputs([out, pdf], force=force)
     browser = None if pdf is None else chromium()
     settings = shop_settings()
     identified = None if model is None else read_model(model, every_source(source_files))
     found, former, modelled = _read(sessions, before, identified, tests, exclude)
-    reported = Reported(found, Filter.NONE, settings, COVERAGE_FACTOR, former, modelled, job)
+    reported = Reported(found, TOLERATED, settings, COVERAGE_FACTOR, former, modelled, job)
     numbers = numbers_of(reported)
     html = report_html(content_of(reported, numbers, provenance()))
     write_bytes(out, html, force=force)
@@ -102,16 +102,16 @@ def _read(
 ) -> tuple[Circled, Circled | None, Modelled | None]:
     """Read what a report needs: circles, circles before, and what the model leaves."""
     from dbbstation.circled import load_circles
-    from dbbstation.circles.path import Filter
     from dbbstation.cli.progress import count_bar
     from dbbstation.machine.difference import check_model_is_of
+    from dbbstation.tolerated import TOLERATED
 
     with count_bar("circles") as progress:
-        found = load_circles(sessions, Filter.NONE, tests, exclude, findings=True, model=identified, progress=progress)
+        found = load_circles(sessions, TOLERATED, tests, exclude, findings=True, model=identified, progress=progress)
     former = None
     if before is not None:
         with count_bar("circles before") as progress:
-            former = load_circles([before], Filter.NONE, progress=progress)
+            former = load_circles([before], TOLERATED, progress=progress)
     if identified is None:
         return found, former, None
     for session in found.sessions:

@@ -29,7 +29,14 @@ from dbbstation.files.formats.mapping import (
 from dbbstation.files.recordings.entries import RunState, count_in
 from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.table_csv import MOST_FAULTS
-from dbbstation.imported.travel import UnusableTravelError, machine_angles, rises, travel
+from dbbstation.imported.travel import (
+    UnusableTravelError,
+    check_span,
+    machine_angles,
+    rises,
+    travel,
+    unplanned_span_deg,
+)
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace import columns
 
@@ -185,6 +192,8 @@ class Reader:
         try:
             said_angle = self.mapping.angle
             theta = None if angle is None or said_angle is None else machine_angles(angle, said_angle, circle)
+            if theta is not None and said_angle is not None:
+                computed += check_span(theta, said_angle.span_deg, circle)
             travelled = travel(values.pop(TIME, None), theta, circle, self.mapping.trace)
         except UnusableTravelError as error:
             self._fault(file, line, error.what, error.remedy)
@@ -251,6 +260,29 @@ class Reader:
             what = f"`{word}` is no direction that is known"
             self._fault(table.table.file, line, what, "say in the mapping: `words: {" + word + ": ccw}`, or cw")
         return RunName(told.test or first(TEST), direction, told.repeat or count_in(first(REPEAT)))
+
+    def asked_span_deg(self, table: ForeignTable) -> float | None:
+        """Return the span of a file's angles that is surely not the plan's: that of none of its circles; None where it may be [deg].
+
+        A table with columns that tell its runs apart has several, which are looked at when they are read.
+        """
+        name = self.mapping.column(ANGLE)
+        if (
+            name is None
+            or any(self.mapping.column(one) is not None for one in OF_RUNS)
+            or name not in table.table.values
+        ):
+            return None
+        factor, offset = in_run_units(ANGLE, self.mapping.columns[name].unit or "deg")
+        angle = table.table.values[name] * factor + offset
+        if not np.all(np.isfinite(angle)):
+            return None
+        spans = [
+            unplanned_span_deg(angle, test.run(direction))
+            for test in self.plan.tests.values()
+            for direction in test.directions
+        ]
+        return next(iter(spans), None) if all(span is not None for span in spans) else None
 
     def says_test(self, table: ForeignTable) -> bool:
         """Whether a file says itself which test and direction it is."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.plan.circle import FULL_TURN_DEG, Circle, Direction
+from dbbstation.trace.cut import LARGEST_GAP_DEG
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,6 +24,10 @@ hundredth of a turn's time on the recordings at hand."""
 
 LEAST_TURN = 0.99
 """Share of a turn that times must cover at the plan's feed; less says that the feed is another one."""
+
+
+UNLIKE_SPAN_DEG = 2.0
+"""How far a span may be off: controls cut a degree of the first or last move [deg]."""
 
 
 class UnusableTravelError(Exception):
@@ -80,6 +85,47 @@ def machine_angles(angle_deg: NDArray[np.float64], said: AngleSchema, circle: Ci
             "check the direction of the run, and `angle: grows` of the mapping",
         )
     return theta
+
+
+def unplanned_span_deg(theta_deg: NDArray[np.float64], circle: Circle) -> float | None:
+    """Return what angles span, where that is neither a turn nor the plan's path with its overshoot; None where it is one of them [deg].
+
+    Args:
+        theta_deg: angles in the machine, in order of time, shape (n,) [deg].
+        circle: of the run.
+    """
+    travelled = _unwrapped(theta_deg)
+    spacing = float(np.median(np.abs(np.diff(travelled)))) if len(travelled) > 1 else 0.0
+    span = float(np.ptp(travelled))
+    if span + spacing < FULL_TURN_DEG - LARGEST_GAP_DEG:
+        return None  # no turn at all: cutting refuses it, and has more to say
+    near = max(UNLIKE_SPAN_DEG, 2.0 * spacing)
+    # A turn has its last sample at its end, or one spacing before it.
+    planned = (FULL_TURN_DEG, FULL_TURN_DEG - spacing, circle.swept_deg)
+    return None if any(abs(span - one) <= near for one in planned) else span + spacing
+
+
+def check_span(theta_deg: NDArray[np.float64], stated_deg: float | None, circle: Circle) -> tuple[str, ...]:
+    """Return what is to be said of a span that somebody confirmed; nothing of the plan's own.
+
+    Args:
+        theta_deg: angles in the machine, in order of time, shape (n,) [deg].
+        stated_deg: span that somebody confirmed [deg]; None where nobody did.
+        circle: of the run.
+
+    Raises:
+        UnusableTravelError: a span that is not the plan's and that nobody confirmed.
+    """
+    span = unplanned_span_deg(theta_deg, circle)
+    if span is None:
+        return ()
+    if stated_deg is None or abs(span - stated_deg) > UNLIKE_SPAN_DEG:
+        path = "" if circle.overshoot_deg == 0.0 else f", with its overshoot {circle.swept_deg:g}"
+        raise UnusableTravelError(
+            f"the angles span {span:.0f} degrees, a turn of the plan has {FULL_TURN_DEG:g}{path}",
+            f"where that is right, say so: --angle-span-deg {span:.0f}; one turn of it counts. Else check plan and file",
+        )
+    return (f"its angles span {span:.0f} degrees, as was confirmed: one turn of them counts",)
 
 
 def travel(

@@ -16,13 +16,17 @@ not quite as warm as it [K]."""
 STEEL_BAR_UM_M_K = 11.5
 """Thermal expansion of unalloyed steel [µm/(m K)]."""
 
+EXPANSION_UNCERTAINTY = 0.05
+"""Standard uncertainty of a stated coefficient of expansion, as its share: of steel, from 11.5 µm/(m K), catalogues differ by 1 either
+way, which is 0.58 as a rectangular distribution."""
+
 USUAL_READINGS = 200
 """Readings on the calibrator that are averaged: of a display twenty seconds."""
 
 
 @dataclass(frozen=True)
 class Bar:
-    """The bar: nothing of it is added to readings; its length is held against the plan's radii.
+    """The bar: recorded readings stay as they are; what is made of them is corrected by what it reads too long.
 
     Attributes:
         serial_number: of the bar.
@@ -52,16 +56,45 @@ class Bar:
         """Return what the bar is expected to read less the true distance, and the standard uncertainty of that [mm].
 
         On its calibrator it read so much more than the calibrator's length. A bar that has grown since reads so much less, as
-        its gauge has to travel less: - a L (T - T_calibration). The temperature counts where its uncertainty is stated; that
-        of a difference is sqrt(2) times that of each.
+        its gauge has to travel less: - a L (T - T_calibration). A known systematic effect is corrected, whatever its
+        uncertainty [GUM 3.2.4]: where nobody stated that of the temperatures it is the usual one. That of a difference is
+        sqrt(2) times that of each.
 
         Args:
             temp_c: of the bar while it measures [degC]; None where not known.
         """
         long_mm = 0.0 if self.reading_mm is None else self.reading_mm - self.calibrated_length_mm
-        if temp_c is None or self.temp_c is None or self.expansion_um_m_k is None or self.temp_uncertainty_k is None:
+        if temp_c is None or self.temp_c is None or self.expansion_um_m_k is None:
             return long_mm, self.calibrator_uncertainty_mm
+        grown_mm = 1e-6 * self.expansion_um_m_k * self.calibrated_length_mm * (temp_c - self.temp_c)
+        return long_mm - grown_mm, math.hypot(self.calibrator_uncertainty_mm, self.grown_uncertainty_mm(temp_c) or 0.0)
+
+    def grown_uncertainty_mm(self, temp_c: float | None) -> float | None:
+        """Return the standard uncertainty of what the bar has grown by since its calibration; None where not known [mm].
+
+        Args:
+            temp_c: of the bar while it measures [degC]; None where not known.
+        """
+        if self.expansion_um_m_k == 0.0:
+            return 0.0
+        if temp_c is None or self.temp_c is None or self.expansion_um_m_k is None:
+            return None
+        usual = USUAL_TEMP_UNCERTAINTY_K if self.temp_uncertainty_k is None else self.temp_uncertainty_k
         mm_per_k = 1e-6 * self.expansion_um_m_k * self.calibrated_length_mm
-        of_temperature = mm_per_k * math.sqrt(2.0) * self.temp_uncertainty_k
-        uncertainty_mm = math.hypot(self.calibrator_uncertainty_mm, of_temperature)
-        return long_mm - mm_per_k * (temp_c - self.temp_c), uncertainty_mm
+        of_coefficient = EXPANSION_UNCERTAINTY * (temp_c - self.temp_c)
+        return mm_per_k * math.hypot(math.sqrt(2.0) * usual, of_coefficient)
+
+    def lacks(self, temp_c: float | None) -> tuple[str, ...]:
+        """Return what has to be known, and is not, before a length that it measured is absolute.
+
+        Args:
+            temp_c: of the bar while it measures [degC]; None where not known.
+        """
+        if self.expansion_um_m_k == 0.0:
+            return ()
+        stated = (
+            (self.expansion_um_m_k, "thermal expansion of the bar"),
+            (self.temp_c, "temperature of the bar at its calibration"),
+            (temp_c, "temperature of bar or shop at the measurement"),
+        )
+        return tuple(name for value, name in stated if value is None)

@@ -14,7 +14,7 @@ class Conformity(StrEnum):
     EXCEEDED = "exceeded"
     """The limit is passed, whatever the figure is within U."""
     UNDECIDED = "cannot tell"
-    """The limit lies within U of the figure."""
+    """The limit lies within U of the figure, or nobody knows U."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,15 @@ class Size:
 
     Attributes:
         um: its size [µm].
-        u_um: its standard uncertainty [µm].
+        u_um: its standard uncertainty [µm]; None where a cause of unknown size counts.
+        why_not: why it has none; empty where it has one.
+        known_um: the part of its standard uncertainty that is known [µm].
     """
 
     um: float
-    u_um: float
+    u_um: float | None
+    why_not: str = ""
+    known_um: float = 0.0
 
 
 def conformity(size: Size, largest_um: float, coverage_factor: float) -> Conformity:
@@ -38,6 +42,8 @@ def conformity(size: Size, largest_um: float, coverage_factor: float) -> Conform
         largest_um: the limit [µm].
         coverage_factor: k of U = k u.
     """
+    if size.u_um is None:
+        return Conformity.UNDECIDED
     expanded = coverage_factor * size.u_um
     if size.um + expanded <= largest_um:
         return Conformity.WITHIN

@@ -45,7 +45,11 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
     own = 1.0 / float(np.sqrt(2.0 * one.noise.reading_freedom))
     # The median of n values is off by sqrt(pi / 2n) of their scatter.
     u = own * float(np.sqrt(1.0 + 0.5 * np.pi / len(known)))
-    limit = float(np.exp(middle + _beyond(u, np.inf, [(float(log - middle), own) for log in logs])))
+    log_limit = middle + _beyond(u, np.inf, [(float(log - middle), own) for log in logs])
+    if log_limit > LARGEST_LOG:
+        why = f"{value:.2f} µm; the noise of the other runs differs too much to hold it against"
+        return undecided(Name.NOISE, why, "µm", value)
+    limit = float(np.exp(log_limit))
     return found(
         Name.NOISE,
         value,
@@ -55,6 +59,10 @@ def noise(one: CircleAnalysis, others: Others) -> Finding:
         f"{value:.2f} µm per reading, {np.exp(middle):.2f} µm in the other runs: look after balls, cable and what shakes the "
         "machine, and repeat the run",
     )
+
+
+LARGEST_LOG = float(np.log(1e4))
+"""Logarithm of a limit in micrometres that no bar's noise would pass: the travel of its gauge."""
 
 
 def closure(one: CircleAnalysis, others: Others) -> Finding:

@@ -133,6 +133,7 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
         "several": len(found.sessions) > 1,
         "findings": _findings(found),
         "not_stated": _not_stated(numbers["circles"]),
+        "why_not": _why_not(numbers["circles"]),
         "tolerances_from": reported.settings.tolerances_from,
         "modelled": None
         if modelled is None
@@ -195,7 +196,8 @@ def _held_data(held: Held, coverage_factor: float) -> dict[str, Any]:
             "direction": worst.direction,
             "repeat": worst.repeat,
             "um": size.um,
-            "expanded_um": coverage_factor * size.u_um,
+            "expanded_um": None if size.u_um is None else coverage_factor * size.u_um,
+            "why_not": size.why_not or None,
         },
     }
 
@@ -215,7 +217,7 @@ def _side_by_side(now: Sequence[ToleratedCircle], before: Sequence[ToleratedCirc
         }
 
 
-def _sizes(one: ToleratedCircle) -> dict[str, dict[str, float]]:
+def _sizes(one: ToleratedCircle) -> dict[str, dict[str, float | None]]:
     return {str(figure): {"um": size.um, "u_um": size.u_um} for figure, size in one.sizes.items()}
 
 
@@ -282,6 +284,16 @@ def _not_stated(circles: Mapping[str, Any]) -> list[str]:
         budget for run in [*circles["runs"], *circles["pairs"]] for budget in run.get("uncertainty", {}).values()
     ]
     return list(dict.fromkeys(cause for budget in budgets for cause in budget["missing"]))
+
+
+def _why_not(circles: Mapping[str, Any]) -> list[str]:
+    """Return why figures have no uncertainty, with their names."""
+    of: dict[str, dict[str, None]] = {}
+    for run in [*circles["runs"], *circles["pairs"]]:
+        for figure, budget in run.get("uncertainty", {}).items():
+            if budget["why_not"]:
+                of.setdefault(budget["why_not"], {})[figure] = None
+    return [f"{', '.join(figures)}: {why}" for why, figures in of.items()]
 
 
 def _files(reported: Reported, provenance: Provenance) -> Iterable[tuple[str, str]]:

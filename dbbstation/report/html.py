@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import jinja2
 
+from dbbstation.digits import with_uncertainty
 from dbbstation.history.words import DASH, rounded
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def environment() -> jinja2.Environment:
         keep_trailing_newline=True,
     )
     made.filters["um"] = _um
+    made.filters["with_u"] = with_uncertainty
     made.filters["figure"] = rounded
     return made
 

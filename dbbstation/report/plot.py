@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.circles.budget import Quantity, budgets
+from dbbstation.circles.budget import budget_of
+from dbbstation.circles.quantity import Quantity
 from dbbstation.errors import StationError
 from dbbstation.report.conditions import conditions
 from dbbstation.report.drawing import AFTER, BEFORE, in_style
@@ -309,12 +310,13 @@ def _numbers_of(one: MeasuredCircle) -> dict[str, Any]:
     if one.analysis is None:
         return {}
     x, y = one.analysis.centre_mm
+    g = budget_of(one.analysis, Quantity.G, one.known)
     return {
         "session": one.session,
         "test": one.entry.test,
         "direction": str(one.entry.direction),
         "repeat": one.entry.repeat,
-        "g_um": one.analysis.g_um,
-        "u_g_um": budgets(one.analysis, one.known)[Quantity.G].u_um,
+        "g_um": g.value_um,
+        "u_g_um": g.u_um,
         "centre_um": {"x": 1e3 * x, "y": 1e3 * y},
     }

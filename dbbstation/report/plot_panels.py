@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from matplotlib.patches import Circle as Ring
 
+from dbbstation.circles.budget import budget_of
+from dbbstation.circles.quantity import Quantity
 from dbbstation.circles.spectrum import FIRST, spectrum_of
 from dbbstation.plan.circle import FULL_TURN_DEG, Direction
 from dbbstation.report.drawing import AFTER, BEFORE, QUARTERS, SET
@@ -173,7 +175,11 @@ def _caption(sheet: Sheet, box: Box, lines: Sequence[str]) -> float:
 def _figures(drawn: Sequence[Drawn]) -> str:
     """G of the last run of each direction, in words."""
     last = [one for one, thin in drawn if not thin and one.analysis is not None]
-    return ", ".join(f"{one.analysis.g_um:.1f} {str(one.entry.direction).upper()}" for one in last if one.analysis)
+    return ", ".join(
+        f"{budget_of(one.analysis, Quantity.G, one.known).value_um:.1f} {str(one.entry.direction).upper()}"
+        for one in last
+        if one.analysis
+    )
 
 
 def _style(analysis: CircleAnalysis, *, thin: bool) -> dict[str, Any]:

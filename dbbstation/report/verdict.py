@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.digits import with_uncertainty
 from dbbstation.quality.conformity import Conformity
 
 if TYPE_CHECKING:
@@ -56,8 +57,8 @@ def verdict_of(held: Sequence[Held], found: Circled, coverage_factor: float) -> 
     if Conformity.UNDECIDED in said:
         headline = "It cannot be told whether the machine is within the shop's tolerances."
         narrow = (
-            "A limit lies within the uncertainty U of a figure. The budget of the figure says what U comes from "
-            "(`dbbstation circles --budget`): lessen its largest term, or agree on another limit."
+            "A limit lies within the uncertainty U of a figure, or the figure has none. The budget of the figure says what U comes from "
+            "(`dbbstation circles --budget`): lessen its largest term, state what the session lacks, or agree on another limit."
         )
         return Verdict(Conformity.UNDECIDED, headline, reasons, (*repeat, narrow))
     keep = (
@@ -77,7 +78,13 @@ def _reason(held: Held, coverage_factor: float) -> str:
     exceeded = f"{held.exceeded} of {held.circles} circles exceed it"
     undecided = f"of {held.undecided} it cannot be told" if held.undecided else ""
     counts = ", ".join(part for part in (exceeded, undecided) if part)
-    measured = f"{size.um:.1f} µm, U {coverage_factor * size.u_um:.1f} µm"
+    if size.u_um is None:
+        return (
+            f"{name}: run {run} has {size.um:.1f} µm, {size.why_not}. At most {held.tolerance.largest_um:g} µm is allowed. "
+            f"{counts}."
+        )
+    shown, expanded = with_uncertainty(size.um, coverage_factor * size.u_um)
+    measured = f"{shown} µm, U {expanded} µm"
     return f"{name}: run {run} has {measured}; at most {held.tolerance.largest_um:g} µm. {counts}."
 
 

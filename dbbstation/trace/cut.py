@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 LARGEST_GAP_DEG = 10.0
 """A wider stretch without a sample is not a full circle any more."""
 
+WRITTEN_DEG = 1e-5
+"""Angles that differ by less are the same: run files have six decimals [deg]."""
+
 SHORTEST_TURN = 0.3
 """A trace that is shorter than a turn by more than this share holds no turn at any feed that was meant."""
 
@@ -141,8 +144,8 @@ _TURNS: WeakKeyDictionary[Recording, dict[Circle, RawCircle]] = WeakKeyDictionar
 
 def _turn(recording: Recording, circle: Circle) -> RawCircle:
     if recording.theta_deg is not None:
-        phi = _along(circle.phi_deg(recording.theta_deg))
-        return _selected(recording, circle, phi, np.ones(len(recording), dtype=bool))
+        phi = one_turn_deg(recording.theta_deg, circle)
+        return _selected(recording, circle, phi, np.isfinite(phi))
     edges = edges_of(recording, circle)
     phi = progress_deg(recording, circle, edges)
     _check_feed(recording, circle, edges)
@@ -348,15 +351,29 @@ def _slopes(t_s: NDArray[np.float64], piece: NDArray[np.int64]) -> Callable[[NDA
     return lambda values: np.asarray(of_rest @ (orthogonal.T @ values))
 
 
-def _along(phi_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Progress in order of time: what ends a turn at its full 360 degrees does not stand at its beginning."""
-    start = phi_deg[:1]
-    if np.any(np.minimum(start, FULL_TURN_DEG - start) > LARGEST_GAP_DEG):
-        return phi_deg
-    early = np.arange(len(phi_deg)) < len(phi_deg) // 2
-    before = early & (phi_deg > FULL_TURN_DEG - LARGEST_GAP_DEG)
-    after = ~early & (phi_deg < LARGEST_GAP_DEG)
-    return phi_deg - FULL_TURN_DEG * before + FULL_TURN_DEG * after
+def one_turn_deg(theta_deg: NDArray[np.float64], circle: Circle) -> NDArray[np.float64]:
+    """Progress along one turn at recorded angles, NaN where a sample lies outside of it, shape (n,) [deg].
+
+    A run that passes places twice must not count them twice. Of more than a turn the first one counts that begins at the plan's
+    start; where none does that is whole, the one in the middle of the run. What begins a turn a little early, or ends it at its
+    full 360 degrees, does not stand at the turn's other end.
+
+    Args:
+        theta_deg: from +X towards +Y, in order of time, with or without steps of a turn, shape (n,) [deg].
+        circle: as commanded.
+    """
+    travelled = circle.direction.sign * (np.unwrap(theta_deg, period=FULL_TURN_DEG) - circle.start_deg)
+    first, last = float(travelled.min()), float(travelled.max())
+    spacing = float(np.median(np.abs(np.diff(travelled)))) if len(travelled) > 1 else 0.0
+    if last - first < FULL_TURN_DEG - WRITTEN_DEG:
+        turn = FULL_TURN_DEG * round(first / FULL_TURN_DEG)
+        return travelled - turn if abs(first - turn) <= LARGEST_GAP_DEG else np.mod(travelled, FULL_TURN_DEG)
+    turn = FULL_TURN_DEG * float(np.ceil((first - spacing) / FULL_TURN_DEG))
+    begins_there = turn + FULL_TURN_DEG <= last + spacing
+    begin = turn if begins_there else 0.5 * (first + last - FULL_TURN_DEG)
+    inside = (travelled >= begin - WRITTEN_DEG) & (travelled < begin + FULL_TURN_DEG - WRITTEN_DEG)
+    phi = travelled - turn if begins_there else np.mod(travelled, FULL_TURN_DEG)
+    return np.where(inside, phi, np.nan)
 
 
 def _selected(recording: Recording, circle: Circle, phi_deg: NDArray[np.float64], rows: NDArray[np.bool_]) -> RawCircle:

@@ -34,7 +34,7 @@ def test_line(one: Mapping[str, Any]) -> Content:
         before=_um(one["before"]),
         now=_um(one),
         limit=f"{one['largest_um']:g}",
-        expanded=f"{one['worst']['expanded_um']:.1f}",
+        expanded=_expanded(one["worst"]),
     )
     word = texts.CONFORMITY_WORDS[one["conformity"]]
     return Content.assemble(row, (word, f"bold {_STYLES[one['conformity']]}"))
@@ -79,7 +79,13 @@ def way_back_lines(former: Former, kept: tuple[Path, ...]) -> Iterator[str]:
 
 
 def _circle(worst: Mapping[str, Any]) -> str:
-    return texts.WORST_CIRCLE.format(**worst)
+    return texts.WORST_CIRCLE.format(**{**worst, "expanded": _expanded(worst)})
+
+
+def _expanded(worst: Mapping[str, Any]) -> str:
+    """Return U of a circle; what stands for none where nobody knows it."""
+    u_um = worst["expanded_um"]
+    return texts.NOT_BEFORE if u_um is None else f"{u_um:.1f}"
 
 
 def _um(held: Mapping[str, Any] | None) -> str:

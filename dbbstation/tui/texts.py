@@ -292,7 +292,7 @@ FORMER_NONE = (
 )
 NOT_BEFORE = "-"
 WORST = "{figure}: before {before}; now {now}; at most {limit:g} µm: {word}."
-WORST_CIRCLE = "{um:.1f} µm, U {expanded_um:.1f} µm ({test} {direction} {repeat})"
+WORST_CIRCLE = "{um:.1f} µm, U {expanded} µm ({test} {direction} {repeat})"
 RUN_BY_NOW = "The circles of this session ran by {by}."
 RUN_BY_PLAIN = "the control's own circles"
 RUN_BY_NOMINAL = "nominal programs"

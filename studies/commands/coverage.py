@@ -9,6 +9,9 @@ import click
 if TYPE_CHECKING:
     from studies.coverage_rows import Row
 
+SESSIONS, CIRCLES = 250, 1000
+"""Draws for each row, where they are not given."""
+
 PLANS = {"elevated": "table2-elevated", "level": "table2"}
 
 
@@ -17,15 +20,19 @@ PLANS = {"elevated": "table2-elevated", "level": "table2"}
     "--machines", default=500, show_default=True, type=click.IntRange(min=10), help="Random machines per plan."
 )
 @click.option("--plan", type=click.Choice(sorted(PLANS)), help="One of the two plans only.")
-@click.option(
-    "--draws", default=250, show_default=True, type=click.IntRange(min=2), help="Sessions for each row of the table."
-)
-@click.option(
-    "--only", type=click.Choice(["machines", "calibration"]), help="Only the machines per plan, or only the table."
-)
 @click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0), help="Seed of the first machine.")
+@click.option(
+    "--part",
+    type=click.Choice(["machines", "calibration", "circles"]),
+    help="Random machines per plan, rows of calibration and prediction, or rows of circles, only.",
+)
+@click.option(
+    "--draws",
+    type=click.IntRange(min=3),
+    help=f"Draws for each row of a table; {SESSIONS} sessions of calibration, {CIRCLES} circles of each of six noises if not given.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
-def coverage(*, machines: int, plan: str | None, draws: int, only: str | None, seed: int, as_json: bool) -> None:
+def coverage(*, machines: int, plan: str | None, seed: int, part: str | None, draws: int | None, as_json: bool) -> None:
     r"""Calibrate many random machines and count how often the 95 % intervals contain the truth.
 
     On the plan with five raised bars all 24 parameters; on the level plan those combinations that level bars see, on
@@ -35,11 +42,15 @@ def coverage(*, machines: int, plan: str | None, draws: int, only: str | None, s
     The table has a row for each figure of calibration and prediction, with and without a stated tolerance of joints, from sessions of
     the independent virtual machine in tests/plant.
 
+    Figures of circles: of machines with serial axes that tests/plant makes, perfect, as good as the noise and worn, with three
+    sizes of white and of correlated noise, with errors of bar, temperatures and ball drawn as they are stated.
+
     \b
     Examples:
       dbbstation study coverage
-      dbbstation study coverage --only calibration --draws 20
+      dbbstation study coverage --part calibration --draws 20
       dbbstation study coverage --machines 100 --plan elevated --json
+      dbbstation study coverage --part circles --draws 300
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import progress_bar
@@ -50,25 +61,27 @@ def coverage(*, machines: int, plan: str | None, draws: int, only: str | None, s
 
     machine = read_machine(shipped_folder("fixtures") / "machines" / "reference.yaml")
     found: dict[str, Any] = {"seed": seed}
-    for name in _plans(plan, only):
+    for name in _plans(plan, part):
         what = read_plan(shipped_folder("protocols") / "plans" / f"{PLANS[name]}.yaml")
         with progress_bar(f"{name} plan", machines) as advance:
             covered = experiment(machine, what, range(seed, seed + machines), advance, level=name == "level")
         found[name] = covered.numbers()
         if not as_json:
             _print(name, found[name])
-    if only != "machines":
-        rows = _calibration(draws, seed)
+    if plan is None and part in {None, "calibration"}:
+        rows = _calibration(draws or SESSIONS, seed)
         found["calibration"] = [row.plain() for row in rows]
         found["faults"] = [row.fault for row in rows if row.fault]
         if not as_json:
             _print_rows(rows)
+    if plan is None and part in {None, "circles"}:
+        found["circles"] = _circles(draws or CIRCLES, seed, as_json=as_json)
     if as_json:
         print_json(found)
 
 
-def _plans(plan: str | None, only: str | None) -> list[str]:
-    if only == "calibration":
+def _plans(plan: str | None, part: str | None) -> list[str]:
+    if part not in {None, "machines"}:
         return []
     return sorted(PLANS) if plan is None else [plan]
 
@@ -95,6 +108,34 @@ def _print_rows(rows: list[Row]) -> None:
     for row in rows:
         if row.fault:
             click.echo(f"NOT as promised: {row.fault}")
+
+
+def _circles(draws: int, seed: int, *, as_json: bool) -> dict[str, Any]:
+    """Draw circles, and print how often U about each figure contains the truth."""
+    from dbbstation.cli.output import print_table
+    from dbbstation.cli.progress import progress_bar
+    from studies.coverage_circles import CELLS, KINDS, coverage_of_circles, pooled
+
+    with progress_bar("circles", draws * len(CELLS)) as advance:
+        found = coverage_of_circles(draws, seed, advance)
+    if as_json:
+        return found
+    noises = [f"{cell.colour} {cell.level_um:g} µm" for cell in CELLS]
+
+    def percent(counts: tuple[int, int]) -> str:
+        return "-" if not counts[1] else f"{100 * counts[0] / counts[1]:.1f}"
+
+    click.echo(f"figures of circles, {draws} draws for each noise from seed {seed}: truth within U = 2 u, in percent")
+    rows = [
+        [
+            name,
+            *(percent(pooled(row, noise=noise)) for noise in noises),
+            *(percent(pooled(row, kind=kind)) for kind in KINDS),
+        ]
+        for name, row in found["rows"].items()
+    ]
+    print_table(["figure", *noises, *KINDS], rows)
+    return found
 
 
 def _print(name: str, numbers: dict[str, Any]) -> None:

@@ -34,9 +34,11 @@ def test_figures_agree_with_evaluate():
     assert len(circles) == len(evaluated)
     for one, other in zip(circles, evaluated, strict=True):
         assert (one["test"], one["direction"], one["repeat"]) == (other["test"], other["direction"], other["repeat"])
-        assert one["g_least_squares_um"] == pytest.approx(other["before"]["circularity_um"], abs=1e-6)
+        read = {figure: budget["as_read_um"] for figure, budget in one["uncertainty"].items()}
+        assert read["G(LS)"] == pytest.approx(other["before"]["circularity_um"], abs=1e-6)
         assert one["mean_radial_error_um"] == pytest.approx(other["before"]["mean_radial_error_um"], abs=1e-6)
-        assert one["g_um"] <= one["g_least_squares_um"]
+        assert read["G"] <= read["G(LS)"]
+        assert one["g_um"] < read["G"]
 
 
 def test_json_has_every_figure_with_its_budget(session):
@@ -46,16 +48,72 @@ def test_json_has_every_figure_with_its_budget(session):
     assert len(data["runs"]) == 4
     assert len(data["pairs"]) == 2
     for run in data["runs"]:
-        assert set(run["uncertainty"]) == {"G", "F", "radius", "X", "Y"}
-        for budget in run["uncertainty"].values():
-            assert budget["u_um"] == pytest.approx(np.sqrt(sum(u**2 for u in budget["terms_um"].values())))
+        assert set(run["uncertainty"]) == {
+            "G", "G(LS)", "Fmax", "Fmin", "radius", "mean radial error", "X", "Y"
+        }  # fmt: skip
+        for figure, budget in run["uncertainty"].items():
+            if figure in {"Fmax", "Fmin", "radius", "mean radial error"}:
+                assert budget["u_um"] is None
+                assert "not absolute, because the session does not state: thermal expansion" in budget["why_not"]
+            else:
+                assert budget["u_um"] == pytest.approx(np.sqrt(sum(u**2 for u in budget["terms_um"].values())))
         assert [h["undulations"] for h in run["harmonics"]] == list(range(2, 11))
-    assert set(data["pairs"][0]["uncertainty"]) == {"G(b)", "D", "H"}
+    assert set(data["pairs"][0]["uncertainty"]) == {"G(b)", "G(b)(LS)", "D", "H"}
 
 
 def test_a_filter_makes_noise_smaller(session):
-    g = [call("circles", session, "--filter", f, "--json").data["runs"][0]["g_um"] for f in ("none", "150", "50", "15")]
-    assert g == sorted(g, reverse=True)
+    """Of the readings; without their noise G keeps what the form has, and U gets smaller."""
+    found = [
+        call("circles", session, "--filter", f, "--json").data["runs"][0]["uncertainty"]["G"]
+        for f in ("none", "150", "50", "15")
+    ]
+    read = [one["as_read_um"] for one in found]
+    assert read == sorted(read, reverse=True)
+    assert found[-1]["u_um"] < 0.7 * found[0]["u_um"]
+
+
+def test_a_bar_that_nobody_knows_gives_no_absolute_figures(session, tmp_path):
+    """D read -18.6 with U 0.0: nobody had stated the bar."""
+    folder = tmp_path / "no-bar"
+    shutil.copytree(session, folder)
+    text = (folder / "session.yaml").read_text("utf-8")
+    kept = [line.replace(", sha256: " + digest_of(line), "") for line in text.splitlines()]
+    (folder / "session.yaml").write_text("\n".join(x for x in kept if not x.startswith("bar:")) + "\n", "utf-8")
+    assert call("session", "seal", folder).code == DONE
+    out = call("circles", folder).out
+    assert "D: not absolute, because the session does not state: calibrated length of the bar" in out.replace(
+        "Fmax, Fmin, radius, mean radial error, ", ""
+    )
+    pair = call("circles", folder, "--json").data["pairs"][0]
+    assert pair["uncertainty"]["D"]["u_um"] is None
+    assert pair["uncertainty"]["H"]["u_um"] > 0.0
+
+
+def test_the_bars_expansion_is_corrected_once(session, tmp_path):
+    """A bar of 11.5 µm/(m K) that was calibrated at 20 °C reads 13.8 µm less at 28 °C; U(D) is that of what is known of it."""
+    folder = tmp_path / "warm"
+    shutil.copytree(session, folder)
+    text = (folder / "session.yaml").read_text("utf-8")
+    kept = "\n".join(line.replace(", sha256: " + digest_of(line), "") for line in text.splitlines())
+    kept = kept.replace("dbb-session/1", "dbb-session/3")
+    kept = re.sub(r"(calibrated_length_mm: [0-9.]+)", r"\1, temp_c: 20.0, expansion_um_m_k: 11.5", kept, count=1)
+    kept = re.sub(r"(?m)^ambient_temp_c:.*$", "", kept)
+    (folder / "session.yaml").write_text(
+        kept.replace("plan: plan.yaml", "plan: plan.yaml\nambient_temp_c: 28.0") + "\n", "utf-8"
+    )
+    assert call("session", "seal", folder).code == DONE
+    cold, warm = (call("circles", one, "--json").data for one in (session, folder))
+    length = 1e-3 * 150.0 * 11.5 * 8.0
+    d = [one["pairs"][0]["d_um"] for one in (cold, warm)]
+    assert d[1] - d[0] == pytest.approx(length, abs=0.02)
+    budget = warm["pairs"][0]["uncertainty"]["D"]
+    # Two temperatures of 0.3 K, and a coefficient known to 5 %.
+    expected = 1e-3 * 150.0 * 11.5 * np.hypot(np.sqrt(2.0) * 0.3, 0.05 * 8.0)
+    assert budget["terms_um"]["temperature of the bar"] == pytest.approx(expected, rel=1e-3)
+    evaluated = call("evaluate", folder, "--model", MODEL, "--json")
+    assert evaluated.code == DONE, evaluated.err
+    for one, other in zip(warm["runs"], evaluated.data["runs"], strict=True):
+        assert one["mean_radial_error_um"] == pytest.approx(other["before"]["mean_radial_error_um"], abs=1e-3)
 
 
 def test_the_table_is_what_json_has(session, tmp_path):
@@ -160,5 +218,6 @@ def test_a_quick_look_is_printed_as_symptoms():
     square, scale = sizes["squareness"], sizes["scale mismatch"]
     assert square["value"] == pytest.approx(-2 * mean.imag / radius_m, abs=4 * square["u"])
     assert scale["value"] == pytest.approx(2 * mean.real / radius_m, abs=4 * scale["u"])
-    assert {one["signature"] for one in single["symptoms"] if one["value"] is None} == {"squareness", "servo mismatch"}
+    mixed = {one["signature"] for one in single["symptoms"] if one["value"] is None and one["below"] is None}
+    assert mixed == {"squareness", "servo mismatch"}
     assert "quick_look" not in call("circles", SMALL, "--json").data

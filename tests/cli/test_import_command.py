@@ -289,3 +289,22 @@ def test_what_is_not_confirmed_is_not_written(run, tmp_path, monkeypatch):
     done = run("import", *GERMAN, "--out", tmp_path / "s", *WHERE, *UNKNOWN, "--mapping", MAPPING)
     assert done.code == FAILED
     assert not list(tmp_path.glob("*s*"))
+
+
+def test_a_span_that_is_not_the_plans_is_asked_for(run, tmp_path):
+    """40 µm off centre and 5 µm too small, from 45 degrees before the turn to 45 behind it."""
+    angles = np.arange(-60.0, 420.0, 1.0)
+    rows = [f"{one:g},{40.0 * np.cos(np.radians(one)) - 5.0:.4f}" for one in angles]
+    file = table(tmp_path / "wide.csv", rows)
+    refused = imported(run, file, tmp_path / "no")
+    assert refused.code == FAILED
+    assert "the angles span 480 degrees, a turn of the plan has 360, with its overshoot 450" in refused.err
+    assert "--angle-span-deg 480" in refused.err
+    out = tmp_path / "s"
+    done = imported(run, file, out, "--angle-span-deg", "480")
+    assert done.code == DONE, done.err
+    assert "its angles span 480 degrees, as was confirmed" in done.out
+    (one,) = run("circles", out, "--json").data["runs"]
+    assert one["samples"] == 360
+    assert one["centre_um"]["x"] == pytest.approx(40.0, abs=0.02)
+    assert one["mean_radial_error_um"] == pytest.approx(-5.0, abs=0.01)

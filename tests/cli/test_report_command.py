@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import DONE, FAILED
+from dbbstation.digits import with_uncertainty
 from dbbstation.files.shipped import shipped_folder
 from tests.cli.conftest import call
 from tests.plant.mechanisms.kinematics import RandomKinematics
@@ -95,16 +96,25 @@ class Page(html.parser.HTMLParser):
 
 def test_it_has_the_figures_of_circles(session, written):
     text, data = written
-    circles = call("circles", session, "--findings", "--json").data
+    circles = call("circles", session, "--filter", "30", "--findings", "--json").data
     assert data["circles"]["runs"] == circles["runs"]
     assert data["circles"]["pairs"] == circles["pairs"]
     page = Page(text).text
     for run in circles["runs"]:
-        u = 2 * run["uncertainty"]["G"]["u_um"]
-        row = f"{run['test']} {run['direction']} {run['repeat']} {run['g_um']:.1f} {u:.1f} {run['g_least_squares_um']:.1f}"
-        assert row in page
+        g = with_uncertainty(run["g_least_squares_um"], 2 * run["uncertainty"]["G(LS)"]["u_um"])
+        assert f"{run['test']} {run['direction']} {run['repeat']} {g[0]} {g[1]} " in page
     for pair in circles["pairs"]:
-        assert f"{pair['test']} both {pair['repeat']} {pair['g_um']:.1f}" in page
+        g = with_uncertainty(pair["g_least_squares_um"], 2 * pair["uncertainty"]["G(b)(LS)"]["u_um"])
+        assert f"{pair['test']} both {pair['repeat']} {g[0]} {g[1]} " in page
+
+
+def test_a_report_has_one_g(written):
+    """The figure that a tolerance is held against is the one of the tables, with one filter on all pages."""
+    _, data = written
+    assert data["circles"]["filter"] == "30 UPR, cut off sharply"
+    for row, run in zip(data["measured"], data["circles"]["runs"], strict=True):
+        size = row["now"]["circular-deviation"]
+        assert (size["um"], size["u_um"]) == (run["g_least_squares_um"], run["uncertainty"]["G(LS)"]["u_um"])
 
 
 def test_it_is_sound_html_and_refers_to_nothing_outside(written):
@@ -163,7 +173,7 @@ def test_the_page_allows_its_own_script_and_no_other(written):
         assert reach not in script
 
 
-def test_traces_can_be_read_off(written):
+def test_traces_can_be_read_off(session, written):
     """From a drawn point and the figure's scale back to the deviation that `circles` has: its greatest and least."""
     text, data = written
     run = next(r for r in data["circles"]["runs"] if (r["test"], r["direction"]) == ("a", "ccw"))
@@ -172,7 +182,9 @@ def test_traces_can_be_read_off(written):
     points = np.array([p.split(",") for p in re.search(r'ccw" points="([^"]*)"', figure)[1].split()], dtype=float)
     deviation = (np.hypot(*(points - 160.0).T) - radius) / scale
     # Places are given to a tenth of a unit.
-    assert np.ptp(deviation) == pytest.approx(run["g_least_squares_um"], abs=0.2 / scale)
+    plain = call("circles", session, "--test", "a", "--json").data["runs"][0]
+    assert plain["direction"] == run["direction"]
+    assert np.ptp(deviation) == pytest.approx(plain["uncertainty"]["G(LS)"]["as_read_um"], abs=0.2 / scale)
     assert 'data-name="CCW 1"' in figure
 
 
@@ -203,9 +215,16 @@ def test_before_and_now_stand_side_by_side_as_measured(session, better, tmp_path
     out = tmp_path / "both.html"
     outcome = call("report", better, "--before", session, "--out", out, "--json")
     assert outcome.code == DONE, outcome.err
+    # A centre offset is longer by its noise than the true one: the sum of both variances is taken off its square.
     centres = {
         name: [
-            np.hypot(run["centre_um"]["x"], run["centre_um"]["y"])
+            np.sqrt(
+                max(
+                    np.hypot(run["centre_um"]["x"], run["centre_um"]["y"]) ** 2
+                    - sum(run["uncertainty"][axis]["u_um"] ** 2 for axis in "XY"),
+                    0.0,
+                )
+            )
             for run in call("circles", folder, "--json").data["runs"]
         ]
         for name, folder in (("before", session), ("now", better))

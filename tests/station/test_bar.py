@@ -132,8 +132,13 @@ def test_what_the_bar_reads_too_long_by_hand() -> None:
     assert BAR.reads_long_mm(None) == (pytest.approx(0.002), 0.0003)
     long_mm, uncertainty_mm = BAR.reads_long_mm(22.0)
     assert long_mm == pytest.approx(0.002 - 0.003, abs=1e-8)
-    assert uncertainty_mm == pytest.approx(math.hypot(0.0003, 0.0015 * math.sqrt(2.0) * 0.3), rel=1e-4)
-    assert replace(BAR, temp_uncertainty_k=None).reads_long_mm(22.0) == BAR.reads_long_mm(None)
+    of_temperature = math.hypot(math.sqrt(2.0) * 0.3, 0.05 * 2.0)  # two temperatures, and a coefficient known to 5 %
+    assert uncertainty_mm == pytest.approx(math.hypot(0.0003, 0.0015 * of_temperature), rel=1e-4)
+    # A known effect is corrected whether its uncertainty is stated or not: then it is the usual one.
+    assert replace(BAR, temp_uncertainty_k=None).reads_long_mm(22.0)[0] == long_mm
+    assert replace(BAR, temp_c=None).reads_long_mm(22.0) == BAR.reads_long_mm(None)
+    assert BAR.lacks(None) == ("temperature of bar or shop at the measurement",)
+    assert replace(BAR, expansion_um_m_k=0.0, temp_c=None).lacks(None) == ()
 
 
 def test_a_bar_that_reads_long_by_its_calibration_changes_no_result(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from dbbstation.errors import TraceError
 from dbbstation.plan.circle import Circle, Direction
+from dbbstation.trace.analysis import figures
 from dbbstation.trace.average import means
 from dbbstation.trace.cut import (
     PIECES,
@@ -66,12 +67,43 @@ def test_rows_with_angles_are_used_as_they_are():
 
 @pytest.mark.parametrize("extra_deg", [0.0, 0.3])
 def test_recorded_angles_keep_their_order_where_a_turn_begins_and_ends(extra_deg):
+    """A turn that ends with a sample at its full 360 degrees, or 0.3 degrees later, has 720 places and counts each once."""
     phi = np.arange(-extra_deg, 360.0 + extra_deg + 1e-9, 0.5)
     theta = CIRCLE.theta_deg(phi)
     recording = Recording("a run", np.arange(float(len(theta))), 150 + shape(theta), theta % 360)
     raw = cut(recording, CIRCLE)
-    assert np.allclose(raw.phi_deg, phi)
+    assert np.allclose(raw.phi_deg, phi[(phi >= 0.0) & (phi < 360.0)])
+    assert len(raw) == 720
     assert np.all(np.diff(raw.phi_deg) > 0)
+
+
+def test_a_turn_that_begins_early_stays_whole():
+    phi = np.arange(-0.3, 359.3, 0.5)
+    theta = CIRCLE.theta_deg(phi)
+    raw = cut(Recording("a run", np.arange(float(len(theta))), 150 + shape(theta), theta % 360), CIRCLE)
+    assert np.allclose(raw.phi_deg, phi)
+
+
+@pytest.mark.parametrize("direction", list(Direction))
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_places_that_are_passed_twice_count_once(direction, wrapped):
+    """Angles from 45 degrees before the turn to 45 behind it: the second half of a whole wave would shift centre and mean."""
+    circle = replace(CIRCLE, direction=direction, start_deg=20.0)
+    phi = np.arange(-45.0, 405.0, 0.5)
+    theta = circle.theta_deg(phi)
+    length = 150.0 + 0.040 * np.cos(np.radians(theta - 20.0)) - 0.005
+    recording = Recording("a run", np.arange(float(len(phi))), length, theta % 360 if wrapped else theta)
+    raw = cut(recording, circle)
+    assert np.allclose(raw.phi_deg, np.arange(0.0, 360.0, 0.5))
+    assert 1e3 * (raw.length_mm - 150).mean() == pytest.approx(-5.0, abs=1e-9)
+    assert 1e3 * figures(raw).centre_mm[0] == pytest.approx(40.0 * np.cos(np.radians(20.0)), abs=0.01)
+
+
+def test_more_than_a_turn_that_begins_elsewhere_gives_the_turn_in_its_middle():
+    theta = np.arange(100.0, 480.0, 1.0)
+    raw = cut(Recording("a run", np.arange(float(len(theta))), 150 + shape(theta), theta), CIRCLE)
+    assert len(raw) == 360
+    assert len(np.unique(np.round(raw.theta_deg, 6))) == 360
 
 
 @pytest.mark.parametrize("feed", [800, 900, 970, 995, 1005, 1030, 1100, 1200])

@@ -96,6 +96,8 @@ class AngleSchema(Schema):
 
     zero_deg: Annotated[float, Quantity("deg", 0, 720, signed=True)] | None = None
     """Angle in the machine, from +X towards +Y, at which the files write 0; absent: where the plan starts the turn [deg]."""
+    span_deg: Annotated[float, Quantity("deg", 300, 3_600)] | None = None
+    """What the angles of a run span, where that is neither a turn nor the plan's path with its overshoot [deg]."""
     grows: Literal["ccw", "cw", "travel"]
     """Sense in which the numbers grow, seen from +Z: always `ccw`, always `cw`, or with the `travel` of the run."""
 

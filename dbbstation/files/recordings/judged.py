@@ -77,7 +77,7 @@ def _expected(
     known_by = nominal if model is None or run.program is not None else model
     try:
         raw = cut(recording, session.circle(run))
-        observation = Observation(run.test, run.repeat, raw, session.setup(run))
+        observation = Observation(run.test, run.repeat, raw, session.setup(run, raw.temperature_degc))
         return expected_circle(observation, known_by, known_sources().values())
     except (TraceError, MachineError):
         return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,6 +43,8 @@ from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Circle
@@ -97,11 +100,24 @@ class SessionFolder(SessionDetails):
         circle = self.plan.tests[run.test].run(run.direction)
         return circle if run.centre_mm is None else replace(circle, centre_mm=run.centre_mm)
 
-    def setup(self, run: RunEntry) -> Setup:
-        """Return ball, mounting and bar of a run, named so that no other session has the same names."""
+    def bar_temp_c(self, logged: Mapping[str, NDArray[np.float64]]) -> float | None:
+        """Return the temperature of the bar in a run: as its thermometer logged it, else that of the shop; None where not known.
+
+        Args:
+            logged: temperatures by sensor, shape (n,) each [degC].
+        """
+        return float(np.mean(logged["bar"])) if "bar" in logged else self.ambient_temp_c
+
+    def setup(self, run: RunEntry, logged: Mapping[str, NDArray[np.float64]] = MappingProxyType({})) -> Setup:
+        """Return ball, mounting and bar of a run, named so that no other session has the same names.
+
+        Args:
+            run: which.
+            logged: temperatures of the run by sensor, shape (n,) each [degC].
+        """
         ball = self.plan.tests[run.test].ball
         mounted = mounted_name(self.plan, run.test, run.mounting)
-        long_mm, uncertainty_mm = (0.0, 0.0) if self.bar is None else self.bar.reads_long_mm(self.ambient_temp_c)
+        long_mm, uncertainty_mm = (0.0, 0.0) if self.bar is None else self.bar.reads_long_mm(self.bar_temp_c(logged))
         readings = (r for r in self.set_up_errors if mounted_name(self.plan, r.test, r.mounting) == mounted)
         return Setup(
             session=self.name,

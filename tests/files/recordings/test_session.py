@@ -7,6 +7,7 @@ import math
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dbbstation.errors import InputError
@@ -107,11 +108,10 @@ def test_runs_share_a_mounting_by_number_or_by_test(session: Path) -> None:
     assert len(set(names)) == 3
     assert len({read.setup(run).ball for run in read.runs[:3]}) == 1
     setup = read.setup(read.runs[0])
-    assert (setup.mounting_repeatability_mm, setup.ball_uncertainty_mm, setup.bar_uncertainty_mm) == (
-        0.58e-3,
-        0.5e-3,
-        0.5e-3,
-    )
+    assert (setup.mounting_repeatability_mm, setup.ball_uncertainty_mm) == (0.58e-3, 0.5e-3)
+    # 150 mm of 10.6 µm/(m K): two temperatures of 0.3 K, and 5 % of what 0.1 K make.
+    of_temperature = 150.0003 * 10.6e-6 * np.hypot(np.sqrt(2.0) * 0.3, 0.05 * 0.1)
+    assert setup.bar_uncertainty_mm == pytest.approx(np.hypot(0.5e-3, of_temperature))
 
 
 def test_runs_are_loaded_when_asked_for() -> None:

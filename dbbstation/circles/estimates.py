@@ -1,0 +1,144 @@
+"""Figures of circles without what noise adds to them: G, F and H of one circle, G(b) and H of both directions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from dbbstation.circles.extremes import (
+    DrawnPath,
+    Estimate,
+    drawn_path,
+    estimated,
+    farthest_of,
+    greatest_of,
+    least_of,
+    range_of,
+)
+from dbbstation.circles.form import FormAndNoise, form_and_noise
+from dbbstation.circles.path import path_of
+from dbbstation.circles.quantity import Quantity
+from dbbstation.circles.strip import strip_widths
+from dbbstation.plan.circle import FULL_TURN_DEG
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
+    from dbbstation.circles.path import Filter
+
+CLEAR = 2.0
+"""Standard uncertainties from which a drift over the turn counts as form: less is noise."""
+
+
+def estimate_of(one: CircleAnalysis, quantity: Quantity) -> Estimate | None:
+    """Return G, G(LS), Fmax or Fmin of a circle; None where it has too few samples to separate noise from form.
+
+    Args:
+        one: the circle.
+        quantity: which.
+    """
+    if not one.noise.known:
+        return None
+    found = _FOUND.setdefault(one, {})
+    if quantity not in found:
+        found[quantity] = _estimate(one, quantity)
+    return found[quantity]
+
+
+_FOUND: WeakKeyDictionary[CircleAnalysis, dict[Quantity, Estimate]] = WeakKeyDictionary()
+_DRAWN: WeakKeyDictionary[CircleAnalysis, DrawnPath] = WeakKeyDictionary()
+"""Worked out once: tables, budgets and tolerances ask for them."""
+
+
+def _estimate(one: CircleAnalysis, quantity: Quantity) -> Estimate:
+    drawn = _drawn(one)
+    radius_um, deviation_um = one.radius_error_um, 1e3 * one.path.least_squares.deviation_mm
+    match quantity:
+        case Quantity.G:
+            return estimated([drawn], strip_widths, one.g_um)
+        case Quantity.G_LS:
+            return estimated([drawn], range_of, one.g_least_squares_um)
+        case Quantity.F_MAX:
+            found = estimated([drawn], greatest_of, float(deviation_um.max()))
+            return Estimate(radius_um + found.value_um, found.u_um, radius_um + found.as_read_um)
+        case Quantity.F_MIN:
+            found = estimated([drawn], least_of, float(-deviation_um.min()))
+            return Estimate(radius_um - found.value_um, found.u_um, radius_um - found.as_read_um)
+        case _:
+            raise ValueError(f"{quantity} is no range of one circle")
+
+
+def _apart(one: CircleAnalysis) -> FormAndNoise:
+    """Form and noise of the deviations from the least-squares circle, not filtered."""
+    if one.closure is None or abs(one.closure.height_um) <= CLEAR * one.closure.u_um:
+        return form_and_noise(one.residual_um)
+    ramp_um = one.closure.height_um * one.raw.phi_deg / FULL_TURN_DEG
+    apart = form_and_noise(one.residual_um - ramp_um)
+    return FormAndNoise(apart.form_um + ramp_um, apart.power_um2)
+
+
+def _drawn(one: CircleAnalysis) -> DrawnPath:
+    if one not in _DRAWN:
+        apart = _apart(one)
+        _DRAWN[one] = _path(_filtered(apart.form_um, one.chosen), apart, one, 0)
+    return _DRAWN[one]
+
+
+def _path(form_um: NDArray[np.float64], apart: FormAndNoise, one: CircleAnalysis, seed: int) -> DrawnPath:
+    passed = one.chosen.passed(np.arange(len(form_um) // 2 + 1.0))
+    return drawn_path(FormAndNoise(form_um, apart.power_um2), one.path.theta_deg, passed, seed)
+
+
+def pair_estimate(pair: PairAnalysis, quantity: Quantity) -> Estimate | None:
+    """Return G(b), G(b)(LS) or H of both directions; None where one has too few samples to separate noise from form.
+
+    Args:
+        pair: the circle in both directions.
+        quantity: which.
+    """
+    if not (pair.one.noise.known and pair.other.noise.known):
+        return None
+    found = _OF_PAIRS.setdefault(pair, {})
+    if quantity not in found:
+        found[quantity] = _pair_estimate(pair, quantity)
+    return found[quantity]
+
+
+_OF_PAIRS: WeakKeyDictionary[PairAnalysis, dict[Quantity, Estimate]] = WeakKeyDictionary()
+
+
+def _pair_estimate(pair: PairAnalysis, quantity: Quantity) -> Estimate:
+    if quantity is Quantity.H:
+        return _hysteresis(pair)
+    drawn = []
+    split = np.split(1e3 * pair.together.least_squares.deviation_mm, [len(pair.one.raw)])
+    for seed, (one, deviation_um) in enumerate(zip((pair.one, pair.other), split, strict=True)):
+        apart = _apart(one)
+        # Seen from the circle of both, radius and centre of each are form.
+        beside_um = deviation_um - 1e3 * one.path.least_squares.deviation_mm
+        drawn.append(_path(_filtered(apart.form_um, one.chosen) + beside_um, apart, one, seed))
+    if quantity is Quantity.G_BOTH:
+        return estimated(drawn, strip_widths, pair.g_um)
+    return estimated(drawn, range_of, pair.g_least_squares_um)
+
+
+def _filtered(form_um: NDArray[np.float64], chosen: Filter) -> NDArray[np.float64]:
+    if not chosen:
+        return form_um
+    passed = chosen.passed(np.arange(len(form_um) // 2 + 1.0))
+    return np.asarray(np.fft.irfft(passed * np.fft.rfft(form_um), len(form_um)))
+
+
+def _hysteresis(pair: PairAnalysis) -> Estimate:
+    """H by the difference of both paths: a series of its own, with a form and a noise of its own."""
+    paths = [path_of(one.raw) for one in (pair.one, pair.other)]
+    theta_deg = np.sort(paths[0].theta_deg)
+    radii = [np.interp(theta_deg, p.theta_deg, p.about_ball_mm, period=FULL_TURN_DEG) for p in paths]
+    apart = form_and_noise(1e3 * (radii[0] - radii[1]))
+    chosen = pair.one.chosen
+    passed = chosen.passed(np.arange(len(theta_deg) // 2 + 1.0))
+    own = FormAndNoise(_filtered(apart.form_um, chosen), apart.power_um2)
+    return estimated([drawn_path(own, theta_deg, passed, 2)], farthest_of, pair.h_um)

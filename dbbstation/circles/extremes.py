@@ -1,0 +1,263 @@
+"""Ranges of noisy paths: what the path without its noise has, and how well that is known.
+
+Noise widens a range. By how much depends on the form beside it: at a flat peak many samples compete for the extreme, at a sharp
+one few, and where there is no form all of them do. The range that was read is therefore held against what paths of the same form
+and of other sizes, with noise of the measured spectrum, would have shown (a parametric bootstrap [Efron and Tibshirani, An
+Introduction to the Bootstrap, ch. 12 to 14]). The size whose paths show, in the mean, what was read is the estimate; those whose
+paths show it at their 2.5th and 97.5th percentile are the ends of its interval [confidence interval by inversion of a test,
+Casella and Berger, Statistical Inference, 9.2.1]. A range is never below zero: where noise alone shows as much, the interval
+begins there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.circles.form import drawn_noise
+from dbbstation.plan.circle import FULL_TURN_DEG
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.circles.form import FormAndNoise
+
+    Statistic = Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+
+DRAWS = 256
+"""Paths that are drawn. Their standard deviation is known to 4.5 %."""
+
+SECTORS = 360
+"""Parts of the turn whose greatest and least sample are kept of each drawn path, at the most: its form hardly changes within a
+degree."""
+
+POINTS_PER_UNDULATION = 8
+"""Samples that are kept for each of the undulations that a filter lets pass: what lies between two of them lies on a smooth
+curve."""
+
+QUANTILE = 1.96
+"""Standard deviations of the end of a 95 % interval [normal distribution]."""
+
+STEPS = np.array([-9.0, -6.0, -4.0, -2.5, -1.0, 0.5, 2.0, 3.5])
+"""Sizes that are tried, as what was read and so many standard deviations of one sample's noise. Noise of a range of many thousand
+samples adds less than nine of them."""
+
+CERTAIN = 3.0
+"""Standard deviations beyond which no further size is tried."""
+
+SEED = 4
+"""Of the draws: the same recording gives the same figures."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A figure without what noise adds to it.
+
+    Attributes:
+        value_um: the figure [µm].
+        u_um: its standard uncertainty by noise: half-width of its 95 % interval over 1.96, of the longer side [µm].
+        as_read_um: the figure of the readings, noise included [µm].
+    """
+
+    value_um: float
+    u_um: float
+    as_read_um: float
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnPath:
+    """One path and draws of its noise, sector by sector of the turn.
+
+    Attributes:
+        form_um: mean of the form in each sector, shape (s,) [µm].
+        highest_um: greatest noise in it, shape (draws, s) [µm].
+        lowest_um: least noise in it, shape (draws, s) [µm].
+        theta_deg: its middle, rising, shape (s,) [deg].
+        sigma_um: standard deviation of one sample's noise [µm].
+        least: share of that which noise has where all of its spectrum is as low as at its end.
+    """
+
+    form_um: NDArray[np.float64]
+    highest_um: NDArray[np.float64]
+    lowest_um: NDArray[np.float64]
+    theta_deg: NDArray[np.float64]
+    sigma_um: float
+    least: float
+
+
+def drawn_path(
+    apart: FormAndNoise, theta_deg: NDArray[np.float64], passed: NDArray[np.float64], seed: int
+) -> DrawnPath:
+    """Draw noise of a path.
+
+    Args:
+        apart: form and noise of its deviations, in time order; the form filtered already.
+        theta_deg: angles of its samples, shape (n,) [deg].
+        passed: share of the noise's amplitude that the figure's filter lets pass, by line, shape (n // 2 + 1,).
+        seed: of the draws.
+    """
+    count = len(theta_deg)
+    power = apart.power_um2 * passed**2
+    # Undulations up to which the filter passes a hundredth of the noise's power.
+    points = POINTS_PER_UNDULATION * int(np.flatnonzero(passed > PASSED).max(initial=1))
+    theta = np.mod(theta_deg, FULL_TURN_DEG)
+    if points < min(count, SECTORS):
+        order = np.arange(0, count, count // points)
+        order = order[np.argsort(theta[order], kind="stable")]
+        starts, middle_deg = np.arange(len(order)), theta[order]
+    else:
+        sectors = min(SECTORS, count)
+        order = np.argsort(theta, kind="stable")
+        sector = np.minimum((theta[order] * (sectors / FULL_TURN_DEG)).astype(np.int64), sectors - 1)
+        starts = np.flatnonzero(np.diff(sector, prepend=-1))
+        middle_deg = (sector[starts] + 0.5) * (FULL_TURN_DEG / sectors)
+    rng = np.random.default_rng([SEED, seed])
+    highest, lowest = [], []
+    for _ in range(BLOCKS):  # long recordings would take much memory at once
+        noise = drawn_noise(power, count, DRAWS // BLOCKS, rng)[:, order]
+        highest.append(np.maximum.reduceat(noise, starts, axis=1))
+        lowest.append(np.minimum.reduceat(noise, starts, axis=1))
+    sizes = np.diff(np.append(starts, len(order)))
+    return DrawnPath(
+        form_um=np.add.reduceat(apart.form_um[order], starts) / sizes,
+        highest_um=np.concatenate(highest),
+        lowest_um=np.concatenate(lowest),
+        theta_deg=middle_deg,
+        sigma_um=float(np.sqrt((2.0 * power.sum() - power[0]) / count)),
+        least=_least_share(apart.power_um2, passed),
+    )
+
+
+def _least_share(power_um2: NDArray[np.float64], passed: NDArray[np.float64]) -> float:
+    """Share of the noise that is left where no line has more power than the end of the spectrum, its upper third."""
+    end = float(np.mean(power_um2[-max(len(power_um2) // 3, 1) :]))
+    whole = float(np.sum(power_um2 * passed**2))
+    return float(np.sqrt(np.sum(np.minimum(power_um2, end) * passed**2) / whole)) if whole > 0.0 else 1.0
+
+
+PASSED = 0.1
+"""Share of the amplitude below which an undulation of the noise no longer counts for where the extremes lie."""
+
+BLOCKS = 4
+
+
+def estimated(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> Estimate:
+    """Return a range without what noise adds to it.
+
+    One recording does not tell noise that remembers its neighbours from form that is short, such as the wave of a screw. Where its
+    spectrum is higher anywhere than at its end, the noise lies between that of the whole spectrum and that of its end. The figure is
+    worked out with both, and its interval holds both intervals.
+
+    Args:
+        paths: one, or both directions of a circle, with deviations from one circle.
+        statistic: of greatest and least deviations, shape (draws, s), at angles, shape (s,): a range that is as many times larger
+            as they are.
+        as_read_um: that of the readings [µm].
+    """
+    if not max(path.sigma_um for path in paths) > 0.0:
+        return Estimate(as_read_um, 0.0, as_read_um)
+    with_all = _interval(paths, statistic, as_read_um)
+    if min(path.least for path in paths) > ALIKE:
+        with_least = with_all
+    else:
+        quiet = [
+            replace(
+                path,
+                highest_um=path.least * path.highest_um,
+                lowest_um=path.least * path.lowest_um,
+                sigma_um=path.least * path.sigma_um,
+            )
+            for path in paths
+        ]
+        with_least = _interval(quiet, statistic, as_read_um)
+    low, high = min(with_all.low, with_least.low), max(with_all.high, with_least.high)
+    value = 0.5 * (with_all.value + with_least.value)
+    u = max((value - low) / QUANTILE, (high - value) / QUANTILE, with_all.least_u)
+    return Estimate(value, u, as_read_um)
+
+
+ALIKE = 0.95
+"""Share of the noise that the end of its spectrum has, from which on the whole spectrum counts as alike: by chance the end of 240
+lines is lower by a twentieth."""
+
+
+@dataclass(frozen=True)
+class _Interval:
+    """Estimate, ends of the 95 % interval, and the least standard uncertainty [µm]."""
+
+    value: float
+    low: float
+    high: float
+    least_u: float
+
+
+def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> _Interval:
+    """Hold what was read against paths of several sizes with drawn noise; arguments as of `estimated`."""
+    angles = np.unique(np.concatenate([path.theta_deg for path in paths]))
+    place = [np.searchsorted(angles, path.theta_deg) for path in paths]
+
+    def at(size: float, *, noisy: bool) -> NDArray[np.float64]:
+        draws = DRAWS if noisy else 1
+        outer, inner = np.full((draws, len(angles)), -np.inf), np.full((draws, len(angles)), np.inf)
+        for path, where in zip(paths, place, strict=True):
+            high = size * path.form_um + (path.highest_um if noisy else 0.0)
+            low = size * path.form_um + (path.lowest_um if noisy else 0.0)
+            outer[:, where], inner[:, where] = np.maximum(outer[:, where], high), np.minimum(inner[:, where], low)
+        return statistic(outer, inner, angles)
+
+    of_form = float(at(1.0, noisy=False)[0])
+    if not of_form > 0.0:
+        return _Interval(as_read_um, as_read_um, as_read_um, 0.0)
+    sigma_um = max(path.sigma_um for path in paths)
+    tried: dict[float, NDArray[np.float64]] = {}
+    # Upwards until no draw worth counting shows less than what was read, downwards until none shows more.
+    for steps, side in ((STEPS[STEPS > 0.0], -1.0), (STEPS[STEPS < 0.0][::-1], 1.0)):
+        for step in steps:
+            size = max(as_read_um + float(step) * sigma_um, 0.0)
+            if size not in tried:
+                tried[size] = at(size / of_form, noisy=True)
+            beyond = tried[size].mean() + side * CERTAIN * tried[size].std() - as_read_um
+            if side * beyond <= 0.0:
+                break
+    sizes = np.array(sorted(tried))
+    shown = np.array([tried[size] for size in sizes])
+    mean, spread = shown.mean(axis=1), shown.std(axis=1)
+    # Extremes are skewed, alike at all sizes: their percentiles are those of all draws together.
+    ends = np.quantile((shown - mean[:, None]) / spread[:, None], [0.975, 0.025])
+    value, low, high = (
+        float(np.interp(as_read_um, np.maximum.accumulate(mean + end * spread), sizes)) for end in (0.0, *ends)
+    )
+    # No interval is shorter than what the readings' own scatter makes of it.
+    return _Interval(value, low, high, 0.5 * float(np.interp(value, sizes, spread)))
+
+
+def range_of(
+    outer: NDArray[np.float64], inner: NDArray[np.float64], _theta_deg: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Greatest less least deviation, shape (draws,)."""
+    return np.asarray(outer.max(axis=1) - inner.min(axis=1))
+
+
+def greatest_of(
+    outer: NDArray[np.float64], _inner: NDArray[np.float64], _theta: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Greatest deviation outwards, shape (draws,)."""
+    return np.asarray(outer.max(axis=1))
+
+
+def least_of(
+    _outer: NDArray[np.float64], inner: NDArray[np.float64], _theta: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Greatest deviation inwards, shape (draws,)."""
+    return np.asarray(-inner.min(axis=1))
+
+
+def farthest_of(
+    outer: NDArray[np.float64], inner: NDArray[np.float64], _theta: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Greatest deviation to either side, shape (draws,)."""
+    return np.asarray(np.maximum(outer.max(axis=1), -inner.min(axis=1)))

@@ -1,0 +1,135 @@
+"""What a circle's deviations are made of: form, which repeats, and noise, whose spectrum is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.harmonics import bands, noise_spectrum
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+CHANCE = 0.01
+"""Chance at which noise alone has one line anywhere in its spectrum that counts as form."""
+
+NEIGHBOURS = 15
+"""Lines over which the power of the noise is averaged: it changes slowly along the spectrum."""
+
+
+@dataclass(frozen=True, eq=False)
+class FormAndNoise:
+    """One series of deviations round a turn, taken apart.
+
+    Attributes:
+        form_um: its form, noise taken off as far as the spectrum tells both apart, shape (n,) [µm].
+        power_um2: of the noise by line 0, 1, ... n // 2: the variance that white noise of the same power would have [µm²].
+    """
+
+    form_um: NDArray[np.float64]
+    power_um2: NDArray[np.float64]
+
+
+def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
+    """Take a series of deviations apart.
+
+    Noise is read above 30 undulations per revolution and continued below (`dbbstation.inference.harmonics`). There, each line
+    counts as form by the share 1 - S / P of its power P that noise of power S would not have put there: the estimate of a mean
+    square that is left when noise is taken off. Above, what stands out of its neighbours is form: a cyclic error is no noise.
+
+    Args:
+        deviation_um: about equally spaced over a turn, shape (n,) [µm].
+    """
+    count = len(deviation_um)
+    low, high = bands(count)
+    above = np.fft.rfft(deviation_um)
+    above[: low + 1] = 0.0
+    sharp = _sharp(np.fft.irfft(above, count), low)
+    lines = np.fft.rfft(deviation_um - sharp)
+    power = np.abs(lines) ** 2 / count
+    floor, standing = _floor(power[low + 1 :])
+    spectrum = noise_spectrum(2.0 * floor[: high - low], low, 2.0)
+    noise = np.concatenate([spectrum.power, _averaged(floor)])
+    share = np.maximum(1.0 - noise / np.maximum(power, np.finfo(float).tiny), 0.0)
+    share[: low + 1] *= power[: low + 1] > STANDS_OUT * spectrum.power
+    share[0] = 1.0  # a mean is no noise where the radius is known to less than a sample's noise
+    share[low + 1 :] *= standing
+    if low > 1 and not (share[2:].any() or sharp.any()):
+        strongest = 2 + int(np.argmax(power[2 : low + 1] / np.maximum(noise[2 : low + 1], np.finfo(float).tiny)))
+        share[strongest] = 1.0  # nothing stands out: what form there may be most likely has this one
+    return FormAndNoise(np.fft.irfft(share * lines, count) + sharp, noise)
+
+
+STANDS_OUT = 3.0
+"""Power of a line of noise is exponentially distributed: one in twenty is three times its mean. Lines below that are taken for noise
+alone, as what noise leaves in the form would be counted twice."""
+
+
+def _sharp(quick_um: NDArray[np.float64], low: int) -> NDArray[np.float64]:
+    """Form that is too short for the low undulations and stands at few places, such as a reversal spike, shape (n,).
+
+    What lies above the low undulations is looked at through a Gaussian filter of four times as many. Noise is about alike all
+    round the turn: where that is further out than noise would be anywhere, it is form.
+    """
+    count = len(quick_um)
+    lines = np.arange(count // 2 + 1.0)
+    smooth = np.fft.irfft(np.fft.rfft(quick_um) * np.exp2(-((lines / (4.0 * low)) ** 2)), count)
+    usual = float(np.median(np.abs(smooth))) / MEDIAN_OF_NORMAL
+    out = np.abs(smooth) > usual * float(np.sqrt(2.0 * np.log(8.0 * low / CHANCE)))
+    if not out.any():
+        return np.zeros(count)
+    reach = max(count // (4 * low), 1)
+    near = np.convolve(np.tile(out, 3), np.ones(2 * reach + 1), mode="same")[count : 2 * count] > 0.0
+    return np.where(near, smooth, 0.0)
+
+
+MEDIAN_OF_NORMAL = 0.6745
+"""Median of the size of a standard normal value."""
+
+
+def _floor(power: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Power of lines with those that stand out replaced by what their neighbours have, and which ones stand out."""
+    standing = np.zeros(len(power), dtype=bool)
+    limit = np.log(max(len(power), 1) / CHANCE)  # the power of a line of noise is exponentially distributed
+    floor = power
+    for _ in range(_ROUNDS):
+        usual = _averaged(np.where(standing, np.nan, power))
+        found = standing | (power > limit * usual)
+        if np.array_equal(found, standing):
+            break
+        standing = found
+        floor = np.where(standing, _averaged(np.where(standing, np.nan, power)), power)
+    return floor, standing
+
+
+_ROUNDS = 20
+
+
+def _averaged(power: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Running mean over lines that are known; the mean of all where none of the neighbours is."""
+    known = np.isfinite(power)
+    window = np.ones(min(2 * NEIGHBOURS + 1, len(power)))
+    total = np.convolve(np.where(known, power, 0.0), window, mode="same")
+    of = np.convolve(known.astype(float), window, mode="same")
+    everywhere = float(np.mean(power[known])) if known.any() else 0.0
+    return np.where(of > 0.0, total / np.maximum(of, 1.0), everywhere)
+
+
+def drawn_noise(
+    power_um2: NDArray[np.float64], count: int, draws: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Draw noise of a spectrum, shape (draws, count) [µm].
+
+    Args:
+        power_um2: by line, shape (count // 2 + 1,).
+        count: samples of a turn.
+        draws: how many.
+        rng: generator.
+    """
+    parts = rng.standard_normal((2, draws, len(power_um2)))
+    lines = (parts[0] + 1j * parts[1]) * np.sqrt(0.5 * count * power_um2)
+    whole = [0, -1] if count % 2 == 0 else [0]
+    lines[:, whole] = np.sqrt(2.0) * lines[:, whole].real
+    return np.asarray(np.fft.irfft(lines, count, axis=1))

@@ -1,0 +1,26 @@
+"""Figures of circles that have an uncertainty."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Quantity(StrEnum):
+    """What a budget is for."""
+
+    G = "G"
+    G_LS = "G(LS)"
+    F_MAX = "Fmax"
+    F_MIN = "Fmin"
+    RADIUS = "radius"
+    MEAN_RADIAL = "mean radial error"
+    X = "X"
+    Y = "Y"
+    G_BOTH = "G(b)"
+    G_BOTH_LS = "G(b)(LS)"
+    D = "D"
+    H = "H"
+
+
+ABSOLUTE = frozenset({Quantity.F_MAX, Quantity.F_MIN, Quantity.RADIUS, Quantity.MEAN_RADIAL, Quantity.D})
+"""Figures that rest on the bar's length, not on its changes alone."""

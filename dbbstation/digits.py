@@ -1,0 +1,33 @@
+"""How many decimals a value has: as many as its expanded uncertainty, which has two digits that count [GUM 7.2.6]."""
+
+from __future__ import annotations
+
+import math
+
+MOST_DECIMALS = 3
+"""Decimals of the finest figures, in µm: a nanometre."""
+
+SIGNIFICANT = 2
+"""Digits of an uncertainty that count."""
+
+
+def decimals_of(expanded: float) -> int:
+    """Return the decimals of a value with this expanded uncertainty, and of that; of none with uncertainty zero the most."""
+    if not expanded > 0.0:
+        return MOST_DECIMALS
+    shown = float(f"{expanded:.{SIGNIFICANT - 1}e}")  # 0.0996 is written as 0.10
+    return min(max(SIGNIFICANT - 1 - math.floor(math.log10(shown)), 0), MOST_DECIMALS)
+
+
+def with_uncertainty(value: float, expanded: float | None, plain: int = 1) -> tuple[str, str]:
+    """Return a value and its expanded uncertainty as they are printed: to the same decimals.
+
+    Args:
+        value: any unit.
+        expanded: in the same unit; None where it has none.
+        plain: decimals of a value that has no uncertainty.
+    """
+    if expanded is None:
+        return f"{value:.{plain}f}", "-"
+    decimals = decimals_of(expanded)
+    return f"{value:.{decimals}f}", f"{expanded:.{decimals}f}"

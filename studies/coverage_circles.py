@@ -1,0 +1,245 @@
+"""Do the intervals of figures of circles contain the truth? Circles of machines with serial axes that `tests/plant` makes."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis, analyse, analyse_pair, refiltered
+from dbbstation.circles.budget import Budget, SetUpKnowledge, budgets, pair_budgets
+from dbbstation.circles.path import Filter
+from dbbstation.circles.quantity import ABSOLUTE, Quantity
+from dbbstation.circles.quick_look import quick_look
+from dbbstation.circles.signatures import Signature
+from dbbstation.plan.bar import Bar
+from dbbstation.plan.circle import Circle, Direction
+from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.tolerated import sizes_of
+from dbbstation.trace.circle import RawCircle
+from studies.fleet import over_machines
+from tests.plant.noise import Noise
+from tests.plant.serial import Axis, SerialMachine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+COVERAGE_FACTOR = 2.0
+"""k of U = k u, as it is printed."""
+
+SAMPLES = 720
+RADIUS_MM, FEED_MM_MIN = 150.0, 1000.0
+BAR = Bar("study", RADIUS_MM, 0.0005, None, 20.0, 11.5, temp_uncertainty_k=0.3)
+SHOP_DEGC = 28.0
+U_BALL_UM = 1.0
+UNKNOWN = SetUpKnowledge(not_absolute="not absolute, because the session does not state: calibrated length of the bar")
+
+LEVELS_UM = (0.1, 0.3, 1.0)
+COLOURS = {"white": (1.0, 0.0), "correlated": (0.6, 0.8)}
+"""Shares of white noise and of noise that remembers eight tenths of the sample before."""
+
+KINDS = ("perfect", "as large as noise", "worn machine")
+"""Faults: none, such that the form is about as large as the noise, and those of a worn machine."""
+
+FILTERS = (Filter.UPR_15, Filter.UPR_50, Filter.UPR_150)
+GAUSSIAN = "G, Gaussian filters"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One noise.
+
+    Attributes:
+        level_um: standard deviation of a reading [µm].
+        colour: `white` or `correlated`.
+    """
+
+    level_um: float
+    colour: str
+
+    @property
+    def noise(self) -> Noise:
+        """The noise of the plant."""
+        white, correlated = COLOURS[self.colour]
+        return Noise(self.level_um * white, self.level_um * correlated, 0.8)
+
+
+CELLS = tuple(Cell(level, colour) for colour in COLOURS for level in LEVELS_UM)
+
+Hits = dict[tuple[str, str], list[bool]]
+"""Whether intervals held the truth, by row and kind of circle."""
+
+
+def coverage_of_circles(
+    draws: int, seed: int, progress: Callable[[int], None], cells: Sequence[Cell] = CELLS
+) -> dict[str, Any]:
+    """Draw circles, and count how often U about each figure contains the truth.
+
+    Args:
+        draws: for each noise; the three kinds of circles take turns.
+        seed: of the first draw.
+        progress: called with how many draws are done.
+        cells: noises.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    done = 0
+    for cell in cells:
+        hits: Hits = defaultdict(list)
+        for one in over_machines(partial(_drawn, cell), range(seed, seed + draws)):
+            for row, inside in one:
+                hits[row].append(inside)
+            done += 1
+            progress(done)
+        for (figure, kind), held in hits.items():
+            by_noise = rows.setdefault(figure, {}).setdefault(f"{cell.colour} {cell.level_um:g} µm", {})
+            by_noise[kind] = {"inside": sum(held), "draws": len(held)}
+    return {"draws": draws, "rows": rows}
+
+
+def pooled(row: dict[str, Any], noise: str = "", kind: str = "") -> tuple[int, int]:
+    """Return how many intervals of a row hold the truth, of how many; of one noise or kind where it is given."""
+    chosen = [
+        counts
+        for name, kinds in row.items()
+        for which, counts in kinds.items()
+        if noise in ("", name) and kind in ("", which)
+    ]
+    return sum(c["inside"] for c in chosen), sum(c["draws"] for c in chosen)
+
+
+def _drawn(cell: Cell, seed: int) -> list[tuple[tuple[str, str], bool]]:
+    """One machine: its circle in both directions, noise and errors of bar and ball drawn; rows and whether they hold."""
+    rng = np.random.default_rng([seed, int(1000 * cell.level_um), len(cell.colour)])
+    kind = KINDS[seed % len(KINDS)]
+    size = dict(zip(KINDS, (0.0, 0.3 * cell.level_um, 1.0), strict=True))[kind]
+    machine = _machine(rng, size)
+    centre_mm = 0.02 * size * rng.standard_normal(2)
+    radius_um = 5.0 * size * rng.standard_normal()
+    ball_mm = 1e-3 * U_BALL_UM * rng.standard_normal(2)
+    long_mm = BAR.calibrator_uncertainty_mm * rng.standard_normal()
+    degc = 0.3 * rng.standard_normal(2)
+    grown_mm = 1e-6 * 11.5 * (1.0 + 0.05 * rng.standard_normal()) * RADIUS_MM * (SHOP_DEGC - 20.0 + degc[0] - degc[1])
+    read_long_mm, _ = BAR.reads_long_mm(SHOP_DEGC)
+    true, read = [], []
+    for direction in Direction:
+        silent = _turn(machine, direction, tuple(-centre_mm), radius_um)
+        about = _turn(machine, direction, tuple(ball_mm - centre_mm), radius_um)
+        true.append(analyse(silent))
+        noisy = about.length_mm + cell.noise.drawn_mm(rng, SAMPLES) + long_mm - grown_mm - read_long_mm
+        read.append(analyse(replace(about, length_mm=noisy)))
+    known = SetUpKnowledge(
+        u_bar_um=1e3 * BAR.calibrator_uncertainty_mm,
+        u_temperature_um=1e3 * (BAR.grown_uncertainty_mm(SHOP_DEGC) or 0.0),
+        u_ball_um=U_BALL_UM,
+        u_ball_z_um=U_BALL_UM,
+    )
+    found = [*_of_one(read[0], true[0], known, seed), *_of_both(analyse_pair(*read), analyse_pair(*true), known)]
+    found += _of_look(read, machine)
+    return [((figure, kind), inside) for figure, inside in found]
+
+
+def _machine(rng: np.random.Generator, size: float) -> SerialMachine:
+    def axis(late_ms: float, scale_um_m: float) -> Axis:
+        play, spikes = size * 2.0 * rng.standard_normal(2), size * rng.standard_normal(2)
+        return Axis(
+            late_ms=late_ms,
+            scale_um_m=scale_um_m,
+            plus_um=float(play[0]),
+            minus_um=float(play[1]),
+            spike_plus_um=float(spikes[0]),
+            spike_minus_um=float(spikes[1]),
+            cyclic_um=size * float(rng.uniform(0.0, 1.0)),
+            period_mm=2.0 * RADIUS_MM / float(rng.uniform(8.0, 38.0)),
+            phase_rad=float(rng.uniform(0.0, 2.0 * np.pi)),
+        )
+
+    late, scale, square = size * np.array([0.1, 50.0, 100.0]) * rng.standard_normal(3)
+    return SerialMachine(
+        axis(float(late), float(scale)), axis(-float(late), -float(scale)), float(square), float(rng.uniform(2.0, 10.0))
+    )
+
+
+def _turn(machine: SerialMachine, direction: Direction, ball_mm: tuple[float, ...], radius_um: float) -> RawCircle:
+    circle = Circle((0, 0, 0), (0, 0, 0), RADIUS_MM, (0, 0, 0), FEED_MM_MIN, 0.0, 0.0, 1.5, 0.0, direction)
+    phi_deg = np.arange(0.0, 360.0, 360.0 / SAMPLES)
+    length_mm = machine.length_mm(
+        circle.theta_deg(phi_deg), RADIUS_MM, FEED_MM_MIN, int(direction.sign), (ball_mm[0], ball_mm[1])
+    )
+    return RawCircle(str(direction), circle, phi_deg / circle.turning_deg_s, phi_deg, length_mm + 1e-3 * radius_um)
+
+
+def _of_one(read: CircleAnalysis, true: CircleAnalysis, known: SetUpKnowledge, seed: int) -> Iterator[tuple[str, bool]]:
+    for quantity, budget in budgets(read, known).items():
+        yield _row(quantity), _holds(budget, _truth(true, quantity))
+    for quantity in sorted(ABSOLUTE - {Quantity.D}):
+        nothing = budgets(read, UNKNOWN, [quantity])[quantity]
+        yield f"{_row(quantity)}, bar not known: printed without U", nothing.u_um is None
+    chosen = FILTERS[seed % len(FILTERS)]
+    budget = budgets(refiltered(read, chosen), known, [Quantity.G])[Quantity.G]
+    yield GAUSSIAN, _holds(budget, refiltered(true, chosen).g_um)
+    sharp_read, sharp_true = refiltered(read, Filter.UPR_30), refiltered(true, Filter.UPR_30)
+    for quantity, budget in budgets(sharp_read, known, [Quantity.G, Quantity.G_LS]).items():
+        yield f"{quantity}, 30 UPR", _holds(budget, _truth(sharp_true, quantity))
+    size = sizes_of(sharp_read, known)[CircleFigure.CENTRE_DEVIATION]
+    yield "centre deviation", abs(size.um - 1e3 * float(np.hypot(*true.centre_mm))) <= COVERAGE_FACTOR * size.known_um
+
+
+def _of_both(read: PairAnalysis, true: PairAnalysis, known: SetUpKnowledge) -> Iterator[tuple[str, bool]]:
+    truth = {
+        Quantity.G_BOTH: true.g_um,
+        Quantity.G_BOTH_LS: true.g_least_squares_um,
+        Quantity.D: true.d_um,
+        Quantity.H: true.h_um,
+    }
+    for quantity, budget in pair_budgets(read, known).items():
+        yield _row(quantity), _holds(budget, truth[quantity])
+
+
+def _of_look(read: Sequence[CircleAnalysis], machine: SerialMachine) -> Iterator[tuple[str, bool]]:
+    look = quick_look(read)
+    if look is None:
+        return
+    x, y = machine.x, machine.y
+    truth = {
+        (Signature.SQUARENESS, ""): machine.square_um_m,
+        (Signature.SCALE, ""): x.scale_um_m - y.scale_um_m,
+        (Signature.SERVO, ""): x.late_ms - y.late_ms,
+    }
+    for axis, name in ((x, "X"), (y, "Y")):
+        truth |= {
+            (Signature.BACKLASH, f"+{name}"): axis.plus_um,
+            (Signature.BACKLASH, f"-{name}"): axis.minus_um,
+            (Signature.SPIKE, f"+{name}"): axis.spike_plus_um,
+            (Signature.SPIKE, f"-{name}"): axis.spike_minus_um,
+            (Signature.CYCLIC, name): axis.cyclic_um,
+        }
+    for one in look.symptoms:
+        true = truth[one.signature, one.place]
+        if one.value is not None and one.u is not None:
+            yield str(one.signature), abs(one.value - true) <= COVERAGE_FACTOR * one.u
+        elif one.below is not None:
+            yield f"{one.signature}, not seen: below", true <= one.below
+
+
+def _row(quantity: Quantity) -> str:
+    return "centre" if quantity in {Quantity.X, Quantity.Y} else str(quantity)
+
+
+def _truth(true: CircleAnalysis, quantity: Quantity) -> float:
+    return {
+        Quantity.G: true.g_um,
+        Quantity.G_LS: true.g_least_squares_um,
+        Quantity.F_MAX: true.f_centred.largest_um,
+        Quantity.F_MIN: true.f_centred.least_um,
+        Quantity.RADIUS: true.radius_error_um,
+        Quantity.MEAN_RADIAL: true.mean_radial_error_um,
+        Quantity.X: 1e3 * true.centre_mm[0],
+        Quantity.Y: 1e3 * true.centre_mm[1],
+    }[quantity]
+
+
+def _holds(budget: Budget, truth_um: float) -> bool:
+    return budget.u_um is not None and abs(budget.value_um - truth_um) <= COVERAGE_FACTOR * budget.u_um

@@ -10,8 +10,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import cho_solve
 
-from dbbstation.inference.model_comparison import ModelComparison
+from dbbstation.inference.model_comparison import ModelComparison, cholesky
 from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
@@ -131,7 +132,7 @@ class BesideBase:
         of_base = self._taken @ (causes.along[:, used] * size)
         gram = size[:, None] * causes.gram[np.ix_(used, used)] * size - of_base.T @ of_base
         towards = size[:, None] * (causes.samples.T @ targets)[used] - of_base.T @ (self._taken @ (axes.T @ targets))
-        values = np.linalg.solve(gram + np.eye(len(used)), towards)
+        values = cho_solve((cholesky(gram + np.eye(len(used))), True), towards)
         every = np.zeros((len(sd), targets.shape[1]))
         every[used] = size[:, None] * values
         left = np.asarray(targets - causes.samples @ every, dtype=np.float64)

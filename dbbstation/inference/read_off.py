@@ -142,7 +142,7 @@ class _Judge:
         pattern = self._settled.bank.patterns.get(cause.name)
         member = self._members.get(cause.name)
         equal = self._classes.get(cause.name, (cause.name,))
-        probability = self._alternatives.probability(equal)
+        probability = self._settled.averaged(self._alternatives.probability(equal), equal)
         gain, shown = self._beside[cause.name] if member is None else (self._best.log_factor(cause.name), member)
         if member is None:
             # The prior must not say how much could hide.
@@ -189,6 +189,8 @@ class _Judge:
         if member is not None and probability >= SURE:
             faint = f"Its effect is only {sigmas:.2g} standard deviations out."
             return (Verdict.IDENTIFIED, (), "") if sigmas >= OUT else (Verdict.AMBIGUOUS, (), faint)
+        if member is not None and self._alternatives.probability(self._classes[cause.name]) >= SURE:
+            return Verdict.AMBIGUOUS, (), "Noise whose neighbours resemble each other explains it as well."
         if member is None and (why := self._impossible_in_place(cause)):
             return Verdict.RULED_OUT, (), why
         if alike := [name for name, equal in self._classes.items() if cause.name in equal and name != cause.name]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,10 +12,10 @@ from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import Bank, alike, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
 from dbbstation.inference.patterns import patterns
-from dbbstation.inference.seen import IN_TIME, edges_anew, seen
+from dbbstation.inference.seen import MOVED, places_anew, seen
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -47,6 +48,18 @@ NEGATIVE_SIGMA = 3.0
 """Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
 
 
+class Beginning(Enum):
+    """What the noise is measured beside at first.
+
+    Beside everything that a channel has, noise that wanders looks like curves. Beside nothing, what is smooth looks like noise.
+    With long tails from the start, pulses look like outliers. So each is tried, and the most probable outcome is taken.
+    """
+
+    EVERYTHING = "everything"
+    NOTHING = "nothing"
+    NOTHING_LONG_TAILS = "nothing, with long tails"
+
+
 @dataclass(frozen=True, eq=False)
 class Settled:
     """What the comparison came to.
@@ -59,6 +72,9 @@ class Settled:
         comparison: that the posterior came from.
         posterior: over sets of causes.
         refused: laws that would have to be what they cannot be, and why.
+        beginning: what the noise was measured beside at first.
+        log_probability: of the noise and the best hypothesis together, but for what is the same for all of a channel.
+        others: what other beginnings came to, most probable first.
     """
 
     channel: Channel
@@ -68,6 +84,9 @@ class Settled:
     comparison: ModelComparison
     posterior: Posterior
     refused: Mapping[str, str] = field(default_factory=dict)
+    beginning: Beginning = Beginning.EVERYTHING
+    log_probability: float = 0.0
+    others: tuple[Settled, ...] = ()
 
     @property
     def best(self) -> Hypothesis:
@@ -97,6 +116,24 @@ class Settled:
         effect = self.effect()
         return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)
 
+    def averaged(self, probability: float, names: Collection[str]) -> float:
+        """Probability of causes over all beginnings of the noise.
+
+        Args:
+            probability: of at least one of them, from this beginning.
+            names: of them; of effects that were looked for, others of the same family over the same variables count as the same.
+        """
+        if not self.others:
+            return probability
+        kinds = {self.bank.kind_of(name) for name in names}
+        every = [probability]
+        for other in self.others:
+            alike = {cause.name for cause in other.causes if other.bank.kind_of(cause.name) in kinds}
+            every.append(other.posterior.probability(alike | set(names)))
+        weights = np.array([self.log_probability, *(other.log_probability for other in self.others)])
+        weights = np.exp(weights - weights.max())
+        return float(weights @ np.array(every) / weights.sum())
+
     def second_start(self) -> Hypothesis:
         """The most probable hypothesis that a search comes to that begins with nothing."""
         return search(self.comparison, self.causes, (), MOST_EXPANDED).best
@@ -111,9 +148,14 @@ def settle(
     most_looks: int = MOST_LOOKS,
     in_time: bool = True,
     thorough: bool = True,
+    beginnings: Sequence[Beginning] = tuple(Beginning),
+    rivals: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns on a channel.
+
+    The noise is part of what is compared. It is measured beside one of several beginnings, then on what the best hypothesis of that
+    beginning leaves, until neither changes. The most probable outcome is returned, noise included, with the others in it.
 
     Args:
         channel: what is to be explained.
@@ -124,6 +166,8 @@ def settle(
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
         thorough: begin from several places, and look once more beside what a search ends at; False: begin with nothing and search
             once, where a selection is repeated many times and may be somewhat worse.
+        beginnings: of the noise.
+        rivals: let noise of any colour compete; False: it is of first order, measured beside everything, and nothing competes with it.
         progress: called with what is being done.
     """
     options = _Options(
@@ -134,7 +178,23 @@ def settle(
         in_time=in_time,
         thorough=thorough,
     )
-    return _settled(_begun(channel, options), options, progress)
+    if not rivals:
+        return _settled(_begun(channel, options, long_tails=False), options, progress)
+    found = sorted((_from(channel, one, options, progress) for one in beginnings), key=lambda one: -one.log_probability)
+    return replace(found[0], others=tuple(found[1:]))
+
+
+def _from(channel: Channel, beginning: Beginning, options: _Options, progress: Callable[[str], None]) -> Settled:
+    """What the comparison comes to from one beginning."""
+    bank = _begun(channel, options, long_tails=beginning is Beginning.NOTHING_LONG_TAILS)
+    if beginning is Beginning.EVERYTHING:
+        begun = _settled(bank, options, progress)
+        bank.measures_beside_members = True
+        settled = _settled(bank, options, progress, begun.best.members, begun.refused)
+    else:
+        bank.measures_beside_members = True
+        settled = _settled(bank, options, progress)
+    return replace(settled, beginning=beginning, log_probability=_log_probability(bank, settled.best.members))
 
 
 @dataclass(frozen=True)
@@ -152,34 +212,41 @@ def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
     return tuple(patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit))
 
 
-def _begun(channel: Channel, options: _Options) -> Bank:
-    bank = Bank(channel)
+def _begun(channel: Channel, options: _Options, *, long_tails: bool) -> Bank:
+    bank = Bank(channel, long_tails=long_tails)
     if options.static:
         ready = channel.static
         bank.add(static_patterns(channel) if ready is None else ready)
     return bank
 
 
-def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> Settled:
+def _settled(
+    bank: Bank,
+    options: _Options,
+    progress: Callable[[str], None],
+    best: tuple[Member, ...] = (),
+    impossible: Mapping[str, str] | None = None,
+) -> Settled:
     """Look, compare, lay out anew, until nothing changes.
 
     Args:
         bank: of columns; they become more.
         options: of `settle`.
         progress: called with what is being done.
+        best: members to begin with.
+        impossible: laws that cannot be what they would have to be, and why.
     """
     channel, look = bank.channel, options.look
-    best: tuple[Member, ...] = ()
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     laid_out: set[str] = set()
-    refused: dict[str, str] = {}
+    refused: dict[str, str] = dict(impossible or {})
     looked: set[frozenset[str]] = set()
     compared: Settled | None = None  # after the last look
     most_probable = -np.inf
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
     looking = look and not channel.laws
     for number in range(MOST_ROUNDS):
-        bank.measure_noise()
+        bank.measure(best)
         starts: list[tuple[Member, ...]] = []
         if looking:
             best, starts = _looked_about(bank, best, refused, progress, options, first=compared is None)
@@ -199,15 +266,15 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
             laid_out |= {member.cause.name for member in rough}
             _lay_out(bank, beside, posterior.best, rough)
             continue
-        if impossible := _negative(settled):
-            refused |= impossible
+        if negative := _negative(settled):
+            refused |= negative
             continue
         if (
-            stretched := {n for n in posterior.best.names & bank.looked_for if bank.patterns[n].family in IN_TIME}
+            stretched := {n for n in posterior.best.names & bank.looked_for if bank.patterns[n].family in MOVED}
             - laid_out
         ):
             # Their ends were found in more noise than there is now.
-            best = edges_anew(bank, best, stretched)
+            best = places_anew(bank, best, stretched)
             laid_out |= stretched | {member.cause.name for member in best}
             continue
         if not look or (looking and (not options.thorough or posterior.best.names in looked)):
@@ -253,17 +320,19 @@ def _looked(
     for number in range(most_looks):
         known = set(bank.patterns)
         new = bank.add(seen(bank, members, in_time=in_time))
-        noise = bank.measure_noise()
+        noise = bank.measure(members)
         progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
         comparison = bank.beside().comparison(bank.target)
-        more = edges_anew(bank, grown(comparison, bank.but_for(refused), members), set(new))
+        more = places_anew(bank, grown(comparison, bank.but_for(refused), members), set(new))
         fresh = set(bank.patterns) - known
         taken = {member.cause.name for member in more}
         # What is taken in makes the noise less, and less noise lets in more: together they must be more probable than before.
+        if bank.measures_beside_members:
+            bank.measure(more)
         after = _log_probability(bank, more)
         if not taken & fresh or after <= before:
             bank.drop(fresh)
-            bank.measure_noise()
+            bank.measure(members)
             break
         bank.drop(fresh - taken)
         members, before = more, after
@@ -295,7 +364,8 @@ def _looked_about(
 def _log_probability(bank: Bank, members: Sequence[Member]) -> float:
     """Of the noise that there is and members together, but for what is the same for all of a channel."""
     odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
-    return bank.log_likelihood() + bank.beside().comparison(bank.target).log_evidence(members) + odds
+    evidence = bank.beside().comparison(bank.target).log_evidence(members)
+    return bank.log_likelihood() + evidence + bank.tails_beyond(members) + odds
 
 
 def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[Member] = ()) -> tuple[Member, ...]:

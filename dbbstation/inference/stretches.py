@@ -240,7 +240,9 @@ class _Look:
         first, last = (int(edge) for edge in self._windows[int(self._worth(along, self._own).argmax())])
         for _ in range(ENDS_MOVED):
             low, high = self._within(first, last)
-            ends = np.arange(first + SHORTEST, high + 1)
+            if high - low < SHORTEST:
+                return None
+            ends = np.arange(min(first + SHORTEST, high), high + 1)
             last = int(ends[int(self._worth_of(np.full(len(ends), first), ends).argmax())])
             starts = np.arange(low, last - SHORTEST + 1)
             first = int(starts[int(self._worth_of(starts, np.full(len(starts), last)).argmax())])

@@ -108,7 +108,7 @@ def test_the_likelihood_of_uneven_noise_is_that_of_its_covariance(rng):
     found = []
     for spread, level in cases:
         bank = Bank(channel)
-        bank._take(bank.noise.with_innovation(level), spread)
+        bank._take(bank.noise.with_innovation(level), spread, np.ones(rows))
         found.append(bank.log_likelihood())
     wanted = [dense(spread, level) for spread, level in cases]
     assert np.diff(found) == pytest.approx(np.diff(wanted), rel=1e-6)
@@ -117,7 +117,7 @@ def test_the_likelihood_of_uneven_noise_is_that_of_its_covariance(rng):
 @pytest.mark.parametrize("longest", [5, 200])
 def test_sums_of_squares_of_a_stretch_are_those_of_its_whitened_rows(longest):
     """By brute force: ones between zeros, filtered row by row."""
-    noise = Coloured(1.0, 0.6, 0.8)
+    noise = Coloured.first_order(1.0, 0.6, 0.8)
     taps = noise.filter
     found = _squares_of_edges(noise, longest)
     for length in range(1, longest + 1, 13):

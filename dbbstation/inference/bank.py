@@ -289,7 +289,7 @@ class Bank:
         if self.measures_beside_members:
             found = autoregressive(self.noise.unwhitened(left[:, 0], stretches), stretches)
             if share.min() < np.log(HARDLY_TAKEN):
-                found = with_put_back(found, bands.frequency[seen], share[seen])
+                found = with_put_back(found, bands.frequency[seen], share[seen], len(left))
         else:
             raw = bands.log_power - share + self.noise.log_power(bands.frequency) - 2.0 * np.log(self.noise.innovation)
             found = first_order(Bands(bands.frequency[seen], raw[seen], bands.count[seen]))

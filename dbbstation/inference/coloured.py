@@ -323,16 +323,20 @@ def akaike_cost(parameters: int, rows: int) -> float:
     return parameters * rows / max(rows - parameters - 2.0, 1.0)
 
 
-def with_put_back(noise: Coloured, bands: NDArray[np.float64], taken: NDArray[np.float64]) -> Coloured:
-    """The same with what was taken from its spectrum put back.
+def with_put_back(noise: Coloured, bands: NDArray[np.float64], taken: NDArray[np.float64], rows: int) -> Coloured:
+    """The same with what was taken from its spectrum put back, of an order that so many rows can tell.
 
     Args:
         noise: as it was found.
         bands: frequencies [cycles per row], rising, shape (b,).
         taken: log of the share that is left there, shape (b,).
+        rows: that it was found from.
     """
     frequency = np.linspace(0.0, 0.5, FREQUENCIES + 1)
     power = np.exp(noise.log_power(frequency) - np.interp(frequency, bands, taken))
     covariance = np.fft.irfft(power)[: LONGEST + 1]
     variance = float(covariance[0])
-    return Coloured(float(np.sqrt(variance)), partial_autocorrelations(covariance / variance))
+    partials = np.array(partial_autocorrelations(covariance / variance)[: rows // ROWS_PER_ORDER])
+    costs = [akaike_cost(order, rows) for order in range(len(partials) + 1)]
+    gains = np.concatenate([[0.0], np.cumsum(0.5 * rows * np.log1p(-(partials**2)))])
+    return Coloured(float(np.sqrt(variance)), tuple(partials[: int(np.argmin(costs + gains))].tolist()))

@@ -44,6 +44,9 @@ SEEDS = 3
 MOST_GROWN = 40
 """Causes that are taken in one after the other before the search begins, at the most."""
 
+MOST_PLACED = 3
+"""Times that what was looked for is moved to better places in the noise that is left, at the most."""
+
 NEGATIVE_SIGMA = 3.0
 """Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
 
@@ -242,7 +245,7 @@ def _settled(
     refused: dict[str, str] = dict(impossible or {})
     looked: set[frozenset[str]] = set()
     compared: Settled | None = None  # after the last look
-    most_probable = -np.inf
+    most_probable, times_placed = -np.inf, 0
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
     looking = look and not channel.laws
     for number in range(MOST_ROUNDS):
@@ -269,14 +272,15 @@ def _settled(
         if negative := _negative(settled):
             refused |= negative
             continue
-        if (
-            stretched := {n for n in posterior.best.names & bank.looked_for if bank.patterns[n].family in MOVED}
-            - laid_out
-        ):
-            # Their ends were found in more noise than there is now.
-            best = places_anew(bank, best, stretched)
-            laid_out |= stretched | {member.cause.name for member in best}
-            continue
+        placed = {n for n in posterior.best.names & bank.looked_for if bank.patterns[n].family in MOVED}
+        if placed and times_placed < MOST_PLACED:
+            # Places were found in more noise than there is now, and there is less of it beside better ones.
+            times_placed += 1
+            before_placed = {member.cause.name for member in best}
+            best = places_anew(bank, best, placed)
+            if {member.cause.name for member in best} != before_placed:
+                continue
+            times_placed = MOST_PLACED
         if not look or (looking and (not options.thorough or posterior.best.names in looked)):
             break
         if looking:

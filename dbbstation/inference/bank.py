@@ -12,15 +12,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import diags_array
-from scipy.special import gammaln
 from scipy.stats import chi2
 
-from dbbstation.inference.coloured import Bands, Coloured, akaike_cost, autoregressive, bands_of, first_order, with_put_back
+from dbbstation.inference.coloured import (
+    Bands,
+    Coloured,
+    akaike_cost,
+    autoregressive,
+    bands_of,
+    first_order,
+    with_put_back,
+)
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, Family, log_odds
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import compress, solve
+from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable, Sequence
@@ -194,7 +202,9 @@ class Bank:
             innovation = float(np.sqrt(np.sum(left[:, 0] ** 2) / possible))
             before, found = self.noise, self.noise.with_innovation(max(innovation, least))
             spread, grows_with = self._spread_of(left[:, 0])
-            trust, tails = self._trust_of(left[:, 0] / self.trust)
+            trust, tails = self.trust, np.inf
+            if self._long_tails:
+                trust, tails = most_probable_tails(left[:, 0] / self.trust / self.noise.innovation)
             uneven = max(float(np.abs(new / old - 1.0).max(initial=0.0)) for new, old in self._changes(spread, trust))
             if self.channel.time is not None and not white and innovation > least:
                 found = self._colour_of(left, draws, stretches, found)
@@ -229,27 +239,8 @@ class Bank:
         if not np.isfinite(self.tails):
             return 0.0
         left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0] / self.noise.innovation
-        raw, tails = left / self.trust, self.tails
-        height = gammaln(0.5 * (tails + 1.0)) - gammaln(0.5 * tails) - 0.5 * np.log(0.5 * tails)
-        student = height - 0.5 * (tails + 1.0) * np.log1p(raw**2 / tails)
+        student = log_student(left / self.trust, self.tails)
         return float(np.sum(student - np.log(self.trust) + 0.5 * left**2))
-
-    def _trust_of(self, new: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Root of the weight of each row whose innovation this is, and the degrees of freedom of Student's t that fit best."""
-        if not self._long_tails:
-            return self.trust, np.inf
-        squares = np.square(new / self.noise.innovation)
-        best, found = -np.inf, (self.trust, np.inf)
-        for tails in TAILS:
-            scale = 1.0
-            for _ in range(TAIL_ROUNDS):  # expectation and maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]
-                weight = (tails + 1.0) / (tails + squares / scale)
-                scale = float(np.mean(weight * squares))
-            height = gammaln(0.5 * (tails + 1.0)) - gammaln(0.5 * tails) - 0.5 * np.log(0.5 * tails * scale)
-            likely = float(np.sum(height - 0.5 * (tails + 1.0) * np.log1p(squares / scale / tails)))
-            if likely > best:
-                best, found = likely, (np.sqrt((tails + 1.0) / (tails + squares / scale)), tails)
-        return found
 
     def _spread_of(self, left: NDArray[np.float64]) -> tuple[NDArray[np.float64], str]:
         """Spread of each kept row that makes whitened rows most probable: a constant part, those known, and those that grow."""
@@ -264,11 +255,11 @@ class Bank:
         )
         powers = np.square(left * self.spread)
         surely = np.zeros((len(left), 0)) if grows is None else np.square(grows[kept].reshape(len(left), -1))
-        cost, best = _most_probable(powers, even, surely, 0.0)
+        cost, best = most_probable_variance(powers, even, surely, 0.0)
         name = ""
         for candidate, size in follows:
             odds = float(np.log(len(follows)))
-            tried, spread = _most_probable(powers, even, np.column_stack([surely, np.square(size[kept])]), odds)
+            tried, spread = most_probable_variance(powers, even, np.column_stack([surely, np.square(size[kept])]), odds)
             if tried < cost:
                 cost, best, name = tried, spread, candidate
         return np.asarray(np.sqrt(best / np.mean(best))), name
@@ -460,43 +451,11 @@ def amplitudes_of(variant: Variant) -> NDArray[np.int64]:
     return np.searchsorted(variant.whole, variant.columns)
 
 
-def _most_probable(
-    powers: NDArray[np.float64], even: NDArray[np.float64], grows: NDArray[np.float64], odds: float
-) -> tuple[float, NDArray[np.float64]]:
-    """Cost of the variance of each row that makes squares most probable, and that variance [Schwarz 1978].
-
-    Args:
-        powers: squares of rows, shape (m,).
-        even: variance that does not grow, up to a factor, shape (m,).
-        grows: parts that may, shape (m, k).
-        odds: log of the number of candidates that this one is of.
-    """
-    squares = grows / np.maximum(np.mean(grows, axis=0), 1e-300)
-    every = np.array(list(product(GROWN, repeat=squares.shape[1])))
-    costs = []
-    for parts in every:
-        tried = even + squares @ np.square(parts)
-        costs.append(0.5 * np.sum(np.log(tried)) + 0.5 * len(powers) * np.log(np.mean(powers / tried)))
-    parameters = np.count_nonzero(every, axis=1)
-    priced = np.array(costs) + 0.5 * np.log(len(powers)) * parameters + odds
-    k = int(np.argmin(priced))
-    return float(priced[k]), even + squares @ np.square(every[k])
-
-
 def alike(one: Coloured, other: Coloured) -> bool:
     """Whether two noises are the same for anything that is compared: their spectra are."""
     frequency = np.linspace(0.0, 0.5, ALIKE_AT)
     return float(np.abs(one.log_power(frequency) - other.log_power(frequency)).mean()) < 2.0 * SETTLED
 
-
-GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
-"""Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
-
-TAILS = (2.5, 3.0, 4.0, 6.0, 10.0)
-"""Degrees of freedom of Student's t that are tried."""
-
-TAIL_ROUNDS = 12
-"""Times that weights and scale are settled against each other."""
 
 HARDLY_TAKEN = 0.95
 """Share of the noise that columns leave of each frequency from which on nothing is put back."""

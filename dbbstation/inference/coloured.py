@@ -257,9 +257,10 @@ def bands_of(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Bands | N
 
 
 def autoregressive(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Coloured:
-    """Noise of which rows are most probably made: forward and backward predictions err least [Burg's method; Percival and Walden,
-    Spectral Analysis for Physical Applications, 1993, sec. 9.5], of an order by Akaike's criterion for few rows [Hurvich and Tsai,
-    Biometrika 76 (1989) 297].
+    """Noise of which rows are made, by predictions that err least forward and backward.
+
+    [Burg's method; Percival and Walden, Spectral Analysis for Physical Applications, 1993, sec. 9.5]. The order is by Akaike's
+    criterion for few rows [Hurvich and Tsai, Biometrika 76 (1989) 297].
 
     Args:
         rows: shape (n,).

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.channel import Channel
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
 
 FOLDS = 10
 """Stretches of rows that are held back in turn, where there are not enough blocks."""

@@ -164,8 +164,9 @@ def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: f
         size: as of `looked_for`.
     """
     (variable,), form = pattern.variables, pattern.form
+    if form is None:
+        return pattern
     values = variable.values[kept]
-    assert form is not None
     for finer in CLOSER:
         near = _moved(form, finer, variable.extent)
         explained = [_explained_by(left, left.whitened(one.columns(values)), size) for one in near]

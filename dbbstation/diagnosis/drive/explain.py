@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.channel import DriveChannel
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.recordings import Recordings
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
 
 MOST_ROUNDS = 6
 """Times that something impossible is refused and all is compared again."""

@@ -10,10 +10,11 @@ import numpy as np
 
 from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.noise import noise_of
 from dbbstation.inference.patterns import Family, covers_turns, turn
 from dbbstation.inference.read_off import OUT, read_off
-from dbbstation.inference.noise import noise_of
-from dbbstation.inference.settle import Beginning, settle, static_patterns
+from dbbstation.inference.settle import settle, static_patterns
+from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import compress, solve, with_random
 from dbbstation.inference.verdict import Value, Verdict
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.read_off import Finding
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
     from dbbstation.texts import Texts
 
 FOLD_ROWS = 3000

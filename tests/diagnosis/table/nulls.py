@@ -1,8 +1,9 @@
-"""Tables in which nothing is missing, under eight kinds of noise: what is named in them is false.
+"""Tables under eight kinds of noise in which nothing is missing, or one effect: what is named in the first is false.
 
-    python -m tests.diagnosis.table.nulls --count 60 --seed 1 [--kinds walk,jitter] [--out nulls.csv]
+    python -m tests.diagnosis.table.nulls --count 60 --seed 1 --out nulls.csv [--kinds walk,jitter] [--sizes 0.5,1,3]
 
-Rows of a table file that is there are not run again: a study that was interrupted goes on where it stopped.
+Sizes are root mean squares of an effect over that of the noise; with them each table has one of `EFFECTS`. Rows of a file that is
+there are not run again: a study that was interrupted goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -62,7 +63,9 @@ def moving(rng: np.random.Generator, rows: int) -> Moving:
     def sines(cycles: tuple[float, float], count: int) -> NDArray[np.float64]:
         total = np.zeros(rows)
         for _ in range(count):
-            total += rng.uniform(0.4, 1.0) * np.sin(2.0 * np.pi * rng.uniform(*cycles) * t / span + rng.uniform(0.0, 6.3))
+            total += rng.uniform(0.4, 1.0) * np.sin(
+                2.0 * np.pi * rng.uniform(*cycles) * t / span + rng.uniform(0.0, 6.3)
+            )
         return total
 
     place = 40.0 * sines((3.0, 9.0), 2)
@@ -130,14 +133,48 @@ DIGITS = 4
 """Of a recorded value [mm]: a two-hundredth of the noise."""
 
 
-def null_table(kind: str, seed: int) -> Table:
-    """Return a table whose measured value differs from the simulated one by noise and a constant only."""
+def _linear(axis: Moving) -> NDArray[np.float64]:
+    return axis.oil
+
+
+def _hysteresis(axis: Moving) -> NDArray[np.float64]:
+    return np.sign(np.gradient(axis.place))
+
+
+def _twice(axis: Moving) -> NDArray[np.float64]:
+    return np.cos(np.radians(2.0 * axis.angle) + 0.7)
+
+
+def _product(axis: Moving) -> NDArray[np.float64]:
+    return axis.place * axis.load
+
+
+def _pulse(axis: Moving) -> NDArray[np.float64]:
+    rows = len(axis.t)
+    return ((np.arange(rows) >= 0.4 * rows) & (np.arange(rows) < 0.5 * rows)).astype(np.float64)
+
+
+EFFECTS: dict[str, tuple[Callable[[Moving], NDArray[np.float64]], tuple[str, ...]]] = {
+    "linear": (_linear, ("oil_temp_c",)),
+    "hysteresis": (_hysteresis, ("hysteresis of place_mm", "hysteresis of simulated_mm")),
+    "twice": (_twice, ("twice per turn of screw_deg",)),
+    "product": (_product, ("product of place_mm and load_n", "product of load_n and simulated_mm")),
+    "pulse": (_pulse, ("pulses", "curve over t_s")),
+}
+"""What a table may lack, and how a right name of it begins or what it has in it."""
+
+
+def null_table(kind: str, seed: int, effect: str = "", size: float = 0.0) -> Table:
+    """Return a table whose measured value differs from the simulated one by noise, a constant, and an effect if one is named."""
     rng = np.random.default_rng([seed, list(NOISES).index(kind)])
     rows = int(rng.integers(300, 1001))
     axis = moving(rng, rows)
     noise = NOISES[kind](rng, axis)
     simulated = axis.place + 0.01 * axis.load
     measured = simulated + 0.02 * noise / np.std(noise) + rng.normal(0.0, 0.05)
+    if effect:
+        missing = EFFECTS[effect][0](axis)
+        measured = measured + 0.02 * size * (missing - missing.mean()) / np.std(missing)
     return table_of(axis, np.round(measured, DIGITS), np.round(simulated, DIGITS))
 
 
@@ -165,15 +202,16 @@ def table_of(axis: Moving, measured: NDArray[np.float64], simulated: NDArray[np.
     )
 
 
-def named_in(kind: str, seed: int) -> tuple[list[str], float]:
-    """Names that are called identified in a table without any, and the processor time [s]."""
+def named_in(kind: str, seed: int, effect: str = "", size: float = 0.0) -> tuple[list[str], float]:
+    """Names that are called identified in a table, and the processor time [s]."""
     began = time.process_time()
-    table = null_table(kind, seed)
-    try:
-        names = [finding.name for finding in find_mismatch(table, hold_out=False).there]
-    except (ArithmeticError, ValueError, IndexError) as error:
-        names = [f"{type(error).__name__}: {error}"]
-    return names, time.process_time() - began
+    table = null_table(kind, seed, effect, size)
+    return [one.name for one in find_mismatch(table, hold_out=False).there], time.process_time() - began
+
+
+def is_right(name: str, effect: str) -> bool:
+    """Whether a name is one of an effect."""
+    return bool(effect) and any(own in name for own in EFFECTS[effect][1])
 
 
 def main() -> None:
@@ -182,14 +220,21 @@ def main() -> None:
     options.add_argument("--count", type=int, default=60)
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--kinds", default=",".join(NOISES))
+    options.add_argument("--sizes", default="0")
     options.add_argument("--out", type=Path, required=True)
     options.add_argument("--workers", type=int, default=os.cpu_count())
     chosen = options.parse_args()
     if not chosen.out.exists():
-        chosen.out.write_text("kind,seed,names,seconds\n", encoding="utf-8")
+        chosen.out.write_text("kind,seed,effect,size,names,seconds\n", encoding="utf-8")
+    wanted = [
+        (kind, chosen.seed * 1000 + k, effect, size)
+        for k in range(chosen.count)
+        for kind in chosen.kinds.split(",")
+        for size in map(float, chosen.sizes.split(","))
+        for effect in (EFFECTS if size else ("",))
+    ]
     with chosen.out.open(encoding="utf-8", newline="") as file:
-        known = {(row["kind"], int(row["seed"])) for row in csv.DictReader(file)}
-    wanted = [(kind, chosen.seed * 1000 + k) for k in range(chosen.count) for kind in chosen.kinds.split(",")]
+        known = {(r["kind"], int(r["seed"]), r["effect"], float(r["size"])) for r in csv.DictReader(file)}
     with ProcessPoolExecutor(chosen.workers) as pool:
         running = {pool.submit(named_in, *one): one for one in wanted if one not in known}
         for done in as_completed(running):
@@ -198,10 +243,15 @@ def main() -> None:
                 csv.writer(file).writerow([*running[done], "; ".join(names), f"{seconds:.1f}"])
     with chosen.out.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    for kind in NOISES:
-        own = [row for row in rows if row["kind"] == kind]
-        false = [row["names"].split("; ") for row in own if row["names"]]
-        print(f"{kind:12} {len(own):4} tables, {len(false):3} with a false name, {sum(map(len, false)):4} names")  # noqa: T201
+    for kind, size in sorted({(row["kind"], row["size"]) for row in rows}, key=lambda one: (one[1], one[0])):
+        own = [row for row in rows if (row["kind"], row["size"]) == (kind, size)]
+        named = [([n for n in row["names"].split("; ") if n], row["effect"]) for row in own]
+        right = sum(any(is_right(name, effect) for name in names) for names, effect in named)
+        false = [[name for name in names if not is_right(name, effect)] for names, effect in named]
+        print(  # noqa: T201
+            f"{kind:12} size {float(size):3g}: {len(own):4} tables, {right:4} with the right name, "
+            f"{sum(map(bool, false)):3} with a false one, {sum(map(len, false)):4} false names"
+        )
     print(f"largest time {max((float(row['seconds']) for row in rows), default=0.0):.0f} s")  # noqa: T201
 
 

@@ -73,13 +73,13 @@ class Bank:
         trust: root of the weight that what is new in each kept row has, shape (m,); ones unless the noise has long tails.
         tails: degrees of freedom of Student's t that what is new follows; infinite where it is Gaussian.
         measures_beside_members: whether `measure` asks what a hypothesis leaves, not what everything does.
+        long_tails: whether what is new in a row may follow Student's t.
         grows_with: what the variance grows with; empty where it is the same in all rows.
     """
 
-    def __init__(self, channel: Channel, *, long_tails: bool = False) -> None:
+    def __init__(self, channel: Channel) -> None:
         self.channel = channel
-        self.measures_beside_members = False
-        self._long_tails = long_tails
+        self.measures_beside_members, self.long_tails = False, False
         self.patterns: dict[str, Pattern] = {}
         self.laws: dict[str, Law] = {law.name: law for law in channel.laws}
         self.noise = Coloured(channel.size)
@@ -203,7 +203,7 @@ class Bank:
             before, found = self.noise, self.noise.with_innovation(max(innovation, least))
             spread, grows_with = self._spread_of(left[:, 0])
             trust, tails = self.trust, np.inf
-            if self._long_tails:
+            if self.long_tails:
                 trust, tails = most_probable_tails(left[:, 0] / self.trust / self.noise.innovation)
             uneven = max(float(np.abs(new / old - 1.0).max(initial=0.0)) for new, old in self._changes(spread, trust))
             if self.channel.time is not None and not white and innovation > least:

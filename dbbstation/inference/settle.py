@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -86,21 +87,37 @@ def settle(
         thorough=thorough,
     )
     if not rivals:
-        return _settled(_begun(channel, options, long_tails=False), options, progress)
-    found = sorted((_from(channel, one, options, progress) for one in beginnings), key=lambda one: -one.log_probability)
+        return _settled(_begun(channel, options), options, progress)
+    found: list[Settled] = []
+    if beside_all := [one for one in beginnings if one not in BESIDE_NOTHING]:
+        # What stands beside everything is worked out once, and gone on with under each kind of noise.
+        bank = _begun(channel, options)
+        begun = _settled(bank, options, progress)
+        found += [
+            _from(*deepcopy((bank, begun.best.members)), begun.refused, one, options, progress) for one in beside_all
+        ]
+    found += [
+        _from(_begun(channel, options), (), {}, one, options, progress) for one in beginnings if one in BESIDE_NOTHING
+    ]
+    found.sort(key=lambda one: -one.log_probability)
     return replace(found[0], others=tuple(found[1:]))
 
 
-def _from(channel: Channel, beginning: Beginning, options: _Options, progress: Callable[[str], None]) -> Settled:
-    """What the comparison comes to from one beginning."""
-    bank = _begun(channel, options, long_tails=beginning is Beginning.NOTHING_LONG_TAILS)
-    if beginning is Beginning.EVERYTHING:
-        begun = _settled(bank, options, progress)
-        bank.measures_beside_members = True
-        settled = _settled(bank, options, progress, begun.best.members, begun.refused)
-    else:
-        bank.measures_beside_members = True
-        settled = _settled(bank, options, progress)
+BESIDE_NOTHING = (Beginning.NOTHING, Beginning.NOTHING_LONG_TAILS)
+LONG_TAILS = (Beginning.EVERYTHING_LONG_TAILS, Beginning.NOTHING_LONG_TAILS)
+
+
+def _from(
+    bank: Bank,
+    members: tuple[Member, ...],
+    refused: Mapping[str, str],
+    beginning: Beginning,
+    options: _Options,
+    progress: Callable[[str], None],
+) -> Settled:
+    """What the comparison comes to from members whose noise is measured beside them."""
+    bank.measures_beside_members, bank.long_tails = True, beginning in LONG_TAILS
+    settled = _settled(bank, options, progress, members, refused)
     return replace(settled, beginning=beginning, log_probability=_log_probability(bank, settled.best.members))
 
 
@@ -119,8 +136,8 @@ def static_patterns(channel: Channel) -> tuple[Pattern, ...]:
     return tuple(patterns(channel.variables, channel.blocks, channel.time, channel.simulated, channel.time_unit))
 
 
-def _begun(channel: Channel, options: _Options, *, long_tails: bool) -> Bank:
-    bank = Bank(channel, long_tails=long_tails)
+def _begun(channel: Channel, options: _Options) -> Bank:
+    bank = Bank(channel)
     if options.static:
         ready = channel.static
         bank.add(static_patterns(channel) if ready is None else ready)

@@ -33,6 +33,7 @@ class Beginning(Enum):
     """
 
     EVERYTHING = "everything"
+    EVERYTHING_LONG_TAILS = "everything, then with long tails"
     NOTHING = "nothing"
     NOTHING_LONG_TAILS = "nothing, with long tails"
 

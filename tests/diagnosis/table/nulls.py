@@ -170,7 +170,7 @@ def null_table(kind: str, seed: int, effect: str = "", size: float = 0.0) -> Tab
     rows = int(rng.integers(300, 1001))
     axis = moving(rng, rows)
     noise = NOISES[kind](rng, axis)
-    simulated = axis.place + 0.01 * axis.load
+    simulated = axis.place + 0.1 * axis.load
     measured = simulated + 0.02 * noise / np.std(noise) + rng.normal(0.0, 0.05)
     if effect:
         missing = EFFECTS[effect][0](axis)

@@ -120,7 +120,7 @@ def test_a_direction_without_a_circle_leaves_a_row_of_its_own(session):
     outcome = call("circles", session, "--findings", "--budget")
     assert outcome.code == 0, outcome.err
     row = next(line.split() for line in outcome.out.splitlines() if line.startswith("a") and " cw " in line)
-    assert row == ["a", "cw", "2", *["-"] * 13]
+    assert row == ["a", "cw", "2", *["-"] * 15]
 
 
 def test_half_a_surrogate_pair_is_no_character(tmp_path):

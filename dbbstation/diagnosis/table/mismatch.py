@@ -158,8 +158,9 @@ def find_mismatch(
         CalibrationError: the difference is so much larger than its noise that rounding hides what it follows.
     """
     try:
-        return _found(table, sources, lacking or {}, progress, hold_out=hold_out)
-    except np.linalg.LinAlgError as error:
+        with np.errstate(over="raise"):
+            return _found(table, sources, lacking or {}, progress, hold_out=hold_out)
+    except (np.linalg.LinAlgError, FloatingPointError) as error:
         what = "the difference is so much larger than its noise that rounding hides what it follows"
         remedy = "check that measured and simulated values are of one quantity in one unit"
         raise CalibrationError(

@@ -68,6 +68,7 @@ def circle_toolpath(
     first, last = circle.poses(_ends_deg(circle), circle.feed_in_mm)
     path = ToolpathBuilder(name)
     path.corner_mm = max(LEAST_CORNER_MM, chord_error_mm(circle, step_deg))
+    path.guard = ()
     if approach is not None:
         path.rapid(_raised(first, approach.clear_mm))
     path.feed(first[None], circle.feed_mm_min)

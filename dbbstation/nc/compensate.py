@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -233,17 +232,7 @@ def _assembled(toolpath: Toolpath, pieces: _Pieces, commanded: NDArray[np.float6
     last = np.append(pieces.row[1:] != pieces.row[:-1], True)
     written = last | (toolpath.kind[pieces.row] == Step.FEED)
     row = pieces.row[written]
-    place = {int(old): new for new, old in enumerate(row) if int(old) in toolpath.text}
-    bare = replace(
-        toolpath,
-        kind=toolpath.kind[row],
-        poses=rounded(commanded[written]),
-        feed_mm_min=toolpath.feed_mm_min[row],
-        feed_deg_min=toolpath.feed_deg_min[row],
-        dwell_s=toolpath.dwell_s[row],
-        line=toolpath.line[row],
-        text=MappingProxyType({place[old]: text for old, text in toolpath.text.items()}),
-    )
+    bare = toolpath.divided(row, rounded(commanded[written]))
     share = (pieces.end - pieces.begin)[written]
     feed = _feeds(bare, toolpath.feed[row], share * toolpath.tip_mm[row], share * toolpath.duration_s[row])
     # A wanted move that takes no time at all, as a turn with a few nanometres of way, has no such feed: the machine's own

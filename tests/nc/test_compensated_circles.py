@@ -93,4 +93,4 @@ def test_nominal_and_compensated_programs_differ_in_numbers_only(linuxcnc, all_r
     np.testing.assert_array_equal(done.feed_mm_min, path.feed_mm_min)
     assert done.text == path.text
     assert abs(done.end_s[-1] - path.end_s[-1]) < 0.02
-    assert linuxcnc.write(done).splitlines()[1] == "G64 P0.0001 Q0"
+    assert "G64 P0.0001 Q0" in linuxcnc.write(done).splitlines()

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274 import codes
 from dbbstation.nc.rs274.codes import Group
-from dbbstation.nc.rs274.tokens import BadLine, Place, Word, tokens
+from dbbstation.nc.rs274.guard import guard_at
+from dbbstation.nc.rs274.tokens import BadLine, Comment, Place, Word, tokens
 
 BLANKS = " \t\r"
 
@@ -30,13 +31,17 @@ class Block:
         place: file and line.
         words: those that are no code, by letter.
         codes: G and M codes by their group.
-        comments: texts of its comments.
+        comments: texts of its comments, of which nothing takes notice.
+        message: a comment that LinuxCNC acts on, to the letter; empty where there is none.
+        guard: work systems that a guard names which begins in this line; None where none begins.
     """
 
     place: Place
     words: dict[str, Word] = field(default_factory=dict)
     codes: dict[Group, Word] = field(default_factory=dict)
     comments: list[str] = field(default_factory=list)
+    message: str = ""
+    guard: tuple[str, ...] | None = None
 
     def code(self, group: Group) -> float | None:
         """Number of the code of a group, None where the line has none."""
@@ -49,10 +54,18 @@ def blocks(text: str, file: str, faults: list[Problem]) -> list[Block]:
     lines = text.split("\n")
     percent, first = _opening(lines)
     found: list[Block] = []
+    behind_guard = first
     for number, line in enumerate(lines[first:], first + 1):
+        if number <= behind_guard:
+            continue
         if percent and _is_percent(line):
             return found
         place = Place(file, number)
+        guard = guard_at(lines[number - 1 :]) if "o" in line or "O" in line else None
+        if guard is not None:
+            found.append(Block(place, guard=guard[0]))
+            behind_guard = number - 1 + guard[1]
+            continue
         try:
             block = _block(_one_line(line, place), place)
         except BadLine as fault:
@@ -109,8 +122,8 @@ def _one_line(line: str, place: Place) -> str:
 def _block(line: str, place: Place) -> Block:
     block = Block(place)
     for token in tokens(line, place):
-        if isinstance(token, str):
-            block.comments.append(token)
+        if isinstance(token, Comment):
+            _take_comment(block, token)
         elif token.letter in "GM":
             _take_code(block, token)
         elif token.letter not in codes.LETTERS:
@@ -124,6 +137,27 @@ def _block(line: str, place: Place) -> Block:
         else:
             block.words[token.letter] = token
     return block
+
+
+_ACTIVE = re.compile(r"(?:msg|debug|print|log|logopen|logappend|probeopen|abort),|(?:logclose|probeclose)", re.IGNORECASE)
+"""Begins of comments that LinuxCNC acts on."""
+
+_PYTHON = re.compile(r"py,|pyrun,|pyreload", re.IGNORECASE)
+
+
+def _take_comment(block: Block, comment: Comment) -> None:
+    """Add a comment. Of several in brackets LinuxCNC looks at the last one only [measured with rs274 2.9]."""
+    text = comment.text.lstrip(BLANKS)
+    if _PYTHON.match(text):
+        what = "a comment that runs Python in the control, which may move it"
+        raise block.place.fault(comment.column, what, "post the program without it")
+    if comment.bracketed and block.message:
+        block.comments.append(block.message.rstrip(BLANKS))
+        block.message = ""
+    if comment.bracketed and _ACTIVE.match(text):
+        block.message = text
+    else:
+        block.comments.append(text.rstrip(BLANKS))
 
 
 def _take_code(block: Block, word: Word) -> None:

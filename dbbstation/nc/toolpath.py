@@ -96,6 +96,8 @@ class Toolpath:
         ending: how the program ends.
         numbers: line numbers of the first and the last line that have one; a compensated program carries its checksum
             there.
+        arc: of rows that are chords of an arc: X and Y of its centre [mm] and the angle that the chord spans [rad],
+            counter-clockwise positive, shape (n, 3); the angle is 0 in straight rows. None: there are no arcs.
     """
 
     name: str
@@ -113,6 +115,7 @@ class Toolpath:
     guard: tuple[str, ...] | None = None
     ending: Ending = Ending.STOP
     numbers: tuple[int, ...] = ()
+    arc: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -129,7 +132,8 @@ class Toolpath:
         A text goes with the last piece of its row, and so does an exact stop.
 
         Args:
-            row: of each piece, each row at least once, rising, shape (k,).
+            row: that each piece ends in, rising, shape (k,); rows that a piece goes through to the end of a later one are
+                missing, and have no text.
             poses: after each piece, shape (k, 6) [mm, deg].
         """
         last = np.append(row[1:] != row[:-1], True)[: len(row)]
@@ -147,6 +151,7 @@ class Toolpath:
             system=self.system[row],
             frame=self.frame[row],
             text=MappingProxyType({place[old]: text for old, text in self.text.items()}),
+            arc=None,
         )
 
     @property
@@ -203,10 +208,17 @@ class Toolpath:
         return self._interpolated(time_s, self.end_s)
 
     def between(self, row: NDArray[np.int64], share: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Poses within rows, shape (k, 6): `share` 0 before the row, 1 after it, both of shape (k,)."""
+        """Poses within rows, shape (k, 6): `share` 0 before the row, 1 after it, both of shape (k,).
+
+        In chords of an arc they lie on the arc.
+        """
         before, after = self.before[row], self.poses[row]
+        inside = before + share[:, None] * (after - before)
+        if self.arc is not None:
+            chord = np.flatnonzero(self.arc[row, 2] != 0.0)
+            inside[chord, :2] = _on_arc(before[chord, :2], after[chord, :2], self.arc[row[chord]], share[chord])
         # The end of a row is its programmed pose to the last bit.
-        return np.where(share[:, None] == 1.0, after, before + share[:, None] * (after - before))
+        return np.where(share[:, None] == 1.0, after, inside)
 
     def subdivided(self, step_mm: float, step_deg: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Rows and shares, shapes (k,), that pass through all moves in pieces no longer than these steps."""
@@ -228,6 +240,7 @@ class Toolpath:
 
 
 _NO_FEED = (np.nan, np.nan)
+_STRAIGHT = (0.0, 0.0, 0.0)
 
 
 class _Rows(NamedTuple):
@@ -241,6 +254,7 @@ class _Rows(NamedTuple):
     corner_mm: float
     system: int
     frame: NDArray[np.int8]
+    arc: tuple[float, float, float]
 
 
 class ToolpathBuilder:
@@ -299,6 +313,7 @@ class ToolpathBuilder:
         line: int = 0,
         named: Sequence[int] = range(6),
         system: int | None = None,
+        arc: tuple[float, float, float] = _STRAIGHT,
     ) -> None:
         """Add moves at a feed.
 
@@ -309,9 +324,11 @@ class ToolpathBuilder:
             line: of the program.
             named: axes that the line names, 0 to 5; the others stay where they are.
             system: in which the numbers of these moves count; None: as those before them.
+            arc: that the moves are chords of, as a row of `Toolpath.arc`.
         """
         self._named(named, system)
-        self._add(Step.FEED, poses, (mm_min, mm_min if deg_min is None else deg_min), line=line, system=system)
+        feed = (mm_min, mm_min if deg_min is None else deg_min)
+        self._add(Step.FEED, poses, feed, line=line, system=system, arc=arc)
 
     def dwell(self, seconds: float, *, line: int = 0) -> None:
         """Add a stop of known duration."""
@@ -362,6 +379,7 @@ class ToolpathBuilder:
             guard=self.guard,
             ending=self.ending,
             numbers=self.numbers,
+            arc=each([rows.arc for rows in self._rows], np.float64).reshape(-1, 3),
         )
 
     def __len__(self) -> int:
@@ -389,13 +407,30 @@ class ToolpathBuilder:
         dwell_s: float = 0.0,
         line: int,
         system: int | None = None,
+        arc: tuple[float, float, float] = _STRAIGHT,
     ) -> None:
         corner_mm = np.nan if self.corner_mm is None else self.corner_mm
         poses = np.array(poses, dtype=np.float64)
         counted = self.system if system is None else system
-        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, counted, self._frame))
+        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, counted, self._frame, arc))
         self._count += len(poses)
         self._pose = poses[-1]
+
+
+def _on_arc(
+    before: NDArray[np.float64],
+    after: NDArray[np.float64],
+    arc: NDArray[np.float64],
+    share: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """X and Y at shares of chords, shape (k, 2), turned about the centre; of a spiral the radius changes evenly [mm]."""
+    centre, turned = arc[:, :2], share * arc[:, 2]
+    first, last = before - centre, after - centre
+    radius = np.linalg.norm(first, axis=1)
+    scale = 1.0 + share * (np.linalg.norm(last, axis=1) / radius - 1.0)
+    cos, sin = scale * np.cos(turned), scale * np.sin(turned)
+    x, y = first.T
+    return centre + np.column_stack([cos * x - sin * y, sin * x + cos * y])
 
 
 def in_pieces(pieces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -18,13 +18,15 @@ from tests.plant.session import record
 FIXTURES = shipped_folder("fixtures")
 STORED = {
     "dbb-machine/1": FIXTURES / "machines" / "reference.yaml",
-    "dbb-machine/2": FIXTURES / "machines" / "every-key.yaml",
+    "dbb-machine/2": FIXTURES / "machines" / "greatest-feed.yaml",
+    "dbb-machine/3": FIXTURES / "machines" / "every-key.yaml",
     "dbb-jig/1": FIXTURES / "jigs" / "reference-plate.yaml",
     "dbb-plan/1": shipped_folder("protocols") / "plans" / "table2.yaml",
     "dbb-plan/2": FIXTURES / "plans" / "every-key.yaml",
     "dbb-model/1": FIXTURES / "models" / "small.yaml",
     "dbb-model/2": FIXTURES / "models" / "greatest-feed.yaml",
     "dbb-model/3": FIXTURES / "models" / "provenance.yaml",
+    "dbb-model/4": FIXTURES / "models" / "acceleration.yaml",
     "dbb-settings/1": FIXTURES / "settings" / "version-1.yaml",
     "dbb-settings/2": FIXTURES / "settings" / "every-key.yaml",
     "dbb-bar/1": FIXTURES / "bars" / "zerodur.yaml",

@@ -151,6 +151,9 @@ def make_models(folder: Path) -> None:
     write_model(folder / "greatest-feed.yaml", model, force=True)
     origin = Provenance("dbbstation 0.1.0", "dbbstation calibrate small", {"small/session.yaml": session.sha256})
     write_model(folder / "provenance.yaml", model, provenance=origin, force=True)
+    planned = replace(faster, acceleration_mm_s2=1500.0)
+    model = replace(model, model=MachineModel(planned, fitted))
+    write_model(folder / "acceleration.yaml", model, provenance=origin, force=True)
 
 
 if __name__ == "__main__":

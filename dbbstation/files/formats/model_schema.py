@@ -1,4 +1,4 @@
-"""`dbb-model/3`, which has all of `dbb-model/1` and `/2`: an identified machine model with the uncertainty and provenance of its numbers."""
+"""`dbb-model/4`, which has all of `dbb-model/1`, `/2` and `/3`: an identified machine model with the uncertainty and provenance of its numbers."""
 
 from typing import Annotated, Any, Literal
 
@@ -60,7 +60,7 @@ class ModelFile(Schema):
     Every key but `provenance` is required, empty where there is nothing to say, so that a file that was cut short is noticed.
     """
 
-    format: Literal["dbb-model/1", "dbb-model/2", "dbb-model/3"]
+    format: Literal["dbb-model/1", "dbb-model/2", "dbb-model/3", "dbb-model/4"]
     """Name and version of this format."""
     machine: MachineParts
     """The nominal machine, as in a `dbb-machine/1` file."""

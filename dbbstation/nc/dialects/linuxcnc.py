@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dbbstation.nc.dialect import plain
+from dbbstation.nc.planner import LookAhead
 from dbbstation.nc.rs274.guard import guard_lines
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import Ending
@@ -40,6 +41,7 @@ class LinuxCNC(WordDialect):
     name = "linuxcnc"
     extension = ".ngc"
     what = "LinuxCNC (RS274/NGC)"
+    look_ahead = LookAhead(share=0.5)
 
     def read(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
         """Return what a program commands."""

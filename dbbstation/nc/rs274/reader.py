@@ -230,9 +230,13 @@ class _Interpreter:
             self.path.rapid(target, line=block.place.line, named=axes, system=system)
         else:
             self._check_feed(block, _first_column(block))
-            poses = target[None] if self._motion == LINEAR else self._chords(block, target)
             speed, line = self._speed, block.place.line
-            self.path.feed(poses, speed.mm_min, speed.deg_min, line=line, named=axes, system=system)
+            if self._motion == LINEAR:
+                self.path.feed(target[None], speed.mm_min, speed.deg_min, line=line, named=axes, system=system)
+            else:
+                arc = self._chords(block, target)
+                poses, chord = arc.poses(), arc.chord
+                self.path.feed(poses, speed.mm_min, speed.deg_min, line=line, named=axes, system=system, arc=chord)
         for letter in named:
             del block.words[letter]
         self._pose = target
@@ -269,11 +273,11 @@ class _Interpreter:
             raise block.place.fault(_first_column(block), what, "check its numbers, and G91 and G20 before it")
         return np.array(target)
 
-    def _chords(self, block: Block, target: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _chords(self, block: Block, target: NDArray[np.float64]) -> Arc:
         arc = self._arc(block, target)
         if len(self.path) + arc.chords > MOST_ROWS:
             raise _too_long(block)
-        return arc.poses()
+        return arc
 
     def _arc(self, block: Block, target: NDArray[np.float64]) -> Arc:
         clockwise = self._motion == CLOCKWISE

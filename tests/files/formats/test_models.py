@@ -161,7 +161,7 @@ def test_a_model_that_could_not_be_read_back_is_not_written(tmp_path: Path, refe
         ('[struts, "", strut_2_mm]', '[struts, "", strut_9_mm]', "the covariance row `struts strut_9_mm` names no parameter"),
         ("abababab", "abab", "sessions.2026-11-20: string should match pattern"),
         ("value: ", "value: .nan #", "not YAML"),
-        ("format: dbb-model/1", "format: dbb-machine/1", "this file is a machine (`dbb-machine/1`), a model (`dbb-model/3`)"),
+        ("format: dbb-model/1", "format: dbb-machine/1", "this file is a machine (`dbb-machine/1`), a model (`dbb-model/4`)"),
     ],
 )  # fmt: skip
 def test_tampering_is_refused(tmp_path: Path, reference, old: str, new: str, said: str) -> None:

@@ -54,7 +54,9 @@ def prepare():
     block = (HERE / "start.txt").read_text()
     command.mdi("G21 G90 G0 " + block)
     wanted = [float(word[1:]) for word in block.split()]
-    until(lambda: idle() and max(abs(a - b) for a, b in zip(status.actual_position, wanted)) < 1e-5, "going to the start")
+    until(
+        lambda: idle() and max(abs(a - b) for a, b in zip(status.actual_position, wanted)) < 1e-5, "going to the start"
+    )
 
 
 def run():

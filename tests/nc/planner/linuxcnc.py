@@ -107,7 +107,9 @@ def _configure(folder: Path, mm_s2: float, faster: int) -> None:
             f"MIN_LIMIT = -9999\nMAX_LIMIT = 9999\nMAX_VELOCITY = {limits[unit + '_s']}\n"
             f"MAX_ACCELERATION = {limits[unit + '_s2']}\n"
         )
-        homed = "HOME = 0\nHOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 0\nHOME_SEQUENCE = 0\nFERROR = 9999\nMIN_FERROR = 9999\n"
+        homed = (
+            "HOME = 0\nHOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 0\nHOME_SEQUENCE = 0\nFERROR = 9999\nMIN_FERROR = 9999\n"
+        )
         ini.append(f"[AXIS_{axis}]\n{both}[JOINT_{joint}]\nTYPE = {kind}\n{both}{homed}")
     (folder / "planner.ini").write_text("".join(ini))
     (folder / "planner.tbl").write_text("T1 P1 D0.1 Z0\n")

@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.nc.curve import Curve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
-from dbbstation.nc.planner import KEPT, LOOKS_AHEAD
+from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, cuts
 from dbbstation.nc.splitting import SHORTEST_MM, looked_at, moves_of, rows_as_pieces, split
 from dbbstation.nc.toolpath import Step, rounded
 
@@ -132,7 +132,8 @@ def compensate_toolpath(
     shift_mm = felt_mm(commanded - toolpath.between(*row_and_share(pieces.end)))
     _check_corrections(toolpath, pieces, shift_mm, largest_mm)
     off_mm = _off_mm(toolpath, pieces, at)
-    done, move = _assembled(toolpath, pieces, commanded, model.machine, chord_mm or 0.0)
+    corner_mm = 0.0 if chord_mm is None else max(chord_mm, float(off_mm.max(initial=0.0)))
+    done, move = _assembled(toolpath, pieces, commanded, model.machine, corner_mm)
     slow = _slowest(toolpath, done, move, planner, short)
     if slow is not None and prefer is Prefer.ACCURACY:
         done = _slowed(done, planner)
@@ -179,7 +180,7 @@ def _needed_mm(toolpath: Toolpath, planner: Planner, prefer: Prefer | None) -> N
     limited = planner.limited(toolpath)
     mm_s = np.where(toolpath.kind == Step.FEED, np.nan_to_num(toolpath.feed) / 60.0, 0.0)
     mm_s = np.where(limited, np.minimum(mm_s, planner.reached_mm_s(_move_mm(toolpath))), mm_s)
-    turns = limited if prefer is Prefer.POSITION_ONLY else toolpath.tip_mm > 0.0
+    turns = limited if prefer is Prefer.POSITION_ONLY else cuts(toolpath)
     return np.where(turns, planner.needed_mm(mm_s), 0.0)
 
 
@@ -205,33 +206,42 @@ def _slowest(
         planner: the control on its machine.
         short: how near to the curve the pieces are that the feed needs, by move [mm].
     """
-    cutting = (done.kind == Step.FEED) & (done.tip_mm > 0.0)
+    cutting = cuts(done)
     if not cutting.any():
         return None
-    feed_mm_s = np.where(cutting, done.feed, 60.0) / 60.0
-    reached = np.where(planner.limited(done), np.minimum(feed_mm_s, planner.reached_mm_s(done.tip_mm)), feed_mm_s)
-    of_moves = moves_of(toolpath)
-    asked_mm_s = np.where(toolpath.kind == Step.FEED, np.nan_to_num(toolpath.feed), 60.0) / 60.0
-    own = np.where(planner.limited(toolpath), planner.reached_mm_s(_move_mm(toolpath)), np.inf)
+    of_moves, reached = moves_of(toolpath), planner.speed_mm_s(done)
     count = int(of_moves[-1]) + 1
+    # A move that turns A, B and C is as slow as its length lets it be, an arc as one move.
+    own = np.where(planner.limited(toolpath), planner.reached_mm_s(_move_mm(toolpath)), np.inf)
+    asked = np.minimum(planner.speed_mm_s(replace(toolpath, poses=_tilt_held(toolpath))), own)
+    at_feed = np.where(cuts(toolpath), toolpath.tip_mm, 0.0)
     takes = np.bincount(move, weights=np.where(cutting, done.tip_mm / reached, 0.0), minlength=count)
-    took = np.bincount(of_moves, weights=toolpath.tip_mm / np.minimum(asked_mm_s, own), minlength=count)
-    share = np.divide(takes, took, out=np.ones(count), where=(took > 0.0) & (takes > 0.0))
-    worst = int(np.argmax(share))
-    row = int(np.argmax(of_moves == worst))
-    if share[worst] > KEPT:
-        slowest_mm_s = float(reached[cutting & (move == worst)].min())
-        return Slow(
-            int(toolpath.line[row]), float(toolpath.feed[row]), 60.0 * slowest_mm_s, 1e3 * short.get(worst, np.nan)
-        )
+    took = np.bincount(of_moves, weights=at_feed / asked, minlength=count)
+    # What a ramp costs is no loss of a move by itself: there may be many of them.
+    ramp_s = np.zeros(count)
+    np.maximum.at(ramp_s, of_moves, asked / planner.acceleration_mm_s2)
+    lost = np.where(takes - took > ramp_s, takes / np.where(took > 0.0, took, 1.0), 1.0)
+    worst = int(np.argmax(lost))
+    if lost[worst] > KEPT:
+        row = int(np.argmax(of_moves == worst))
+        shortest = 60.0 * float(reached[cutting & (move == worst)].min())
+        return Slow(int(toolpath.line[row]), float(toolpath.feed[row]), shortest, 1e3 * short.get(worst, np.nan))
     return _lost_in_ramps(toolpath, done, move, planner)
+
+
+def _tilt_held(toolpath: Toolpath) -> NDArray[np.float64]:
+    """Poses of the toolpath, shape (n, 6), with A, B and C at zero."""
+    return np.where(np.arange(6) < 3, toolpath.poses, 0.0)  # noqa: PLR2004 - X, Y and Z
 
 
 def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, move: NDArray[np.int64], planner: Planner) -> Slow | None:
     """Return the move that loses most in its ramps, with the feed at which all together lose little enough."""
 
     def share(of_feed: float) -> float:
-        slower = [replace(path, feed_mm_min=of_feed * path.feed_mm_min) for path in (toolpath, done)]
+        slower = [
+            replace(path, feed_mm_min=of_feed * path.feed_mm_min, feed_deg_min=of_feed * path.feed_deg_min)
+            for path in (toolpath, done)
+        ]
         nominal, own = (_seconds(path, planner).sum() for path in slower)
         return float(own / nominal)
 

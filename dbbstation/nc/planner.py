@@ -28,6 +28,16 @@ KEPT = 1.01
 """A program keeps its feed while it takes no longer than this share of the time of the program that it was made from."""
 
 
+STOPS = (Step.RAPID, Step.DWELL, Step.PAUSE, Step.OPTIONAL_STOP)
+"""What a stretch at feed ends at. Rapids are no part of it, and their corners with it are left out."""
+
+LEAST_MM_PER_DEG = 0.1
+"""A move that takes the tip less far for each degree is a turn."""
+
+OF_AN_ARC = np.sqrt(3.0) / 2.0
+"""Share of the acceleration that LinuxCNC leaves to the direction of arcs in corners (`BLEND_ACC_RATIO_NORMAL`)."""
+
+
 @dataclass(frozen=True)
 class LookAhead:
     """How far a control looks ahead in moves that turn A, B or C.
@@ -74,32 +84,77 @@ class Planner:
         """Rows at feed that move the tool tip and turn A, B or C, in which the control does not look ahead, shape (n,)."""
         if self.look_ahead is None:
             return np.zeros(len(toolpath), dtype=np.bool_)
-        return (toolpath.kind == Step.FEED) & (toolpath.tip_mm > 0.0) & (toolpath.turn_deg > 0.0)
+        return cuts(toolpath) & (toolpath.turn_deg > 0.0)
+
+    def speed_mm_s(self, toolpath: Toolpath) -> NDArray[np.float64]:
+        """Speed that each row at feed reaches, shape (n,) [mm/s]: F, or less where pieces or the way between stops are short."""
+        way_mm = toolpath.tip_mm
+        between = np.cumsum(np.isin(toolpath.kind, STOPS))
+        stretch_mm = np.bincount(between, weights=way_mm)[between]
+        cutting = cuts(toolpath)
+        asked = np.where(cutting, toolpath.feed, 60.0) / 60.0
+        at_most = np.where(
+            self.limited(toolpath), self.reached_mm_s(way_mm), np.sqrt(self.acceleration_mm_s2 * stretch_mm)
+        )
+        return np.where(cutting, np.minimum(asked, at_most), 1.0)
 
     def seconds(self, toolpath: Toolpath) -> NDArray[np.float64]:
         """Time of each row, shape (n,) [s]: dwells as written, rapids without, moves at feed with their ramps.
 
-        A stretch is what lies between stops. Where the control looks ahead, it begins and ends with a ramp, and corners
-        are taken at the feed. Where not, each piece has its own trapezoid of half the acceleration, and the next one begins
-        when the slower of the two ramps between them does.
+        A stretch is what lies between stops. Where the control looks ahead, it begins and ends with a ramp, and corners are
+        rounded by an arc that leaves them by what is allowed. Where not, each piece has its own trapezoid of half the
+        acceleration; the next one begins with the shorter of the two ramps between them, or when the corner allows it.
         """
-        moving = (toolpath.kind == Step.FEED) & (toolpath.tip_mm > 0.0)
-        rows = np.flatnonzero(moving)
+        rows = np.flatnonzero(cuts(toolpath))
         seconds = np.where(toolpath.kind == Step.RAPID, 0.0, toolpath.duration_s)
         if len(rows) == 0:
             return seconds
-        limited = self.limited(toolpath)[rows]
-        feed_mm_s, length_mm = toolpath.feed[rows] / 60.0, toolpath.tip_mm[rows]
-        speed = np.where(limited, np.minimum(feed_mm_s, self.reached_mm_s(length_mm)), feed_mm_s)
+        limited, length_mm = self.limited(toolpath)[rows], toolpath.tip_mm[rows]
+        speed = self.speed_mm_s(toolpath)[rows]
         ramp_s = speed / self.acceleration_mm_s2 * np.where(limited, 2.0, 1.0)
-        stops = np.isin(toolpath.kind, [Step.RAPID, Step.DWELL, Step.PAUSE])
-        stretch = np.cumsum(stops)[rows]
-        ends = np.append(stretch[1:] != stretch[:-1], True)
-        between_s = np.append(np.minimum(ramp_s[1:], ramp_s[:-1]), 0.0)
-        # A ramp takes twice the time of its way at full speed; between two moves the next one begins as it does.
-        alone = length_mm / speed + ramp_s
-        seconds[rows] = alone - np.where(ends, 0.0, between_s)
+        # A ramp takes twice the time of its way at full speed.
+        seconds[rows] = length_mm / speed + ramp_s
+        stops = np.isin(toolpath.kind, STOPS)
+        goes_on = np.diff(np.cumsum(stops)[rows]) == 0
+        seconds[rows[:-1]] -= np.where(goes_on, self._saved_s(toolpath, rows, speed, ramp_s, limited), 0.0)
         return seconds
+
+    def _saved_s(
+        self,
+        toolpath: Toolpath,
+        rows: NDArray[np.int64],
+        speed: NDArray[np.float64],
+        ramp_s: NDArray[np.float64],
+        limited: NDArray[np.bool_],
+    ) -> NDArray[np.float64]:
+        """Time that is saved by not stopping between each of the rows and the next, shape (len(rows) - 1,) [s]."""
+        a = self.acceleration_mm_s2
+        way = toolpath.poses[rows, :3] - toolpath.before[rows, :3]
+        way /= np.linalg.norm(way, axis=1)[:, None]
+        half_sine = np.minimum(np.linalg.norm(np.diff(way, axis=0), axis=1) / 2.0, 1.0)
+        half_cosine = np.sqrt(1.0 - half_sine**2)
+        allowed_mm = np.where(np.isnan(toolpath.corners_mm[rows[:-1]]), np.inf, toolpath.corners_mm[rows[:-1]])
+        shorter_mm = np.minimum(toolpath.tip_mm[rows[:-1]], toolpath.tip_mm[rows[1:]])
+        ramp = np.minimum(ramp_s[:-1], ramp_s[1:])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # Two ramps of a/2 at once leave the corner by v² sin(φ/2) / (2a); an arc of radius R by R (1/cos(φ/2) - 1).
+            blended = 2.0 / a * np.sqrt(2.0 * a * allowed_mm / half_sine)
+            within = np.fmin(
+                allowed_mm * half_cosine / (1.0 - half_cosine), shorter_mm * half_cosine / (2.0 * half_sine)
+            )
+            corner = np.minimum(np.fmin(np.sqrt(OF_AN_ARC * a * within), np.inf), np.minimum(speed[:-1], speed[1:]))
+        lost = sum((each - corner) ** 2 / (2.0 * a * each) for each in (speed[:-1], speed[1:]))
+        both = np.maximum((ramp_s[:-1] + ramp_s[1:]) / 2.0 - lost, 0.0)
+        saved: NDArray[np.float64] = np.where(limited[:-1] | limited[1:], np.fmin(ramp, blended), both)
+        return saved
+
+
+def cuts(toolpath: Toolpath) -> NDArray[np.bool_]:
+    """Rows at feed that move the tool tip, apart from turns about a tip that hardly moves, shape (n,).
+
+    How fast those are is a matter of the angles' own acceleration, which is not known here.
+    """
+    return (toolpath.kind == Step.FEED) & (toolpath.tip_mm > LEAST_MM_PER_DEG * toolpath.turn_deg)
 
 
 LOOKS_AHEAD = Planner(1000.0, None)

@@ -126,7 +126,9 @@ def split(
     short: dict[int, float] = {}
     places = cells.places(LOOKED_AT)
     for of in _runs(number, chosen):
-        nodes = _Nodes(curve, cells.begin[of[0]], places[of], at[of], (off_mm[of] > tolerance_mm) & ~for_feed)
+        nodes = _Nodes(
+            curve, cells.begin[of[0]], places[of], at[of], (off_mm[of] > tolerance_mm) & np.logical_not(for_feed)
+        )
         least = float(needed_mm[row[of[0]]])
         ended = longest(nodes.way, nodes.at, nodes.may_end, OF_THE_TOLERANCE * tolerance_mm)
         if nodes.shortest(ended) < least:

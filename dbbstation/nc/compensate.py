@@ -12,7 +12,7 @@ from dbbstation.errors import StationError
 from dbbstation.nc.curve import Curve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, cuts
-from dbbstation.nc.splitting import SHORTEST_MM, looked_at, moves_of, rows_as_pieces, split
+from dbbstation.nc.splitting import SHORTEST_MM, looked_at, moves_of, rows_as_pieces, runs_of, split
 from dbbstation.nc.toolpath import Step, rounded
 
 if TYPE_CHECKING:
@@ -95,6 +95,7 @@ def compensate_toolpath(
     model: MachineModel,
     *,
     chord_mm: float | None = CHORD_MM,
+    keep_arcs: bool = False,
     started_s: float | None = None,
     largest_mm: float = LARGEST_CORRECTION_MM,
     planner: Planner = LOOKS_AHEAD,
@@ -109,6 +110,7 @@ def compensate_toolpath(
         toolpath: as it should be.
         model: calibrated model; what belongs to the machine is inverted.
         chord_mm: moves at feed are written in the longest pieces that keep this tolerance; None writes one move for each.
+        keep_arcs: chords of arcs stay as they are: they were chosen for the feed before.
         started_s: start of the program on the time scale of the model's sessions, for sources that need time [s];
             None: not known.
         largest_mm: greatest correction that is applied, of the tip and of a point `LEVER_MM` from it by the tilt [mm].
@@ -123,18 +125,22 @@ def compensate_toolpath(
     curve = Curve(toolpath, model, started_s, hold_tilt=prefer is Prefer.POSITION_ONLY)
     short: dict[int, float] = {}
     if chord_mm is None:
-        pieces = rows_as_pieces(toolpath)
+        pieces, runs = rows_as_pieces(toolpath), moves_of(toolpath)
     else:
         needed_mm = _needed_mm(toolpath, planner, prefer)
-        pieces, short = split(curve, model, chord_mm, needed_mm, for_feed=prefer is Prefer.FEED)
+        runs = runs_of(toolpath, needed_mm)
+        whole = np.zeros(len(toolpath), dtype=np.bool_)
+        if keep_arcs and toolpath.arc is not None:
+            whole = toolpath.arc[:, 2] != 0.0
+        pieces, short = split(curve, model, chord_mm, needed_mm, runs, for_feed=prefer is Prefer.FEED, whole=whole)
     at = looked_at(curve, pieces, DENSELY)
     commanded = at[:, -1]
     shift_mm = felt_mm(commanded - toolpath.between(*row_and_share(pieces.end)))
     _check_corrections(toolpath, pieces, shift_mm, largest_mm)
     off_mm = _off_mm(toolpath, pieces, at)
-    corner_mm = 0.0 if chord_mm is None else max(chord_mm, float(off_mm.max(initial=0.0)))
-    done, move = _assembled(toolpath, pieces, commanded, model.machine, corner_mm)
-    slow = _slowest(toolpath, done, move, planner, short)
+    corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
+    done = _assembled(toolpath, pieces, commanded, runs, model.machine, corner_mm)
+    slow = _slowest(toolpath, done, _Of(runs, runs[pieces.row[_written(toolpath, pieces)]]), planner, short)
     if slow is not None and prefer is Prefer.ACCURACY:
         done = _slowed(done, planner)
     worst = int(np.argmax(off_mm)) if len(off_mm) else 0
@@ -190,43 +196,49 @@ def _move_mm(toolpath: Toolpath) -> NDArray[np.float64]:
     return np.asarray(np.bincount(number, weights=toolpath.tip_mm)[number], dtype=np.float64)
 
 
-def _slowest(
-    toolpath: Toolpath,
-    done: Toolpath,
-    move: NDArray[np.int64],
-    planner: Planner,
-    short: dict[int, float],
-) -> Slow | None:
+@dataclass(frozen=True, eq=False)
+class _Of:
+    """Number of the run that each row belongs to: of the toolpath as it was, shape (n,), and of the compensated one, (k,)."""
+
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
+
+    def lost(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sums of each run, those of the compensated toolpath over those of the other, shape (2, runs)."""
+        count = int(self.before[-1]) + 1
+        pairs = ((self.after, after), (self.before, before))
+        return np.array([np.bincount(number, weights=each, minlength=count) for number, each in pairs])
+
+
+def _slowest(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner, short: dict[int, float]) -> Slow | None:
     """Return the move that loses most of its feed; None where all keep it, and all together with their ramps.
 
     Args:
         toolpath: as it was.
         done: compensated, with F as it was.
-        move: number of the move of `toolpath` that each row of `done` belongs to.
+        of: runs of their rows.
         planner: the control on its machine.
-        short: how near to the curve the pieces are that the feed needs, by move [mm].
+        short: how near to the curve the pieces are that the feed needs, by run [mm].
     """
     cutting = cuts(done)
     if not cutting.any():
         return None
-    of_moves, reached = moves_of(toolpath), planner.speed_mm_s(done)
-    count = int(of_moves[-1]) + 1
+    reached = planner.speed_mm_s(done)
     # A move that turns A, B and C is as slow as its length lets it be, an arc as one move.
     own = np.where(planner.limited(toolpath), planner.reached_mm_s(_move_mm(toolpath)), np.inf)
     asked = np.minimum(planner.speed_mm_s(replace(toolpath, poses=_tilt_held(toolpath))), own)
-    at_feed = np.where(cuts(toolpath), toolpath.tip_mm, 0.0)
-    takes = np.bincount(move, weights=np.where(cutting, done.tip_mm / reached, 0.0), minlength=count)
-    took = np.bincount(of_moves, weights=at_feed / asked, minlength=count)
+    at_feed = np.where(cuts(toolpath), toolpath.tip_mm / asked, 0.0)
+    takes, took = of.lost(at_feed, np.where(cutting, done.tip_mm / reached, 0.0))
     # What a ramp costs is no loss of a move by itself: there may be many of them.
-    ramp_s = np.zeros(count)
-    np.maximum.at(ramp_s, of_moves, asked / planner.acceleration_mm_s2)
-    lost = np.where(takes - took > ramp_s, takes / np.where(took > 0.0, took, 1.0), 1.0)
+    ramp_s = np.zeros(len(took))
+    np.maximum.at(ramp_s, of.before, asked / planner.acceleration_mm_s2)
+    lost = np.where((takes - took > ramp_s) & (took > 0.0), takes / np.where(took > 0.0, took, 1.0), 1.0)
     worst = int(np.argmax(lost))
-    if lost[worst] > KEPT:
-        row = int(np.argmax(of_moves == worst))
-        shortest = 60.0 * float(reached[cutting & (move == worst)].min())
-        return Slow(int(toolpath.line[row]), float(toolpath.feed[row]), shortest, 1e3 * short.get(worst, np.nan))
-    return _lost_in_ramps(toolpath, done, move, planner)
+    if lost[worst] <= KEPT:
+        return _lost_in_ramps(toolpath, done, of, planner)
+    row = int(np.argmin(np.where(cutting & (of.after == worst), reached, np.inf)))
+    chord_um = 1e3 * short.get(worst, np.nan)
+    return Slow(int(done.line[row]), float(done.feed[row]), 60.0 * float(reached[row]), chord_um)
 
 
 def _tilt_held(toolpath: Toolpath) -> NDArray[np.float64]:
@@ -234,7 +246,7 @@ def _tilt_held(toolpath: Toolpath) -> NDArray[np.float64]:
     return np.where(np.arange(6) < 3, toolpath.poses, 0.0)  # noqa: PLR2004 - X, Y and Z
 
 
-def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, move: NDArray[np.int64], planner: Planner) -> Slow | None:
+def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner) -> Slow | None:
     """Return the move that loses most in its ramps, with the feed at which all together lose little enough."""
 
     def share(of_feed: float) -> float:
@@ -251,11 +263,8 @@ def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, move: NDArray[np.int64], 
     for _ in range(20):
         middle = (low + high) / 2.0
         low, high = (middle, high) if share(middle) <= KEPT else (low, middle)
-    of_moves = moves_of(toolpath)
-    count = int(of_moves[-1]) + 1
-    nominal, own = _seconds(toolpath, planner), _seconds(done, planner)
-    lost = np.bincount(move, weights=own, minlength=count) - np.bincount(of_moves, weights=nominal, minlength=count)
-    row = int(np.argmax(of_moves == int(np.argmax(lost))))
+    takes, took = of.lost(_seconds(toolpath, planner), _seconds(done, planner))
+    row = int(np.argmax((of.before == int(np.argmax(takes - took))) & (toolpath.kind == Step.FEED)))
     feed = float(toolpath.feed[row])
     return Slow(int(toolpath.line[row]), feed, low * feed, np.nan)
 
@@ -276,18 +285,17 @@ def _assembled(
     toolpath: Toolpath,
     pieces: Pieces,
     commanded: NDArray[np.float64],
+    runs: NDArray[np.int64],
     machine: Machine,
     corner_mm: float,
-) -> tuple[Toolpath, NDArray[np.int64]]:
-    """The toolpath with one row for each piece, rapids in one, and the written move that each belongs to.
+) -> Toolpath:
+    """The toolpath with one row for each piece, rapids in one.
 
     Corners between the pieces of a move may be rounded by as much as the pieces may leave the path: such a corner needs
     no more at full feed, and no less.
     """
     row = pieces.row
-    last = np.append(row[1:] != row[:-1], True)[: len(row)]
-    written = last | (toolpath.kind[row] == Step.FEED)
-    of = moves_of(toolpath)[row]
+    written, of = _written(toolpath, pieces), runs[row]
     begin_mm, begin_s = _until(toolpath, pieces.begin)
     end_mm, end_s = _until(toolpath, pieces.end)
     bare = toolpath.divided(row[written], rounded(commanded[written]))
@@ -296,12 +304,18 @@ def _assembled(
     feed = _feeds(bare, toolpath.feed[row[written]], (end_mm - begin_mm)[written], (end_s - begin_s)[written])
     # A wanted move that takes no time at all, as a turn with a few nanometres of way, has no such feed: the machine's own
     # limits are what slows it down, whatever F says.
-    done = replace(
+    return replace(
         bare,
         feed_mm_min=np.where(bare.only_turns, bare.feed_mm_min, np.minimum(feed, machine.feed_limit_mm_min)),
         feed_deg_min=np.where(bare.only_turns, np.minimum(feed, machine.turn_limit_deg_min), bare.feed_deg_min),
     )
-    return done, of[written]
+
+
+def _written(toolpath: Toolpath, pieces: Pieces) -> NDArray[np.bool_]:
+    """Which pieces become a row: all at feed, the last one of a rapid."""
+    row = pieces.row
+    last = np.append(row[1:] != row[:-1], True)[: len(row)]
+    return np.asarray(last | (toolpath.kind[row] == Step.FEED))
 
 
 def _until(toolpath: Toolpath, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -132,7 +132,11 @@ def circle_programs(
         progress(len(programs), len(runs))
         circle = plan.tests[name].run(direction)
         title = f"test {name} {direction}"
-        step = step_deg if inverse is None else _step_deg(circle, title, step_deg, chord_mm, inverse, dialect)
+        step = (
+            step_deg
+            if inverse is None
+            else _step_deg(circle, title, step_deg, chord_mm, inverse.prefer, machine, dialect)
+        )
         path = circle_toolpath(circle, title, step_deg=step, approach=approach)
         header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name})
         header += _said(origin or {})
@@ -224,15 +228,16 @@ def _program(
     done = compensate_toolpath(
         path,
         inverse.model,
-        chord_mm=chord_mm if split else None,
+        chord_mm=chord_mm,
+        keep_arcs=not split,
         started_s=inverse.started_s,
         largest_mm=inverse.largest_mm,
-        planner=planner_of(inverse.model.machine, dialect),
+        planner=planner_of(machine, dialect),
         prefer=prefer,
     )
     check_reach(machine, done.toolpath)
     check_chord(path.name, done, asked_um, inverse.accepted_um, prefer)
-    check_feed(path.name, done, asked_um, inverse.model.machine, prefer)
+    check_feed(path.name, done, asked_um, machine, prefer)
     spent = "" if prefer is None else cost(done, asked_um, prefer)
     header = [*header, *_said(inverse.origin), f"{COMPENSATED} {done.greatest_um:.3f} um"]
     header.append(f"chord error asked for {asked_um:g} um, reached {done.chord_um:.3f} um")
@@ -261,21 +266,28 @@ def planner_of(machine: Machine, dialect: Dialect) -> Planner:
     return Planner(machine.planned_acceleration_mm_s2, dialect.look_ahead)
 
 
-def _step_deg(circle: Circle, name: str, step_deg: float, chord_mm: float, inverse: Inverse, dialect: Dialect) -> float:
+def _step_deg(
+    circle: Circle,
+    name: str,
+    step_deg: float,
+    chord_mm: float,
+    prefer: Prefer | None,
+    machine: Machine,
+    dialect: Dialect,
+) -> float:
     """Angle between the points of a compensated circle [deg]: what its feed needs, and no less than was asked for.
 
     Raises:
         StationError: such a chord leaves the circle by more than `chord_mm`.
     """
-    if inverse.prefer in {Prefer.ACCURACY, Prefer.POSITION_ONLY}:
+    if prefer in {Prefer.ACCURACY, Prefer.POSITION_ONLY}:
         return step_deg
-    machine = inverse.model.machine
     planner = planner_of(machine, dialect)
     # The arc is divided evenly: its steps may be smaller by a part in its number of points.
     needed_mm = 1.01 * float(planner.needed_mm(np.array(circle.feed_mm_min / 60.0)))
     step = max(step_deg, float(np.degrees(needed_mm / circle.radius_mm)))
     error_mm = chord_error_mm(circle, step)
-    if step > step_deg and error_mm > chord_mm and inverse.prefer is None:
+    if step > step_deg and error_mm > chord_mm and prefer is None:
         longest_mm = np.array(np.sqrt(8.0 * circle.radius_mm * chord_mm) / 1.01)
         reached = 60.0 * float(planner.reached_mm_s(longest_mm))
         slow = Slow(0, circle.feed_mm_min, reached, 1e3 * error_mm)

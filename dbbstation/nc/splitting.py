@@ -52,6 +52,12 @@ HISTORY_MM, HISTORY_DEG = 5.0, 1.0
 """Steps in which rapids are followed for the sake of backlash and friction; they are written as one move all the same,
 since nothing is cut on the way."""
 
+ALMOST = 0.999
+"""Moves that are shorter than needed by less are long enough."""
+
+COSINE = 0.97
+"""Of the greatest angle at which a curve in short lines goes on, 14 degrees."""
+
 MOST_CELLS = 1_000_000
 """All cells are inverted at once; so many take some gigabytes and minutes. As many as `rs274.reader.MOST_ROWS`."""
 
@@ -90,13 +96,39 @@ def moves_of(toolpath: Toolpath) -> NDArray[np.int64]:
     return moves
 
 
+def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Number of the run that each row belongs to, shape (n,): a written move, or several that are shorter than their feed needs.
+
+    Such moves follow each other at one F, in one work system, with corners that may be rounded, and go on in nearly the same
+    direction: a curve in short lines, whose pieces may join any of its points.
+
+    Args:
+        toolpath: in rows.
+        needed_mm: length of a piece that keeps the feed of each row, shape (n,).
+    """
+    moves = moves_of(toolpath)
+    if len(toolpath) < 2:  # noqa: PLR2004 - a pair
+        return moves
+    cuts = (toolpath.kind == Step.FEED) & (toolpath.tip_mm > 0.0)
+    short = cuts & (np.bincount(moves, weights=toolpath.tip_mm)[moves] < ALMOST * needed_mm)
+    way = toolpath.poses[:, :3] - toolpath.before[:, :3]
+    along = np.einsum("ni,ni->n", way[1:], way[:-1]) >= COSINE * toolpath.tip_mm[1:] * toolpath.tip_mm[:-1]
+    alike = (toolpath.feed[1:] == toolpath.feed[:-1]) & (toolpath.system[1:] == toolpath.system[:-1])
+    joined = (short[1:] | short[:-1]) & cuts[1:] & cuts[:-1] & along & alike & (toolpath.corners_mm[:-1] != 0.0)
+    joined |= moves[1:] == moves[:-1]
+    runs: NDArray[np.int64] = np.concatenate([[0], np.cumsum(~joined)])
+    return runs
+
+
 def split(
     curve: Curve,
     model: MachineModel,
     tolerance_mm: float,
     needed_mm: NDArray[np.float64],
+    runs: NDArray[np.int64],
     *,
     for_feed: bool,
+    whole: NDArray[np.bool_],
 ) -> tuple[Pieces, dict[int, float]]:
     """Return the pieces in which a toolpath is written.
 
@@ -105,21 +137,23 @@ def split(
         model: whose shortest period says how closely to look.
         tolerance_mm: greatest distance of a piece from the curve.
         needed_mm: length of a piece that keeps the feed, for each row; 0 where any does, shape (n,).
+        runs: number of the run that each row belongs to, within which pieces may end anywhere, shape (n,).
         for_feed: where the two cannot both be had, keep the feed.
+        whole: rows that are one piece each, shape (n,).
 
     Returns:
-        The pieces, and for each move whose longest pieces are shorter than needed: its number, and how near to the curve
+        The pieces, and for each run whose longest pieces are shorter than needed: its number, and how near to the curve
         pieces of the needed length are [mm].
 
     Raises:
         StationError: the path has too many cells.
     """
-    cells, at = _cells(curve, model, tolerance_mm, needed_mm / SHORTEST_OF_NEEDED if for_feed else None)
+    cells, at = _cells(curve, model, tolerance_mm, needed_mm / SHORTEST_OF_NEEDED if for_feed else None, whole)
     off_mm = cell_off_mm(at)
     toolpath, row = curve.toolpath, cells.row
     # What needs no choice: what is no move at feed, and moves that are one cell near the curve.
-    number = moves_of(toolpath)[row]
-    chosen = (toolpath.kind[row] == Step.FEED) & curve.leads_on[row]
+    number = runs[row]
+    chosen = (toolpath.kind[row] == Step.FEED) & curve.leads_on[row] & ~whole[row]
     alone = np.bincount(number)[number] == 1
     chosen &= ~alone | (off_mm > OF_THE_TOLERANCE * tolerance_mm)
     begins, ends = [cells.begin[~chosen]], [cells.end[~chosen]]
@@ -129,7 +163,7 @@ def split(
         nodes = _Nodes(
             curve, cells.begin[of[0]], places[of], at[of], (off_mm[of] > tolerance_mm) & np.logical_not(for_feed)
         )
-        least = float(needed_mm[row[of[0]]])
+        least = float(needed_mm[row[of]].max())
         ended = longest(nodes.way, nodes.at, nodes.may_end, OF_THE_TOLERANCE * tolerance_mm)
         if nodes.shortest(ended) < least:
             kept = truest(nodes.way, nodes.at, nodes.may_end, least)
@@ -214,13 +248,17 @@ def looked_at(curve: Curve, pieces: Pieces, shares: NDArray[np.float64]) -> NDAr
 
 
 def _cells(
-    curve: Curve, model: MachineModel, tolerance_mm: float, shortest_mm: NDArray[np.float64] | None
+    curve: Curve,
+    model: MachineModel,
+    tolerance_mm: float,
+    shortest_mm: NDArray[np.float64] | None,
+    whole: NDArray[np.bool_],
 ) -> tuple[Pieces, NDArray[np.float64]]:
     toolpath = curve.toolpath
     history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
     cutting = np.maximum(toolpath.tip_mm / FIRST_CELL_MM, toolpath.turn_deg / FIRST_CELL_DEG)
     cutting = np.maximum(cutting, _way_mm(toolpath, model.machine) / (OF_A_PERIOD * model.shortest_period_mm))
-    cells = _in(toolpath, np.where(toolpath.kind == Step.RAPID, history, cutting))
+    cells = _in(toolpath, np.where(whole, 1.0, np.where(toolpath.kind == Step.RAPID, history, cutting)))
     while True:
         at = looked_at(curve, cells, LOOKED_AT)
         row, share = cells.row, cells.end - cells.begin
@@ -228,7 +266,7 @@ def _cells(
         can = (way_mm > SHORTEST_MM) | (turn_deg > SHORTEST_DEG)
         if shortest_mm is not None:
             can &= (way_mm > shortest_mm[row]) | (toolpath.tip_mm[row] == 0.0)
-        at_feed = (toolpath.kind[row] == Step.FEED) & curve.leads_on[row]
+        at_feed = (toolpath.kind[row] == Step.FEED) & curve.leads_on[row] & ~whole[row]
         bent = at_feed & can & (cell_off_mm(at) > tolerance_mm / FINER)
         if not bent.any():
             return cells, at

@@ -55,7 +55,8 @@ def prepare():
     command.mdi("G21 G90 G0 " + block)
     wanted = [float(word[1:]) for word in block.split()]
     until(
-        lambda: idle() and max(abs(a - b) for a, b in zip(status.actual_position, wanted)) < 1e-5, "going to the start"
+        lambda: idle() and max(abs(a - b) for a, b in zip(status.actual_position, wanted, strict=False)) < 1e-5,
+        "going to the start",
     )
 
 
@@ -64,8 +65,8 @@ def run():
     command.wait_complete()
     command.program_open(str(HERE / "program.ngc"))
     with (HERE / "samples.txt").open("w") as samples:
-        sampler = subprocess.Popen(["halsampler", "-t"], stdout=samples)
-        subprocess.run(["halcmd", "setp", "sampler.0.enable", "1"], check=True)
+        sampler = subprocess.Popen(["halsampler", "-t"], stdout=samples)  # noqa: S607 - as LinuxCNC has it
+        subprocess.run(["halcmd", "setp", "sampler.0.enable", "1"], check=True)  # noqa: S607 - likewise
         command.auto(linuxcnc.AUTO_RUN, 0)
         command.wait_complete()
         time.sleep(0.1)

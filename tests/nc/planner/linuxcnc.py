@@ -80,7 +80,7 @@ def run(text: str, *, mm_s2: float = 1000.0, faster: int = 1, patience_s: float 
     Raises:
         RuntimeError: LinuxCNC refuses the program or does not end.
     """
-    with tempfile.TemporaryDirectory(prefix="dbbstation-planner-") as made, _alone():
+    with tempfile.TemporaryDirectory(prefix="dbbstation-planner-") as made, _Alone():
         folder = Path(made)
         _configure(folder, mm_s2, faster)
         (folder / "program.ngc").write_text(_quickened(text, faster))
@@ -144,7 +144,7 @@ def _first_point(text: str) -> str:
     raise RuntimeError("no move names all six axes")
 
 
-class _alone:
+class _Alone:
     """There is one LinuxCNC on a computer at a time."""
 
     def __enter__(self) -> None:
@@ -156,14 +156,22 @@ class _alone:
 
 
 def _has_user() -> bool:
-    return subprocess.run(["id", USER], capture_output=True, check=False).returncode == 0
+    return (
+        subprocess.run(
+            ["id", USER],  # noqa: S607 - as the system has it
+            capture_output=True,
+            check=False,
+        ).returncode
+        == 0
+    )
 
 
 def _started(folder: Path, patience_s: float) -> str:
     command = ["linuxcnc", "-r", "planner.ini"]
     if os.getuid() == 0:
         if not _has_user():
-            subprocess.run(["useradd", "--system", "--no-create-home", "--shell", "/bin/sh", USER], check=True)
+            made = ["useradd", "--system", "--no-create-home", "--shell", "/bin/sh", USER]
+            subprocess.run(made, check=True)
         for path in (folder, *folder.iterdir()):
             shutil.chown(path, USER, USER)
         command = ["setpriv", f"--reuid={USER}", f"--regid={USER}", "--init-groups", *command]

@@ -18,9 +18,10 @@ from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import Step, Toolpath
 from tests.nc.grammar import program
 from tests.nc.interpreter import RS274, Event, events
+from tests.nc.planner.required import needs
 
 pytestmark = [
-    pytest.mark.skipif(RS274 is None, reason="LinuxCNC's interpreter rs274 is not installed"),
+    needs("" if RS274 else "LinuxCNC's interpreter rs274 is not installed"),
     pytest.mark.slow,
 ]
 

@@ -7,7 +7,6 @@ and every acceleration a hundred times it plans the same way in each servo cycle
 from __future__ import annotations
 
 import math
-import os
 import re
 from dataclasses import replace
 
@@ -21,11 +20,11 @@ from dbbstation.nc.export import Inverse, circle_programs, compensated_program, 
 from dbbstation.nc.planner import KEPT
 from dbbstation.plan.plan import Plan
 from tests.nc.planner.linuxcnc import Ran, missing, run
+from tests.nc.planner.required import needs
 
 REASON = missing()
-REQUIRED = "linuxcnc" in os.environ.get("DBBSTATION_REQUIRE", "").split()
 pytestmark = [
-    pytest.mark.skipif(bool(REASON) and not REQUIRED, reason=REASON),
+    needs(REASON),
     # There is one LinuxCNC on a computer at a time.
     pytest.mark.xdist_group("linuxcnc"),
 ]

@@ -157,14 +157,16 @@ def _or_empty(value: float | None) -> float | str:
 
 
 def _say_uncertainty(programs: Sequence[Program]) -> None:
-    """Set what the model knows of the path against the chord error that was asked for."""
-    for each in programs:
-        if each.uncertainty_um is not None and each.chord_asked_um is not None:
-            knows = f"the model knows the path within {each.uncertainty_um:.2g} µm (standard uncertainty)"
-            asked = f"the chord error asked for is {each.chord_asked_um:g} µm"
-            if each.uncertainty_um > each.chord_asked_um:
-                asked += ": moves are split finer than the model knows them"
-            say(f"{knows}, {asked}")
+    """Set what the model knows of the paths, where it knows least, against the chord error that was asked for."""
+    uncertain_um = max((each.uncertainty_um for each in programs if each.uncertainty_um is not None), default=None)
+    asked_um = next((each.chord_asked_um for each in programs if each.chord_asked_um is not None), None)
+    if uncertain_um is None or asked_um is None:
+        return
+    knows = f"the model knows the path within {uncertain_um:.2g} µm (standard uncertainty)"
+    asked = f"the chord error asked for is {asked_um:g} µm"
+    if uncertain_um > asked_um:
+        asked += ": moves are split finer than the model knows them"
+    say(f"{knows}, {asked}")
 
 
 def _content(path: Path) -> bytes:

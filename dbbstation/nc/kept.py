@@ -68,7 +68,7 @@ def said_acceleration(machine: Machine) -> str:
 
 def cost(done: Compensation, asked_um: float, prefer: Prefer) -> str:
     """Return what a preference costs, in µm and seconds."""
-    slower = f"{done.seconds - done.nominal_seconds:.1f} s more than {done.nominal_seconds:.1f} s at feed"
+    slower = f"{max(done.seconds - done.nominal_seconds, 0.0):.1f} s more than {done.nominal_seconds:.1f} s at feed"
     if prefer is Prefer.ACCURACY:
         return f"--prefer accuracy costs {slower}"
     if prefer is Prefer.FEED:

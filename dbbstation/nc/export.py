@@ -13,10 +13,12 @@ from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import CHORD_MM, compensate_toolpath
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
+from dbbstation.nc.mark import marked
 from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM
 from dbbstation.nc.reach import check_feeds, check_reach
+from dbbstation.nc.systems import in_systems
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
@@ -209,9 +211,10 @@ def _program(
     uncertainty_um = _uncertainty_um(path, inverse)
     if uncertainty_um is not None:
         header.append(f"standard uncertainty of the model along the path {uncertainty_um:.3f} um at most")
-    mark = checksum(done.toolpath)
-    text = dialect.write(replace(done.toolpath, numbers=(mark, mark)), header)
-    return Program(name, text, _points(done.toolpath), done.greatest_um, done.chord_um, asked_um, uncertainty_um)
+    finished = marked(in_systems(done.toolpath))
+    number = checksum(finished)
+    text = dialect.write(replace(finished, numbers=(number, number)), header)
+    return Program(name, text, _points(finished), done.greatest_um, done.chord_um, asked_um, uncertainty_um)
 
 
 UNCERTAIN_AT = 2000

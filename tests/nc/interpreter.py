@@ -7,15 +7,30 @@ import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 RS274 = shutil.which("rs274")
 
-_CALL = re.compile(
-    r"(STRAIGHT_TRAVERSE|STRAIGHT_FEED|ARC_FEED|DWELL|PROGRAM_STOP|OPTIONAL_PROGRAM_STOP|SET_FEED_RATE|USE_LENGTH_UNITS)"
-    r"\(([^)]*)\)"
-)
+_CALL = re.compile(r"\s*\d+ N(?:\.+|\d+)\s*(?P<name>[A-Z]\w+)\((?P<arguments>.*)\)\s*")
+
+_STATE = {"USE_LENGTH_UNITS", "SET_FEED_RATE", "SET_MOTION_CONTROL_MODE", "SET_NAIVECAM_TOLERANCE", "SET_G5X_OFFSET"}
+"""Calls that change what later calls mean, and are nothing by themselves."""
+
+_MOVES = {"STRAIGHT_TRAVERSE": "RAPID", "STRAIGHT_FEED": "FEED", "ARC_FEED": "ARC"}
+_STOPS = {"PROGRAM_STOP": "PAUSE", "OPTIONAL_PROGRAM_STOP": "OPTIONAL_STOP", "DWELL": "DWELL"}
+MOTION = frozenset((*_MOVES.values(), *_STOPS.values()))
+"""Kinds of events that move the machine or keep it waiting."""
+
+_SILENT = {"COMMENT", "ON_RESET", "SET_G92_OFFSET", "SET_XY_ROTATION", "SET_FEED_REFERENCE", "SET_FEED_MODE", "FINISH"}
+_SILENT |= {"SET_NAIVECAM_TOLERANCE", "SELECT_PLANE", "USE_TOOL_LENGTH_OFFSET"}
+"""Calls that are no event: they follow from others, or mean nothing to the machine."""
+
+INCH_MM = 25.4
 
 
 @dataclass(frozen=True)
@@ -23,13 +38,16 @@ class Event:
     """One thing that a program makes the machine do.
 
     Attributes:
-        kind: RAPID, FEED, ARC, DWELL or PAUSE.
-        pose: after it, shape (6,) [mm, deg].
+        kind: RAPID, FEED, ARC, DWELL, PAUSE, OPTIONAL_STOP; SAID for messages, spindle, coolant, work systems, the end.
+        pose: after it, in the coordinates of the program, shape (6,) [mm, deg].
         feed: of the tip [mm/min] and of moves that only turn [deg/min].
         centre_mm: of an arc, X and Y [mm].
         turns: of an arc, positive counter-clockwise; 1 for less than a full turn or one.
         dwell_s: of a dwell [s].
         unit_mm: length unit of the program at this place; printed numbers have four decimals of it [mm].
+        corner: path control in force, as printed, lengths in millimetres.
+        offset: of the work system in force, shape (6,) [mm, deg].
+        said: call and arguments of a SAID event, as printed.
     """
 
     kind: str
@@ -39,12 +57,24 @@ class Event:
     turns: int = 0
     dwell_s: float = 0.0
     unit_mm: float = 1.0
+    corner: str = ""
+    offset: np.ndarray | None = None
+    said: str = ""
 
 
-def calls(text: str | bytes, folder: Path) -> list[tuple[str, str]] | None:
-    """Calls with their arguments as printed; None where the program is refused."""
+def printed(
+    text: str | bytes, folder: Path, parameters: Mapping[int, float] | None = None
+) -> list[tuple[str, str]] | None:
+    """Every call with its arguments as printed, and what PRINT writes; None where the program is refused.
+
+    Args:
+        text: the program.
+        folder: for its files.
+        parameters: numbered parameters that the control has at the start, lengths in inches.
+    """
     (folder / "tool.tbl").write_text("T1 P1 D0.1 Z0\n")
-    (folder / "rs274.var").write_text("")
+    stored = sorted((parameters or {}).items())
+    (folder / "rs274.var").write_text("".join(f"{number}\t{value:.9f}\n" for number, value in stored))
     (folder / "program.ngc").write_bytes(text if isinstance(text, bytes) else text.encode())
     done = subprocess.run(
         [str(RS274), "-g", "-t", "tool.tbl", "-v", "rs274.var", "program.ngc"],
@@ -56,32 +86,61 @@ def calls(text: str | bytes, folder: Path) -> list[tuple[str, str]] | None:
         check=False,
         timeout=60,
     )
-    return None if done.returncode else _CALL.findall(done.stdout)
+    if done.returncode:
+        return None
+    found = []
+    for line in done.stdout.splitlines():
+        call = _CALL.fullmatch(line)
+        if call is not None:
+            found.append((call["name"], call["arguments"]))
+        elif line.strip():
+            found.append(("PRINT", line))
+    return found
 
 
-def events(text: str | bytes, folder: Path) -> list[Event] | None:
+def calls(text: str | bytes, folder: Path) -> list[tuple[str, str]] | None:
+    """Calls that move, stop, or change feed and units; None where the program is refused."""
+    known = {*_MOVES, *_STOPS, "SET_FEED_RATE", "USE_LENGTH_UNITS"}
+    made = printed(text, folder)
+    return None if made is None else [call for call in made if call[0] in known]
+
+
+def events(text: str | bytes, folder: Path, parameters: Mapping[int, float] | None = None) -> list[Event] | None:
     """What a program does, in millimetres and degrees; None where it is refused."""
-    made = calls(text, folder)
+    made = printed(text, folder, parameters)
     if made is None:
         return None
-    unit, feed, pose = 1.0, (0.0, 0.0), np.zeros(6)
+    unit, feed, pose, corner, offset = 1.0, (0.0, 0.0), np.zeros(6), "", np.zeros(6)
     found: list[Event] = []
-    for name, printed in made:
+    for name, arguments in made:
         if name == "USE_LENGTH_UNITS":
-            unit = 25.4 if "INCHES" in printed else 1.0
+            unit = INCH_MM if "INCHES" in arguments else 1.0
+        elif name == "SET_MOTION_CONTROL_MODE":
+            mode, _, allowed = arguments.partition(",")
+            corner = f"{mode} {float(allowed) * unit:.4f}" if allowed else mode
+        elif name in _SILENT:
             continue
-        numbers = np.array([float(number) for number in printed.split(",") if number.strip()])
-        if name == "SET_FEED_RATE":
-            feed = (float(numbers[0]) * unit, float(numbers[0]))
-        elif name.startswith("STRAIGHT"):
-            pose = np.concatenate([numbers[:3] * unit, numbers[3:]])
-            found.append(Event("RAPID" if name.endswith("TRAVERSE") else "FEED", pose, feed, unit_mm=unit))
-        elif name == "ARC_FEED":
-            x, y, i, j, turns, z, *angles = numbers
-            pose = np.array([x * unit, y * unit, z * unit, *angles])
-            found.append(Event("ARC", pose, feed, (i * unit, j * unit), int(turns), unit_mm=unit))
-        elif name == "DWELL":
-            found.append(Event("DWELL", pose, dwell_s=float(numbers[0])))
+        elif name in {"MESSAGE", "LOG", "LOGOPEN", "PRINT"}:
+            found.append(Event("SAID", pose, said=f"{name}({arguments})"))
+        elif name in _MOVES or name in _STOPS or name in _STATE:
+            numbers = np.array([float(number) for number in arguments.split(",") if number.strip()])
+            if name == "SET_FEED_RATE":
+                feed = (float(numbers[0]) * unit, float(numbers[0]))
+            elif name == "SET_G5X_OFFSET":
+                offset = np.concatenate([numbers[1:4] * unit, numbers[4:7]])
+                found.append(Event("SAID", pose, said=f"{name}({numbers[0]:g})"))
+            elif name.startswith("STRAIGHT"):
+                pose = np.concatenate([numbers[:3] * unit, numbers[3:]])
+                found.append(Event(_MOVES[name], pose, feed, unit_mm=unit, corner=corner, offset=offset))
+            elif name == "ARC_FEED":
+                x, y, i, j, turns, z, *angles = numbers
+                pose = np.array([x * unit, y * unit, z * unit, *angles])
+                centre = (i * unit, j * unit)
+                found.append(Event("ARC", pose, feed, centre, int(turns), unit_mm=unit, corner=corner, offset=offset))
+            elif name == "DWELL":
+                found.append(Event("DWELL", pose, dwell_s=float(numbers[0])))
+            else:
+                found.append(Event(_STOPS[name], pose))
         else:
-            found.append(Event("PAUSE", pose))
+            found.append(Event("SAID", pose, said=f"{name}({arguments})"))
     return found

@@ -139,7 +139,9 @@ def _block(line: str, place: Place) -> Block:
     return block
 
 
-_ACTIVE = re.compile(r"(?:msg|debug|print|log|logopen|logappend|probeopen|abort),|(?:logclose|probeclose)", re.IGNORECASE)
+_ACTIVE = re.compile(
+    r"(?:msg|debug|print|log|logopen|logappend|probeopen|abort),|(?:logclose|probeclose)", re.IGNORECASE
+)
 """Begins of comments that LinuxCNC acts on."""
 
 _PYTHON = re.compile(r"py,|pyrun,|pyreload", re.IGNORECASE)

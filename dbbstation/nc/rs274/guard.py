@@ -21,7 +21,9 @@ _SYSTEM, _PER_SYSTEM = 5200, 20
 _TERMS = 5
 """In one line; a line of LinuxCNC has an end."""
 
-_WORK = "work system {} is not zero: this program is in machine coordinates. Clear offsets and rotation, then start again"
+_WORK = (
+    "work system {} is not zero: this program is in machine coordinates. Clear offsets and rotation, then start again"
+)
 _G92 = "G92 is not zero: this program is in machine coordinates. Clear it with G92.1, then start again"
 _TOOL = "a tool length is in force: this program is for the tool tip of the machine model. Cancel it with G49, then start again"
 

@@ -1,0 +1,139 @@
+"""The mark of a compensated program in its own geometry: the last decimals of its poses.
+
+Each pose of a compensated program is moved by the last decimal of its angles, or of X, Y and Z where the angles stand still,
+until a hash of its six written numbers is zero in its first bits. Of the poses of any other program one in `ONE_IN` has
+such a hash. The mark is in every pose, so it survives what texts do not: comments and line numbers taken out or changed, numbers
+spelt otherwise, feeds changed, lines added, moved or deleted. It does not survive other geometry: fewer decimals, another place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import bdtrc
+
+from dbbstation.nc.systems import elsewhere
+from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.toolpath import Toolpath
+
+BITS = 7
+ONE_IN = 2**BITS
+"""One pose in so many has the mark by chance. More would move poses farther, fewer would need longer programs."""
+
+BY_CHANCE = 1e-8
+"""Probability with which a program that is not compensated is taken for one: as rare as its own checksum of eight digits. Four
+poses with the mark are enough."""
+
+LEAST_WAY_MM, LEAST_TURN_DEG, LEAST_ONLY_TURN_DEG = 1e-3, 1e-6, 1e-3
+"""An axis is moved by the mark only where it moves itself by more than this, before and after the pose: what stands still must go
+on standing still, and F, which counts along the way, must go on taking its time within half a percent."""
+
+FARTHEST = 3
+"""Greatest step of a last decimal."""
+
+_SCALE = np.repeat([10.0**DECIMALS_MM, 10.0**DECIMALS_DEG], 3)
+_FELT_NM = np.array([1.0, 1.0, 1.0, 0.17, 0.17, 0.17])
+"""What the last decimal is worth, of an angle at a point 100 mm from the tip [nm]."""
+
+_ODD = np.array(
+    [
+        0x9E3779B97F4A7C15,
+        0xC2B2AE3D27D4EB4F,
+        0x165667B19E3779F9,
+        0xD6E8FEB86659FD93,
+        0xA0761D6478BD642F,
+        0xE7037ED1A0B428DB,
+    ],
+    dtype=np.uint64,
+)
+"""Odd numbers of 64 bits with about as many ones as zeros, one for each axis. They are part of what compensated programs are
+known by: never change them."""
+
+
+def marked(toolpath: Toolpath) -> Toolpath:
+    """Return a compensated toolpath with the mark in its poses, which are rounded as they will be written."""
+    moves = np.flatnonzero(toolpath.is_move)
+    if not len(moves):
+        return toolpath
+    numbers = _numbers(toolpath.poses[moves])
+    free = _free(toolpath, moves)
+    sums = _sums(numbers)
+    missing = np.flatnonzero(~_has_mark(sums) & free.any(axis=1))
+    for steps in _steps():
+        if not len(missing):
+            break
+        may = free[missing][:, steps != 0].all(axis=1)
+        found = may & _has_mark(sums[missing] + _sums(steps))
+        numbers[missing[found]] += steps
+        missing = missing[~found]
+    poses = toolpath.poses.copy()
+    poses[moves] = numbers / _SCALE
+    # Rows between moves stand where the move before them ended.
+    before = np.searchsorted(moves, np.arange(len(poses)), side="right") - 1
+    stands = ~toolpath.is_move & (before >= 0)
+    poses[stands] = poses[moves[before[stands]]]
+    return replace(toolpath, poses=poses)
+
+
+def is_marked(toolpath: Toolpath) -> bool:
+    """Whether more poses of a toolpath have the mark than chance gives."""
+    sums = np.unique(_sums(_numbers(toolpath.poses[toolpath.is_move])))
+    hits = int(np.count_nonzero(_has_mark(sums)))
+    return hits > 0 and float(bdtrc(hits - 1, len(sums), 1.0 / ONE_IN)) < BY_CHANCE
+
+
+def _numbers(poses: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Poses in units of their last decimals."""
+    numbers: NDArray[np.int64] = np.rint(poses * _SCALE).astype(np.int64)
+    return numbers
+
+
+def _sums(numbers: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Weighted sum of each row of six; that of a row that is moved by some steps is the sum of both."""
+    with np.errstate(over="ignore"):
+        weighted: NDArray[np.uint64] = (numbers.astype(np.uint64) * _ODD).sum(axis=-1, dtype=np.uint64)
+    return weighted
+
+
+def _has_mark(sums: NDArray[np.uint64]) -> NDArray[np.bool_]:
+    """Whether a sum, spread evenly over 64 bits, begins with zeros. [finaliser of SplitMix64, Steele et al. 2014]."""
+    with np.errstate(over="ignore"):
+        mixed = (sums ^ (sums >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    marked_ones: NDArray[np.bool_] = (mixed ^ (mixed >> np.uint64(31))) >> np.uint64(64 - BITS) == 0
+    return marked_ones
+
+
+def _free(toolpath: Toolpath, moves: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Axes that each move may have moved by a few last decimals, shape (m, 6)."""
+    poses = toolpath.poses[moves]
+    way = np.abs(np.diff(poses, axis=0))
+    tips = way[:, :3].max(axis=1) > 0.0
+    least = np.where(tips[:, None], [LEAST_WAY_MM] * 3 + [LEAST_TURN_DEG] * 3, [np.inf] * 3 + [LEAST_ONLY_TURN_DEG] * 3)
+    moving: NDArray[np.bool_] = way > least
+    free = np.ones(poses.shape, dtype=np.bool_)
+    free[:-1] &= moving
+    free[1:] &= moving
+    free[0] &= toolpath.start is None
+    # An axis that is held in another coordinate system has to keep the number of the move before.
+    apart = np.asarray(elsewhere(toolpath)[moves].any(axis=1))
+    free[apart | np.append(apart[1:], False)] = False
+    return free
+
+
+def _steps() -> list[NDArray[np.int64]]:
+    """Steps of the six last decimals, the least felt first."""
+    near, far = range(-1, 2), range(-FARTHEST, FARTHEST + 1)
+    tried = {(0, 0, 0, *angles) for angles in product(far, repeat=3)}
+    tried |= {(*places, 0, 0, 0) for places in product(far, repeat=3)}
+    tried |= set(product(near, repeat=6))
+    tried.discard((0,) * 6)
+    ordered = sorted(tried, key=lambda steps: (float(np.linalg.norm(_FELT_NM * steps)), steps))
+    return [np.array(steps, dtype=np.int64) for steps in ordered]

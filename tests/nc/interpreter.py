@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -18,7 +19,7 @@ RS274 = shutil.which("rs274")
 
 _CALL = re.compile(r"\s*\d+ N(?:\.+|\d+)\s*(?P<name>[A-Z]\w+)\((?P<arguments>.*)\)\s*")
 
-_STATE = {"USE_LENGTH_UNITS", "SET_FEED_RATE", "SET_MOTION_CONTROL_MODE", "SET_NAIVECAM_TOLERANCE", "SET_G5X_OFFSET"}
+_STATE = {"USE_LENGTH_UNITS", "SET_FEED_RATE", "SET_MOTION_CONTROL_MODE"}
 """Calls that change what later calls mean, and are nothing by themselves."""
 
 _MOVES = {"STRAIGHT_TRAVERSE": "RAPID", "STRAIGHT_FEED": "FEED", "ARC_FEED": "ARC"}
@@ -79,6 +80,8 @@ def printed(
     done = subprocess.run(
         [str(RS274), "-g", "-t", "tool.tbl", "-v", "rs274.var", "program.ngc"],
         cwd=folder,
+        # It keeps its tools in $HOME/.tool.mmap; two that run at once with one such file end with a bus error.
+        env=os.environ | {"HOME": str(folder)},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -86,6 +89,8 @@ def printed(
         check=False,
         timeout=60,
     )
+    if done.returncode < 0:
+        raise subprocess.CalledProcessError(done.returncode, "rs274", stderr=done.stderr)
     if done.returncode:
         return None
     found = []
@@ -110,37 +115,52 @@ def events(text: str | bytes, folder: Path, parameters: Mapping[int, float] | No
     made = printed(text, folder, parameters)
     if made is None:
         return None
-    unit, feed, pose, corner, offset = 1.0, (0.0, 0.0), np.zeros(6), "", np.zeros(6)
-    found: list[Event] = []
-    for name, arguments in made:
+    control = _Control()
+    return [event for name, arguments in made if (event := control.event(name, arguments)) is not None]
+
+
+class _Control:
+    """What holds until a call changes it."""
+
+    def __init__(self) -> None:
+        self.unit_mm, self.feed, self.pose, self.corner, self.offset = 1.0, (0.0, 0.0), np.zeros(6), "", np.zeros(6)
+
+    def event(self, name: str, arguments: str) -> Event | None:
+        """The event of a call; None where it only changes what holds, or means nothing to the machine."""
+        if name in _SILENT:
+            return None
+        if name in _MOVES:
+            return self._move(name, _numbers(arguments))
+        if name in _STOPS:
+            return Event(_STOPS[name], self.pose, dwell_s=float(arguments or 0.0))
+        if name == "SET_G5X_OFFSET":
+            system, *offset = _numbers(arguments)
+            self.offset = np.array(offset[:6]) * ([self.unit_mm] * 3 + [1.0] * 3)
+            return Event("SAID", self.pose, said=f"{name}({system:g})")
+        if name in _STATE:
+            self._set(name, arguments)
+            return None
+        return Event("SAID", self.pose, said=f"{name}({arguments})")
+
+    def _set(self, name: str, arguments: str) -> None:
         if name == "USE_LENGTH_UNITS":
-            unit = INCH_MM if "INCHES" in arguments else 1.0
-        elif name == "SET_MOTION_CONTROL_MODE":
-            mode, _, allowed = arguments.partition(",")
-            corner = f"{mode} {float(allowed) * unit:.4f}" if allowed else mode
-        elif name in _SILENT:
-            continue
-        elif name in {"MESSAGE", "LOG", "LOGOPEN", "PRINT"}:
-            found.append(Event("SAID", pose, said=f"{name}({arguments})"))
-        elif name in _MOVES or name in _STOPS or name in _STATE:
-            numbers = np.array([float(number) for number in arguments.split(",") if number.strip()])
-            if name == "SET_FEED_RATE":
-                feed = (float(numbers[0]) * unit, float(numbers[0]))
-            elif name == "SET_G5X_OFFSET":
-                offset = np.concatenate([numbers[1:4] * unit, numbers[4:7]])
-                found.append(Event("SAID", pose, said=f"{name}({numbers[0]:g})"))
-            elif name.startswith("STRAIGHT"):
-                pose = np.concatenate([numbers[:3] * unit, numbers[3:]])
-                found.append(Event(_MOVES[name], pose, feed, unit_mm=unit, corner=corner, offset=offset))
-            elif name == "ARC_FEED":
-                x, y, i, j, turns, z, *angles = numbers
-                pose = np.array([x * unit, y * unit, z * unit, *angles])
-                centre = (i * unit, j * unit)
-                found.append(Event("ARC", pose, feed, centre, int(turns), unit_mm=unit, corner=corner, offset=offset))
-            elif name == "DWELL":
-                found.append(Event("DWELL", pose, dwell_s=float(numbers[0])))
-            else:
-                found.append(Event(_STOPS[name], pose))
+            self.unit_mm = INCH_MM if "INCHES" in arguments else 1.0
+        elif name == "SET_FEED_RATE":
+            self.feed = (float(arguments) * self.unit_mm, float(arguments))
         else:
-            found.append(Event("SAID", pose, said=f"{name}({arguments})"))
-    return found
+            mode, _, allowed = arguments.partition(",")
+            self.corner = f"{mode} {float(allowed) * self.unit_mm:.4f}" if allowed else mode
+
+    def _move(self, name: str, numbers: list[float]) -> Event:
+        unit, centre, turns = self.unit_mm, (0.0, 0.0), 0
+        if name == "ARC_FEED":
+            x, y, i, j, rotation, z, *angles = numbers
+            numbers, centre, turns = [x, y, z, *angles], (i * unit, j * unit), int(rotation)
+        self.pose = np.array(numbers[:6]) * ([unit] * 3 + [1.0] * 3)
+        return Event(
+            _MOVES[name], self.pose, self.feed, centre, turns, unit_mm=unit, corner=self.corner, offset=self.offset
+        )
+
+
+def _numbers(arguments: str) -> list[float]:
+    return [float(number) for number in arguments.split(",") if number.strip()]

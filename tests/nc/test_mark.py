@@ -27,7 +27,7 @@ def renumbered(text: str) -> str:
 def in_inches(text: str) -> str:
     lines = []
     for line in without_numbers(text).replace("G21", "G20").splitlines():
-        if line[0] in "G":
+        if line[0] == "G":
             line = re.sub(r"([XYZ])(-?[\d.]+)", lambda m: f"{m[1]}{float(m[2]) / 25.4:.9f}", line)  # noqa: PLW2901
         lines.append(line)
     return "\n".join(lines) + "\n"
@@ -58,7 +58,7 @@ def test_a_compensated_circle_is_known_without_numbers(linuxcnc, crooked, table2
         compensated_program(linuxcnc.read(bare(without_numbers(program.text)), "a.ngc"), linuxcnc, Inverse(crooked))
 
 
-def test_nominal_programs_are_not_taken_for_compensated_ones(linuxcnc):
+def test_nominal_programs_are_not_taken_for_compensated_ones():
     """A thousand drawn programs, as CAM writes them and with all decimals: the chance is one in a hundred million each."""
     draw = np.random.default_rng(7)
     for count in (1, 2, 5, 6, 7, 20, 300):
@@ -69,7 +69,7 @@ def test_nominal_programs_are_not_taken_for_compensated_ones(linuxcnc):
                 assert not is_marked(read_program("G21 G90\nG0 " + "\n".join(lines) + "\nM2\n", "x.ngc"))
 
 
-def test_a_pattern_that_is_run_many_times_is_one_pattern(linuxcnc):
+def test_a_pattern_that_is_run_many_times_is_one_pattern():
     """Poses count once: one that has the mark by chance does not become evidence by being repeated."""
     draw = np.random.default_rng(3)
     while True:
@@ -99,7 +99,7 @@ def test_the_mark_moves_no_tip_where_the_angles_move(crooked, table2):
     assert off[:, :3].max() <= 3.01e-6
 
 
-def test_what_stands_still_goes_on_standing_still(crooked, linuxcnc):
+def test_what_stands_still_goes_on_standing_still():
     """Angles that are held (so that LinuxCNC blends), and a turn about a tip at rest, whose F counts degrees."""
     lines = "\n".join(f"X{k % 7 + 0.001 * k:.3f} Y{k % 5}" for k in range(40))
     path = read_program(f"G21 G90\nG0 X0 Y0 Z-1000 A1 B0 C0\nG1 F500\n{lines}\nG1 A5 F60\nA7\nA9 B2\nM2\n", "x.ngc")

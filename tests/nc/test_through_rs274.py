@@ -11,14 +11,11 @@ import numpy as np
 import pytest
 
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.export import Inverse, compensated_program
-from dbbstation.nc.rs274.guard import guard_lines
-from dbbstation.nc.rs274.reader import read_program
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
 from tests.nc.grammar import part
-from tests.nc.interpreter import INCH_MM, RS274, events
+from tests.nc.interpreter import RS274, events
 from tests.nc.through_rs274 import DiffersError, compare, compare_elsewhere
 
 pytestmark = pytest.mark.skipif(RS274 is None, reason="LinuxCNC's interpreter rs274 is not installed")

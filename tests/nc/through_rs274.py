@@ -28,6 +28,8 @@ CHORD_MM = 1.5e-4
 """The chord that was asked for, and what our own arcs add to it [mm]."""
 
 LEVER_MM = 100.0
+SCALE = np.array([1.0] * 3 + [math.radians(LEVER_MM)] * 3)
+"""What a unit of each axis is worth, of an angle at a point so far from the tip [mm]."""
 
 SHARE_OF_TIME = 2e-3
 """Compensated moves are as long as nominal ones within a part in a thousand, so their times are too."""
@@ -180,9 +182,8 @@ class _Line:
         self.way = self.end - self.start
 
     def nearest(self, pose: np.ndarray) -> np.ndarray:
-        scale = np.array([1.0] * 3 + [math.radians(LEVER_MM)] * 3)
-        length = float(np.sum((scale * self.way) ** 2))
-        share = 0.0 if length == 0.0 else float(np.sum(scale**2 * (pose - self.start) * self.way)) / length
+        length = float(np.sum((SCALE * self.way) ** 2))
+        share = 0.0 if length == 0.0 else float(np.sum(SCALE**2 * (pose - self.start) * self.way)) / length
         return self.start + min(max(share, 0.0), 1.0) * self.way
 
     def is_at_end(self, pose: np.ndarray, slack: float) -> bool:
@@ -213,17 +214,25 @@ class _Arc:
             swept = math.tau
         self.swept = swept + (abs(event.turns) - 1) * math.tau
         self.radii = math.hypot(*first), math.hypot(*last)
-        self.at, self.turned = math.atan2(first[1], first[0]), 0.0
+        self.first = self.at = math.atan2(first[1], first[0])
+        self.turned = 0.0
 
     def nearest(self, pose: np.ndarray) -> np.ndarray:
         x, y = pose[:2] - self.centre
         now = math.atan2(y, x)
         step = (self.sign * (now - self.at) + math.pi) % math.tau - math.pi
         self.at, self.turned = now, self.turned + step
-        share = self.turned / self.swept
-        there = self.start + share * (self.end - self.start)
+        # The angle tells the place on a steep helix badly: one step of least squares along it.
+        share, small = self.turned / self.swept, 1e-6
+        there = self._place(share)
+        along = SCALE * (self._place(share + small) - there) / small
+        return self._place(share + float(SCALE * (pose - there) @ along) / float(along @ along))
+
+    def _place(self, share: float) -> np.ndarray:
+        there: np.ndarray = self.start + share * (self.end - self.start)
+        angle = self.first + self.sign * share * self.swept
         radius = self.radii[0] + share * (self.radii[1] - self.radii[0])
-        there[:2] = self.centre + radius * np.array([math.cos(now), math.sin(now)])
+        there[:2] = self.centre + radius * np.array([math.cos(angle), math.sin(angle)])
         return there
 
     def is_at_end(self, pose: np.ndarray, slack: float) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.machine.difference import check_model_is_of
+from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import CHORD_MM, compensate_toolpath
@@ -201,6 +202,7 @@ def _program(
     check_feeds(machine, path)
     if inverse is None:
         return Program(name, dialect.write(path, header), _points(path))
+    check_joints(inverse.model.machine)
     model, started_s = inverse.model, inverse.started_s
     done = compensate_toolpath(path, model, chord_mm=chord_mm, started_s=started_s, largest_mm=inverse.largest_mm)
     check_reach(machine, done.toolpath)

@@ -11,11 +11,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 RS274 = shutil.which("rs274")
+
+needs_rs274 = pytest.mark.skipif(
+    RS274 is None and "DBBSTATION_RS274" not in os.environ, reason="LinuxCNC's interpreter rs274 is not installed"
+)
+"""Skips without the interpreter; where `DBBSTATION_RS274` is set, as in CI, the test fails without it."""
 
 _CALL = re.compile(r"\s*\d+ N(?:\.+|\d+)\s*(?P<name>[A-Z]\w+)\((?P<arguments>.*)\)\s*")
 
@@ -73,12 +79,13 @@ def printed(
         folder: for its files.
         parameters: numbered parameters that the control has at the start, lengths in inches.
     """
+    assert RS274 is not None, "LinuxCNC's interpreter rs274 is not installed: package linuxcnc-uspace"
     (folder / "tool.tbl").write_text("T1 P1 D0.1 Z0\n")
     stored = sorted((parameters or {}).items())
     (folder / "rs274.var").write_text("".join(f"{number}\t{value:.9f}\n" for number, value in stored))
     (folder / "program.ngc").write_bytes(text if isinstance(text, bytes) else text.encode())
     done = subprocess.run(
-        [str(RS274), "-g", "-t", "tool.tbl", "-v", "rs274.var", "program.ngc"],
+        [RS274, "-g", "-t", "tool.tbl", "-v", "rs274.var", "program.ngc"],
         cwd=folder,
         # It keeps its tools in $HOME/.tool.mmap; two that run at once with one such file end with a bus error.
         env=os.environ | {"HOME": str(folder)},

@@ -17,10 +17,10 @@ from dbbstation.errors import InputError
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import Step, Toolpath
 from tests.nc.grammar import program
-from tests.nc.interpreter import MOTION, RS274, Event, events
+from tests.nc.interpreter import MOTION, Event, events, needs_rs274
 
 pytestmark = [
-    pytest.mark.skipif(RS274 is None, reason="LinuxCNC's interpreter rs274 is not installed"),
+    needs_rs274,
     pytest.mark.slow,
 ]
 

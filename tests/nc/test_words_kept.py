@@ -13,11 +13,9 @@ from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.rs274.guard import guard_lines
 from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import PIECE_CORNER_MM, Ending
-from tests.nc.interpreter import RS274, events, printed
+from tests.nc.interpreter import events, needs_rs274, printed
 
 FIRST = "G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\n"
-
-with_rs274 = pytest.mark.skipif(RS274 is None, reason="LinuxCNC's interpreter rs274 is not installed")
 
 
 def written(linuxcnc, text: str) -> list[str]:
@@ -163,7 +161,7 @@ OFFSETS = {
 }
 
 
-@with_rs274
+@needs_rs274
 @pytest.mark.parametrize("which", OFFSETS)
 @pytest.mark.parametrize("model", [None, "crooked"])
 def test_a_ball_bar_program_stops_where_an_offset_is_not_zero(linuxcnc, table2, crooked, tmp_path, which, model):
@@ -184,7 +182,7 @@ def test_a_ball_bar_program_stops_where_an_offset_is_not_zero(linuxcnc, table2, 
     assert message in said
 
 
-@with_rs274
+@needs_rs274
 @pytest.mark.parametrize(("before", "stops"), [("G43.1 Z1", True), ("G43.1 Z1\nG49", False), ("T1 M6", False)])
 def test_a_ball_bar_program_stops_where_a_tool_length_is_in_force(linuxcnc, table2, tmp_path, before, stops):
     text = linuxcnc.write(circle_toolpath(table2.tests["a"].circle, "a", step_deg=5.0, approach=None))
@@ -207,7 +205,7 @@ def test_an_exact_stop_belongs_to_the_ends_of_the_written_move(linuxcnc, crooked
     np.testing.assert_allclose(path.poses[circle, :2], [0.0, 3.0], atol=1.0)
 
 
-@with_rs274
+@needs_rs274
 def test_linuxcnc_sees_one_exact_end_for_each_exact_move(linuxcnc, crooked, tmp_path):
     text = FIRST + "G61\nG1 X100 Y3 F500\nG3 I20\nG1 X5\nM2\n"
     done = compensated_program(linuxcnc.read(text, "x.ngc"), linuxcnc, Inverse(crooked)).text

@@ -35,8 +35,9 @@ LEAST_WAY_MM, LEAST_TURN_DEG, LEAST_ONLY_TURN_DEG = 1e-3, 1e-6, 1e-3
 """An axis is moved by the mark only where it moves itself by more than this, before and after the pose: what stands still must go
 on standing still, and F, which counts along the way, must go on taking its time within half a percent."""
 
-FARTHEST = 3
-"""Greatest step of a last decimal."""
+FARTHEST_PLACE, FARTHEST_ANGLE = 1, 3
+"""Greatest steps of the last decimals of X, Y, Z and of A, B, C: a nanometre, and half a nanometre at a point 100 mm from the
+tip. Where A, B and C stand still one pose in five has the mark; thirty poses are enough then."""
 
 _SCALE = np.repeat([10.0**DECIMALS_MM, 10.0**DECIMALS_DEG], 3)
 _FELT_NM = np.array([1.0, 1.0, 1.0, 0.17, 0.17, 0.17])
@@ -130,10 +131,8 @@ def _free(toolpath: Toolpath, moves: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 def _steps() -> list[NDArray[np.int64]]:
     """Steps of the six last decimals, the least felt first."""
-    near, far = range(-1, 2), range(-FARTHEST, FARTHEST + 1)
-    tried = {(0, 0, 0, *angles) for angles in product(far, repeat=3)}
-    tried |= {(*places, 0, 0, 0) for places in product(far, repeat=3)}
-    tried |= set(product(near, repeat=6))
+    near, far = range(-FARTHEST_PLACE, FARTHEST_PLACE + 1), range(-FARTHEST_ANGLE, FARTHEST_ANGLE + 1)
+    tried = {(0, 0, 0, *angles) for angles in product(far, repeat=3)} | set(product(near, repeat=6))
     tried.discard((0,) * 6)
     ordered = sorted(tried, key=lambda steps: (float(np.linalg.norm(_FELT_NM * steps)), steps))
     return [np.array(steps, dtype=np.int64) for steps in ordered]

@@ -96,12 +96,12 @@ def test_the_mark_moves_no_tip_where_the_angles_move(crooked, table2):
     off = np.abs(with_mark.poses - done.poses)[done.is_move]
     assert off[:, 3:].max() <= 3.01e-7
     assert np.mean(off[:, :3].max(axis=1) > 1e-9) < 0.4  # where one of the angles hardly changes
-    assert off[:, :3].max() <= 3.01e-6
+    assert off[:, :3].max() <= 1.01e-6
 
 
 def test_what_stands_still_goes_on_standing_still():
     """Angles that are held (so that LinuxCNC blends), and a turn about a tip at rest, whose F counts degrees."""
-    lines = "\n".join(f"X{k % 7 + 0.001 * k:.3f} Y{k % 5}" for k in range(40))
+    lines = "\n".join(f"X{k % 7 + 0.001 * k:.3f} Y{k % 5} Z{-1000 - k % 3}" for k in range(150))
     path = read_program(f"G21 G90\nG0 X0 Y0 Z-1000 A1 B0 C0\nG1 F500\n{lines}\nG1 A5 F60\nA7\nA9 B2\nM2\n", "x.ngc")
     with_mark = marked(path)
     assert is_marked(with_mark)

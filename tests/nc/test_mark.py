@@ -10,7 +10,7 @@ import pytest
 from dbbstation.errors import StationError
 from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.export import Inverse, circle_programs, compensated_program
-from dbbstation.nc.mark import BY_CHANCE, ONE_IN, is_marked, marked
+from dbbstation.nc.mark import BITS, BY_CHANCE, _has_mark, _numbers, _sums, is_marked, marked
 from dbbstation.nc.rs274.reader import read_program
 
 PART = "G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X20 F500\nG4 P0.5\nG1 Y5 A2\nX7 Y7\nX0 Y9\nX3 Y0\nM0\nG0 Z-950\nM2\n"
@@ -52,6 +52,22 @@ def test_a_compensated_program_is_known_whatever_its_text(linuxcnc, crooked, cha
         compensated_program(linuxcnc.read(bare(change(once)), "again.ngc"), linuxcnc, Inverse(crooked))
 
 
+@pytest.mark.parametrize(
+    "moves",
+    [
+        "G1 X20 F500\n",
+        "G0 X20\n",
+        "G1 X9 F100\nG0 Z-990\n",
+        "G54\nG1 X20 F500\nG55 G0 X0 Y0 Z-1000 A0 B0 C0\nG53 G0 Z-950\n",
+    ],
+)
+def test_a_program_of_two_moves_is_known_too(linuxcnc, crooked, moves):
+    path = read_program(f"G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\n{moves}M2\n", "part.ngc")
+    once = compensated_program(path, linuxcnc, Inverse(crooked)).text
+    with pytest.raises(StationError, match="compensated already, say the last decimals"):
+        compensated_program(linuxcnc.read(bare(without_numbers(once)), "again.ngc"), linuxcnc, Inverse(crooked))
+
+
 def test_a_compensated_circle_is_known_without_numbers(linuxcnc, crooked, table2):
     (program, _) = circle_programs(table2, crooked.machine, linuxcnc, inverse=Inverse(crooked), tests=["a"])
     with pytest.raises(StationError, match="compensated already"):
@@ -76,15 +92,14 @@ def test_a_pattern_that_is_run_many_times_is_one_pattern():
         pose = np.round(draw.uniform(-50.0, 50.0, 6), 3)
         line = " ".join(f"{a}{v:.3f}" for a, v in zip("XYZABC", pose, strict=True))
         path = read_program(f"G21 G90\nG0 {line}\nG1 X0 F100\n" + f"{line}\nX0\n" * 50 + "M2\n", "x.ngc")
-        alone = read_program(f"G21 G90\nG0 {line}\nM2\n", "x.ngc")
-        if np.array_equal(marked(alone).poses, alone.poses):  # it has the mark
+        if _has_mark(_sums(_numbers(path.poses[:1])), BITS[4])[0]:
             break
     assert not is_marked(path)
 
 
 def test_the_chance_is_what_is_said():
-    """Four poses with the mark: 128 to the power of -4."""
-    assert ONE_IN**-4.0 < BY_CHANCE < ONE_IN**-3.0
+    """All of the fewest poses with all of their bits."""
+    assert all(0.5 ** (bits * poses) < BY_CHANCE for poses, bits in BITS.items())
 
 
 def test_the_mark_moves_no_tip_where_the_angles_move(crooked, table2):

@@ -42,13 +42,13 @@ def guard_lines(systems: Sequence[str] = ()) -> tuple[str, ...]:
     for parameters, message in checks:
         for first in range(0, len(parameters), _TERMS):
             condition = " OR ".join(f"[{one} NE 0]" for one in parameters[first : first + _TERMS])
-            lines += [f"o{label} if [{condition}]", f"(MSG, {message})", "M0", "M2", f"o{label} endif"]
+            lines += [f"o{label} if [{condition}]", f"(MSG, {message})", "M0", "M02", f"o{label} endif"]
             label += 1
     return tuple(lines)
 
 
 _NAMED = re.compile(r"if\[\[#(\d{4})ne0\]")
-_OF_A_GUARD = re.compile(r"o\d+|m0$|m2$")
+_OF_A_GUARD = re.compile(r"o\d+|m0$|m02$")
 
 
 def guard_at(lines: Sequence[str]) -> tuple[tuple[str, ...], int] | None:

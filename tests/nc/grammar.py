@@ -213,7 +213,8 @@ class _Machinist(_Author):
         if self.has_feed and self.draw.random() < 0.6:
             return ""
         self.has_feed = True
-        return f" F{self.draw.uniform(50, 3000) / self.unit_mm:.2f}"
+        # So slow that short pieces with A, B and C keep it on a control that does not look ahead there.
+        return f" F{self.draw.uniform(5, 40) / self.unit_mm:.3f}"
 
     def straight(self) -> str:
         draw = self.draw

@@ -166,9 +166,7 @@ OFFSETS = {
 @pytest.mark.parametrize("model", [None, "crooked"])
 def test_a_ball_bar_program_stops_where_an_offset_is_not_zero(linuxcnc, table2, crooked, tmp_path, which, model):
     inverse = None if model is None else Inverse(crooked)
-    (program, _) = circle_programs(
-        table2, crooked.machine, linuxcnc, inverse=inverse, tests=["a"], step_deg=5.0, approach=None
-    )
+    (program, _) = circle_programs(table2, crooked.machine, linuxcnc, inverse=inverse, tests=["a"], approach=None)
     parameters, message = OFFSETS[which]
     made = printed(program.text, tmp_path, parameters)
     names = [name for name, _ in made]

@@ -9,16 +9,19 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.machine.difference import check_model_is_of
+from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import CHORD_MM, Prefer, Slow, compensate_toolpath
 from dbbstation.nc.kept import check_chord, check_feed, cost, too_slow
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
+from dbbstation.nc.mark import marked
 from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
 from dbbstation.nc.planner import Planner
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM
 from dbbstation.nc.reach import check_feeds, check_reach
+from dbbstation.nc.systems import in_systems
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
@@ -224,6 +227,7 @@ def _program(
     check_feeds(machine, path)
     if inverse is None:
         return Program(name, dialect.write(path, header), _points(path))
+    check_joints(inverse.model.machine)
     asked_um, prefer = 1e3 * chord_mm, inverse.prefer
     done = compensate_toolpath(
         path,
@@ -245,11 +249,12 @@ def _program(
     uncertainty_um = _uncertainty_um(path, inverse)
     if uncertainty_um is not None:
         header.append(f"standard uncertainty of the model along the path {uncertainty_um:.3f} um at most")
-    mark = checksum(done.toolpath)
+    finished = marked(in_systems(done.toolpath))
+    number = checksum(finished)
     return Program(
         name,
-        dialect.write(replace(done.toolpath, numbers=(mark, mark)), header),
-        _points(done.toolpath),
+        dialect.write(replace(finished, numbers=(number, number)), header),
+        _points(finished),
         done.greatest_um,
         done.chord_um,
         asked_um,

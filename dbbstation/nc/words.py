@@ -14,7 +14,7 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.nc.dialect import Dialect
-from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, MACHINE_SYSTEM, Step, rounded
+from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, MACHINE_SYSTEM, Ending, Step, rounded
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -97,7 +97,7 @@ class WordDialect(Dialect):
         yield from around
         yield from self._body(toolpath)
         around = list(self.end(toolpath))
-        if toolpath.numbers and around:
+        if toolpath.numbers and around and toolpath.ending is not Ending.TEXT:
             around[-1] = f"{self.line_number(toolpath.numbers[-1])}{around[-1]}"
         yield from around
 
@@ -227,7 +227,7 @@ class WordDialect(Dialect):
                 continue
             alike = np.flatnonzero(which == one)
             axes = np.flatnonzero(changed[alike[0]])
-            form = " ".join(self.axis_forms[axis] for axis in axes)
+            form = " ".join(self.axis_forms[axis] for axis in axes.tolist())
             for row, values in zip(alike.tolist(), poses[np.ix_(alike, axes)].tolist(), strict=True):
                 texts[row] = form % tuple(values)
         return texts

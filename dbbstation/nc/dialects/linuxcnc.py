@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING
 
 from dbbstation.nc.dialect import plain
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 MODES = "G21 G90 G94 G17 G40 G49"
 """Millimetres, absolute, feed per minute, arcs in XY, no cutter compensation, no tool length: the model is about the
 tool tip. A program must not inherit any of these from the one before it."""
+
+
+_FUNCTION = re.compile(r"S[0-9.]+|M[345789]")
 
 
 class LinuxCNC(WordDialect):
@@ -98,7 +102,9 @@ class LinuxCNC(WordDialect):
         return f"({text})"
 
     def function(self, words: str) -> str:
-        """The words as they are."""
+        """The words as they are, spindle and coolant; a tool has another tip than the model."""
+        if not all(_FUNCTION.fullmatch(word) for word in words.split()):
+            raise self.cannot_say(words)
         return words
 
     def system(self, name: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274 import codes
@@ -11,10 +12,18 @@ from dbbstation.nc.rs274.codes import Group
 from dbbstation.nc.rs274.guard import guard_at
 from dbbstation.nc.rs274.tokens import BadLine, Comment, Place, Word, tokens
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 BLANKS = " \t\r"
 
 LONGEST_BYTES = 252
 """LinuxCNC's interpreter refuses lines of more bytes, the CR before the line feed counted [measured with rs274 2.9]."""
+
+MOST_GUARD = 1000
+"""A guard has fewer lines, empty ones between them counted."""
+
+_MAY_GUARD = re.compile(r"[ \t]*+(?:[nN][0-9 \t]++)?+[oO]")
 
 _CONTROL = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028\u2029]")
 """All control characters but the tab, and the line separators of Unicode."""
@@ -49,21 +58,26 @@ class Block:
         return None if word is None else word.value
 
 
-def blocks(text: str, file: str, faults: list[Problem]) -> list[Block]:
-    """Return all lines up to the program's end, with faults added to `faults`; a program without an end is one."""
+def blocks(text: str, file: str, faults: list[Problem]) -> Iterator[Block]:
+    """All lines up to the program's end, one by one, so that a long program is read in little memory.
+
+    Args:
+        text: the program.
+        file: for messages.
+        faults: those of the lines so far; complete once every block was taken. A program without an end is one.
+    """
     lines = text.split("\n")
     percent, first = _opening(lines)
-    found: list[Block] = []
     behind_guard = first
     for number, line in enumerate(lines[first:], first + 1):
         if number <= behind_guard:
             continue
         if percent and _is_percent(line):
-            return found
+            return
         place = Place(file, number)
-        guard = guard_at(lines[number - 1 :]) if "o" in line or "O" in line else None
+        guard = guard_at(lines[number - 1 : number - 1 + MOST_GUARD]) if _MAY_GUARD.match(line) else None
         if guard is not None:
-            found.append(Block(place, guard=guard[0]))
+            yield Block(place, guard=guard[0])
             behind_guard = number - 1 + guard[1]
             continue
         try:
@@ -71,15 +85,14 @@ def blocks(text: str, file: str, faults: list[Problem]) -> list[Block]:
         except BadLine as fault:
             faults.append(fault.problem)
             if len(faults) >= MOST_FAULTS:
-                return found
+                return
             continue
-        found.append(block)
+        yield block
         if block.code(Group.STOP) in {2.0, 30.0}:
             if percent and not any(_is_percent(after) for after in lines[number:]):
                 faults.append(_cut_short(file, lines, "the % that closes it"))
-            return found
+            return
     faults.append(_cut_short(file, lines, "the % that closes it" if percent else "M2 or M30"))
-    return found
 
 
 def _opening(lines: list[str]) -> tuple[bool, int]:
@@ -139,7 +152,9 @@ def _block(line: str, place: Place) -> Block:
     return block
 
 
-_ACTIVE = re.compile(r"(?:msg|debug|print|log|logopen|logappend|probeopen|abort),|(?:logclose|probeclose)", re.IGNORECASE)
+_ACTIVE = re.compile(
+    r"(?:msg|debug|print|log|logopen|logappend|probeopen|abort),|(?:logclose|probeclose)", re.IGNORECASE
+)
 """Begins of comments that LinuxCNC acts on."""
 
 _PYTHON = re.compile(r"py,|pyrun,|pyreload", re.IGNORECASE)

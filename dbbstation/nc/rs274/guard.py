@@ -21,7 +21,9 @@ _SYSTEM, _PER_SYSTEM = 5200, 20
 _TERMS = 5
 """In one line; a line of LinuxCNC has an end."""
 
-_WORK = "work system {} is not zero: this program is in machine coordinates. Clear offsets and rotation, then start again"
+_WORK = (
+    "work system {} is not zero: this program is in machine coordinates. Clear offsets and rotation, then start again"
+)
 _G92 = "G92 is not zero: this program is in machine coordinates. Clear it with G92.1, then start again"
 _TOOL = "a tool length is in force: this program is for the tool tip of the machine model. Cancel it with G49, then start again"
 
@@ -40,13 +42,13 @@ def guard_lines(systems: Sequence[str] = ()) -> tuple[str, ...]:
     for parameters, message in checks:
         for first in range(0, len(parameters), _TERMS):
             condition = " OR ".join(f"[{one} NE 0]" for one in parameters[first : first + _TERMS])
-            lines += [f"o{label} if [{condition}]", f"(MSG, {message})", "M0", "M2", f"o{label} endif"]
+            lines += [f"o{label} if [{condition}]", f"(MSG, {message})", "M0", "M02", f"o{label} endif"]
             label += 1
     return tuple(lines)
 
 
 _NAMED = re.compile(r"if\[\[#(\d{4})ne0\]")
-_OF_A_GUARD = re.compile(r"o\d+|m0$|m2$")
+_OF_A_GUARD = re.compile(r"o\d+|m0$|m02$")
 
 
 def guard_at(lines: Sequence[str]) -> tuple[tuple[str, ...], int] | None:

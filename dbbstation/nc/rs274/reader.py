@@ -50,18 +50,20 @@ def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = No
         InputError: faults with line and column; all unreadable words at once, or the first block that makes no sense.
     """
     faults: list[Problem] = []
-    program = blocks(text, file, faults)
-    if faults:
-        raise InputError(faults)
+    senseless: BadLine | None = None
     interpreter = _Interpreter(ToolpathBuilder(file, start), start)
     interpreter.path.ending = Ending.TEXT  # unless a block says otherwise
-    try:
-        for block in program:
+    for block in blocks(text, file, faults):
+        if faults or senseless is not None:
+            continue  # the other lines are looked at for what cannot be read
+        try:
             interpreter.run(block)
-    except BadLine as fault:
-        raise InputError([fault.problem]) from None
-    numbered = [int(block.words["N"].value) for block in program if "N" in block.words]
-    interpreter.path.numbers = tuple(numbered[:: max(len(numbered) - 1, 1)])
+        except BadLine as fault:
+            senseless = fault
+    if faults:
+        raise InputError(faults)
+    if senseless is not None:
+        raise InputError([senseless.problem])
     path = interpreter.path.built()
     if not path.is_move.any():
         raise InputError([Problem(file, 0, 0, "this program moves nothing", "check that it is the file you mean")])
@@ -89,6 +91,9 @@ class _Interpreter:
 
     def run(self, block: Block) -> None:
         """Execute one block in the order that RS274/NGC gives [RS274/NGC 3.8]."""
+        if "N" in block.words:
+            numbered = int(block.words["N"].value)
+            self.path.numbers = (*self.path.numbers[:1], numbered)
         self._said(block)
         self._units(block)
         self._feed(block)

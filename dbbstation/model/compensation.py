@@ -1,8 +1,12 @@
-"""Inversion of a machine model: what to command so that the tool goes where it should."""
+"""Inversion of a machine model: what to command so that the tool goes where it should.
+
+A path is inverted from its beginning on, stretch by stretch. What play, friction and lag remember goes from each stretch to the
+next, so that a program of any length is inverted in the memory that one stretch takes.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,66 +15,124 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import forward, strut_lengths
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import Actual, MachineModel, actual_hexapod
+from dbbstation.model.root_search import MOST_MM, RootSearch
+from dbbstation.sources.contract import Effect
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from dbbstation.sources.contract import Motion
+    from dbbstation.sources.contract import Fitted, Motion, State
 
-MOST_ROUNDS = 1000
-"""A pose-dependent error needs three or four; play hands its correction on from sample to sample, some tens."""
+MOST_ROUNDS = 50
+"""An error that hangs on the pose needs three or four: each round leaves the ratio of error to travel, about 1e-4."""
+
 AGREED_MM = 1e-10
-PASSED_ON_MM = 1e-5
-"""What friction and play may still hand to and fro between samples when the rounds are over: ten nanometres."""
+
+MET_MM = 1e-9
+"""How well a strut meets its length where there is a history: a thousandth of what programs write."""
+
+MOST_TOGETHER = 512
+"""Rows that are tried at once behind the last one that is met."""
+
+TRIES = 8
+"""Most rounds for rows together, before the first one that is not met is looked for alone."""
+
+GETS_ON = 0.5
+"""Share of what the first row lacks that a round may leave of it; a row in which more is left is looked for alone."""
+
+FEWEST_TOGETHER = 16
+"""Rows that are tried at once where few were met: a round over so many costs as much as over one."""
+
+STEEPEST, FLATTEST = -3.0, -0.2
+"""Bounds of the slope that is taken from two rounds: of what a strut lacks by what is commanded, -1 where its error does not
+change with the command."""
+
+
+@dataclass(frozen=True, eq=False)
+class Passed:
+    """What a model remembers of a path so far, between two stretches.
+
+    Attributes:
+        model: the machine's own sources.
+        states: of the sources with a history, those first whose errors build up, else in the model's order.
+        held_back_mm: what the history added to the driven lengths in the last row, shape (6,) [mm]: where the search begins
+            in the next.
+    """
+
+    model: MachineModel
+    states: tuple[State, ...]
+    held_back_mm: NDArray[np.float64]
 
 
 def compensated(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
     """Poses to command so that the actual machine goes to the wanted ones, in six degrees of freedom.
 
-    The controller drives the struts to F(T; nominal). The actual machine needs F(T wanted; actual) less what the
-    error sources add, so the command is the pose at which the nominal machine has those lengths. Weights pull where
-    the machine will be, at the wanted poses. All other sources act on what is commanded, hence the rounds: where they
-    hang on the pose, each shrinks the remainder by the ratio of error to travel, about 1e-4; where they do not, the
-    first rounds are exact.
-
     Args:
         model: calibrated model; only what belongs to the machine is inverted.
-        wanted: poses that the tool tip should take, all rows.
+        wanted: poses that the tool tip should take, all rows. Between the poses commanded the machine goes straight: who
+            predicts where it goes makes their motion `straight`.
 
     Returns:
         Poses, shape (n, 6) [mm, deg], for all rows of `wanted`.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
-        ModelError: a source needs what the motion does not give, or the rounds do not agree.
+        ModelError: a source needs what the motion does not give, or looks ahead; or no command leads to a wanted pose.
+    """
+    return compensated_on(begun(model, wanted), wanted)[0]
+
+
+def begun(model: MachineModel, wanted: Motion) -> Passed:
+    """What is remembered before a path.
+
+    Args:
+        model: calibrated model; only what belongs to the machine is inverted.
+        wanted: the path, or its beginning: it shows which way the struts set out.
+
+    Raises:
+        ModelError: a source needs what the motion does not give, or looks ahead.
     """
     own = model.of_the_machine()
-    nominal, convention = model.machine.hexapod, model.machine.hexapod.rotation
-    target = Frames.from_poses(wanted.poses, convention)
-    commanded, last, change = wanted.poses, np.full((len(wanted), 6), np.inf), np.inf
-    there: Actual | None = None
-    for _ in range(MOST_ROUNDS):
-        motion = replace(wanted, poses=commanded)
-        effect = own.effect(motion, there)
-        platform = target
-        if effect.tool_tip_mm is not None:
-            tip = np.broadcast_to(effect.tool_tip_mm, (len(target), 3))
-            platform = replace(target, position_mm=target.position_mm - np.einsum("nij,nj->ni", target.rotation, tip))
-        there = Actual(own, motion, actual_hexapod(nominal, effect), platform, effect)
-        needed = strut_lengths(there.hexapod, platform)
-        strut = 0.0 if effect.strut_mm is None else effect.strut_mm
-        driven = needed - strut + model.machine.reference_length_error_mm
-        change = float(np.abs(driven - last).max())
-        if change < AGREED_MM:
-            return commanded
-        commanded = forward(nominal, driven, target).to_poses(convention)
-        last = driven
-    if change < PASSED_ON_MM:
-        return commanded
-    raise ModelError(
-        f"the compensation does not settle: {change:.2e} mm after {MOST_ROUNDS} rounds",
-        remedy="check the model's sources for an effect as large as the motion itself",
-    )
+    motion = replace(wanted, straight=True)
+    for fitted in own.acting(motion):
+        fitted.source.require(motion)
+        if fitted.source.looks_ahead:
+            raise ModelError(
+                f"the error source {fitted.source.name} cannot be compensated: its effect hangs on what the machine does later",
+                remedy="leave it out of the model, or write its effect from the rows so far and set `looks_ahead` to False",
+            )
+    remembering = _with_history(own, motion)
+    states = tuple(fitted.source.begin(motion, own.as_found, fitted.values) for fitted in remembering)
+    return Passed(own, states, np.zeros(6))
+
+
+def compensated_on(passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64], Passed]:
+    """Poses to command along one stretch of a path.
+
+    The controller drives the struts to F(T; nominal). The actual machine needs F(T wanted; actual) less what the
+    error sources add, so the command is the pose at which the nominal machine has those lengths. Weights pull where
+    the machine will be, at the wanted poses; all other sources act on what is commanded. Those without a history settle in
+    three or four rounds over all rows, and so do those whose errors build up, which say what leads to the wanted lengths; jumps that
+    the others ask for are not asked of these, for no command makes a late drive jump. What the others do in a row hangs on the commands before, which are known by
+    then: rows are tried together from what the history did in the row before; those that are met are kept, and the first that
+    is not is looked for alone, strut by strut between bounds [a bisection, as at a reversal, where play makes the command jump].
+
+    Args:
+        passed: of `begun`, or what came back from the stretch before; it stays as it is, so that a stretch can be tried again
+            with other rows.
+        wanted: poses that the tool tip should take, in time order.
+
+    Returns:
+        Poses, shape (n, 6) [mm, deg], and what is remembered behind the last row.
+
+    Raises:
+        KinematicsError: a pose that the machine cannot take.
+        ModelError: a source needs what the motion does not give; or no command leads to a wanted pose.
+    """
+    if len(wanted) == 0:
+        return wanted.poses, passed
+    stretch = _Stretch(passed, replace(wanted, straight=True))
+    return stretch.commanded(stretch.with_history()), stretch.passed()
 
 
 def shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
@@ -83,3 +145,196 @@ def shifted(model: MachineModel, wanted: Motion) -> NDArray[np.float64]:
     poses = wanted.poses.copy()
     poses[:, :3] -= error[:, :3]
     return poses
+
+
+def _with_history(own: MachineModel, motion: Motion) -> tuple[Fitted, ...]:
+    """Sources with a history, those first whose errors build up."""
+    there = (f for f in own.acting(motion) if f.source.has_history)
+    return tuple(sorted(there, key=lambda fitted: not fitted.source.builds_up))
+
+
+class _Slope:
+    """How what is lacking answers to the command, each strut in each row for itself: a secant through two rounds."""
+
+    def __init__(self) -> None:
+        self._before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+
+    def step(self, driven: NDArray[np.float64], lacking: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What to add to a command, shape (k, 6) [mm]."""
+        slope = np.full(driven.shape, -1.0)
+        if self._before is not None:
+            moved = driven - self._before[0]
+            seen = np.abs(moved) > AGREED_MM
+            slope = np.where(seen, (lacking - self._before[1]) / np.where(seen, moved, 1.0), slope)
+        self._before = driven, lacking
+        found: NDArray[np.float64] = -lacking / np.clip(slope, STEEPEST, FLATTEST)
+        return found
+
+
+class _Stretch:
+    """The inversion of one stretch."""
+
+    def __init__(self, passed: Passed, wanted: Motion) -> None:
+        self._own, self._held_back = passed.model, passed.held_back_mm
+        self._machine = self._own.as_found
+        self._nominal, self._convention = self._own.machine.hexapod, self._own.machine.hexapod.rotation
+        self._wanted = wanted
+        self._target = Frames.from_poses(wanted.poses, self._convention)
+        acting = self._own.acting(wanted)
+        self._weights = tuple(f for f in acting if f.source.weighs and not f.source.has_history)
+        self._others = tuple(f for f in acting if not f.source.weighs and not f.source.has_history)
+        remembering = _with_history(self._own, wanted)
+        self._building_up = tuple(f for f in remembering if f.source.builds_up)
+        self._searched = remembering[len(self._building_up) :]
+        self._built_up, self._states = passed.states[: len(self._building_up)], passed.states[len(self._building_up) :]
+        self._smooth, self._known = self._without_search()
+
+    def commanded(self, driven: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Poses at which the nominal machine has these lengths, shape (n, 6) [mm, deg]."""
+        return forward(self._nominal, driven, self._target).to_poses(self._convention)
+
+    def passed(self) -> Passed:
+        """What is remembered behind the last row."""
+        return Passed(self._own, (*self._built_up, *self._states), self._held_back)
+
+    def _without_search(self) -> tuple[NDArray[np.float64], Effect]:
+        """Take into account what needs no search.
+
+        Returns:
+            Lengths to drive to, shape (n, 6) [mm], and the part of the effect that does not change with a jump of the command.
+        """
+        motion, last, bent = self._wanted, np.full((len(self._wanted), 6), np.inf), Effect()
+        built_up = [np.zeros((len(self._wanted), 6)) for _ in self._building_up]
+        there: Actual | None = None
+        for _ in range(MOST_ROUNDS):
+            bent = self._own.together(self._weights, motion, there)
+            effect = bent + self._own.together(self._others, motion)
+            platform = self._platform(effect, self._target)
+            there = Actual(self._own, motion, actual_hexapod(self._nominal, effect), platform, effect)
+            wanted = self._needed(effect, platform)
+            for k, (fitted, state) in enumerate(zip(self._building_up, self._built_up, strict=True)):
+                reached = self._driven_to(wanted - sum(built_up) + built_up[k], slice(None), self._target)
+                built_up[k] = fitted.source.undone(motion, reached, self._machine, fitted.values, state)
+            driven = wanted - sum(built_up)
+            change = float(np.abs(driven - last).max())
+            if change < AGREED_MM:
+                break
+            motion, last = self._driven_to(driven, slice(None), self._target), driven
+        if change > MET_MM:
+            raise ModelError(
+                f"the compensation does not settle: {change:.2e} mm after {MOST_ROUNDS} rounds",
+                remedy="check the model's sources for an effect as large as the motion itself",
+            )
+        if not built_up:
+            return driven, bent
+        self._built_up = tuple(
+            fitted.source.advance(motion, self._machine, fitted.values, state)[1]
+            for fitted, state in zip(self._building_up, self._built_up, strict=True)
+        )
+        return driven, bent + Effect(strut_mm=sum(built_up, np.zeros_like(driven)))
+
+    def with_history(self) -> NDArray[np.float64]:
+        """Lengths to drive to, shape (n, 6) [mm], row after row with what is remembered by then."""
+        if not self._searched:
+            return self._smooth
+        count, row, together = len(self._wanted), 0, MOST_TOGETHER
+        driven = np.empty_like(self._smooth)
+        while row < count:
+            rows = slice(row, min(row + together, count))
+            found, met, states = self._tried(rows)
+            if met == len(found):
+                together = min(2 * together, MOST_TOGETHER)
+            else:
+                together = max(2 * met, FEWEST_TOGETHER)
+                if met:
+                    states = self._lacking(slice(row, row + met), found[:met])[1]
+            driven[row : row + met] = found[:met]
+            row += met
+            self._go_on(states if met else self._states, driven, row)
+            if met < len(found):
+                driven[row], states = self._alone(row)
+                row += 1
+                self._go_on(states, driven, row)
+        return driven
+
+    def _go_on(self, states: tuple[State, ...], driven: NDArray[np.float64], row: int) -> None:
+        """Go on before a row."""
+        self._states = states
+        if row:
+            self._held_back = driven[row - 1] - self._smooth[row - 1]
+
+    def _tried(self, rows: slice) -> tuple[NDArray[np.float64], int, tuple[State, ...]]:
+        """Try rows together.
+
+        Returns:
+            Lengths to drive to, shape (k, 6) [mm], how many rows from the first on are met, and the states behind all of them.
+        """
+        smooth = self._smooth[rows]
+        driven = smooth + self._held_back
+        slope = _Slope()
+        first, short_mm = -1, np.inf
+        for _ in range(TRIES):
+            lacking, states = self._lacking(rows, driven)
+            missed = np.abs(lacking).max(axis=1) > MET_MM
+            met = int(np.argmax(missed)) if missed.any() else len(missed)
+            if met == len(missed):
+                break
+            before, (first, short_mm) = (first, short_mm), (met, float(np.abs(lacking[met]).max()))
+            if first == before[0] and short_mm > GETS_ON * before[1]:
+                break
+            last = driven
+            driven = np.clip(driven + slope.step(driven, lacking), smooth - MOST_MM, smooth + MOST_MM)
+        else:
+            driven = last
+        return driven, met, states
+
+    def _alone(self, row: int) -> tuple[NDArray[np.float64], tuple[State, ...]]:
+        """Look for one row.
+
+        Returns:
+            Lengths to drive to, shape (1, 6) [mm], and the states behind the row.
+
+        Raises:
+            ModelError: there is none.
+        """
+        rows = slice(row, row + 1)
+        search = RootSearch((self._smooth[row] + self._held_back), MET_MM)
+        while not search.done:
+            search.tell(self._lacking(rows, search.at[None])[0][0])
+        if search.lost:
+            pose = ", ".join(
+                f"{axis}{value:.3f}" for axis, value in zip("XYZABC", self._wanted.poses[row], strict=True)
+            )
+            raise ModelError(
+                f"no command leads the machine to the pose {pose}: strut {search.lost} does not come there",
+                remedy="check the model's sources for an effect as large as the motion itself",
+            )
+        return search.at[None], self._lacking(rows, search.at[None])[1]
+
+    def _lacking(self, rows: slice, driven: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[State, ...]]:
+        """What driven lengths lack of those that lead to the wanted poses, shape (k, 6) [mm], and the states behind the rows."""
+        target = Frames(self._target.position_mm[rows], self._target.rotation[rows])
+        motion = self._driven_to(driven, rows, target)
+        effect, states = self._known.rows(rows) + self._own.together(self._others, motion), []
+        for fitted, state in zip(self._searched, self._states, strict=True):
+            own, behind = fitted.source.advance(motion, self._machine, fitted.values, state)
+            effect += own
+            states.append(behind)
+        return self._needed(effect, self._platform(effect, target)) - driven, tuple(states)
+
+    def _driven_to(self, driven: NDArray[np.float64], rows: slice, near: Frames) -> Motion:
+        return self._wanted.stretch(rows).commanded(forward(self._nominal, driven, near), self._own.machine)
+
+    def _platform(self, effect: Effect, target: Frames) -> Frames:
+        """Where the platform has to be for the tool tip to be there."""
+        if effect.tool_tip_mm is None:
+            return target
+        tip = np.broadcast_to(effect.tool_tip_mm, (len(target), 3))
+        return replace(target, position_mm=target.position_mm - np.einsum("nij,nj->ni", target.rotation, tip))
+
+    def _needed(self, effect: Effect, platform: Frames) -> NDArray[np.float64]:
+        """Lengths to drive to for the platform to be there, shape (n, 6) [mm]."""
+        strut = 0.0 if effect.strut_mm is None else effect.strut_mm
+        needed = strut_lengths(actual_hexapod(self._nominal, effect), platform)
+        lengths: NDArray[np.float64] = needed - strut + self._own.machine.reference_length_error_mm
+        return lengths

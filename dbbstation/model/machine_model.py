@@ -67,9 +67,10 @@ class MachineModel:
         Raises:
             ModelError: a source needs what the motion does not give.
         """
-        return self._together(self.acting(motion), motion, there)
+        return self.together(self.acting(motion), motion, there)
 
-    def _together(self, several: Iterable[Fitted], motion: Motion, there: Actual | None) -> Effect:
+    def together(self, several: Iterable[Fitted], motion: Motion, there: Actual | None = None) -> Effect:
+        """Some of the model's sources together, as `effect` is all of them."""
         total = Effect()
         for fitted in several:
             fitted.source.require(motion)
@@ -114,18 +115,18 @@ class MachineModel:
         driven = self.driven_mm(commanded)
         acting = self.acting(motion)
         weights = tuple(f for f in acting if f.source.weighs)
-        firm = self._together((f for f in acting if not f.source.weighs), motion, None)
+        firm = self.together((f for f in acting if not f.source.weighs), motion, None)
 
         def reached(effect: Effect, near: Frames) -> Actual:
             hexapod = actual_hexapod(self.machine.hexapod, effect)
             return Actual(self, motion, hexapod, forward(hexapod, driven + _strut_errors(effect), near), effect)
 
-        bent = self._together(weights, motion, None)
+        bent = self.together(weights, motion, None)
         there = reached(firm + bent, commanded)
         if not weights:
             return there
         for _ in range(MOST_ROUNDS):
-            last, bent = bent, self._together(weights, motion, there)
+            last, bent = bent, self.together(weights, motion, there)
             change = _change_mm(bent, last)
             if change.max() < AGREED_MM:
                 return there

@@ -71,7 +71,7 @@ def simulate_circle(
         setup=setup,
     )
     if command is not None:
-        motion = replace(motion, poses=command(motion))
+        motion = replace(motion, poses=command(motion), straight=True)
     theta = np.mod(circle.theta_deg(turn), FULL_TURN_DEG)
     return SimulatedCircle(turn / circle.turning_deg_s, theta, model.bar(motion).length_mm, motion.poses)
 

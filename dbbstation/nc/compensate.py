@@ -1,4 +1,4 @@
-"""Compensation of any toolpath: the machine model inverted over the whole path, moves in pieces that keep chord and feed."""
+"""Compensation of any toolpath: the machine model inverted along the path, moves in pieces that keep chord and feed."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def compensate_toolpath(
 ) -> Compensation:
     """Return the toolpath that takes the actual machine along the given one.
 
-    The whole path is inverted at once, rapids included, so that sources with a history see the one that the machine
-    will have.
+    The path is inverted from its beginning to its end, rapids included, so that sources with a history see the one that the
+    machine will have.
 
     Args:
         toolpath: as it should be.

@@ -59,7 +59,7 @@ COSINE = 0.97
 """Of the greatest angle at which a curve in short lines goes on, 14 degrees."""
 
 MOST_CELLS = 1_000_000
-"""All cells are inverted at once; so many take some gigabytes and minutes. As many as `rs274.reader.MOST_ROWS`."""
+"""As many as `rs274.reader.MOST_ROWS`: the path itself is held in memory."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, ClassVar, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
 
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 
 _Worked = TypeVar("_Worked", Frames, Struts)
+
+State = Any
+"""What a source remembers of the way so far, of any type that the source likes; never changed in place."""
 
 
 class Owner(StrEnum):
@@ -142,6 +145,8 @@ class Motion(WithLogged):
     Attributes:
         poses: commanded [X, Y, Z, A, B, C], shape (n, 6) [mm, deg].
         is_path: the rows follow each other on one path; otherwise they are poses without a history.
+        straight: the machine goes straight from row to row, as a program has it, and what bends does so at a row; otherwise
+            the rows are samples of a smooth path, such as a circle, which bends between them as well.
         kept: the rows that count.
         time_s: since the session's first sample, shape (n,) [s]; None where unknown.
         logged: what was logged beside the bar, by the name of its column, shape (n,) each; `temperature_degc` and
@@ -158,6 +163,7 @@ class Motion(WithLogged):
 
     poses: NDArray[np.float64]
     is_path: bool = False
+    straight: bool = False
     kept: slice = field(default_factory=lambda: slice(None))
     time_s: NDArray[np.float64] | None = None
     logged: Logged = field(default_factory=dict)
@@ -184,6 +190,31 @@ class Motion(WithLogged):
         if known is None or known[0] is not machine.hexapod:
             known = self._known[what] = machine.hexapod, work()
         return cast("_Worked", known[1])
+
+    def commanded(self, frames: Frames, machine: Machine) -> Motion:
+        """The motion with other poses, those of these frames."""
+        motion = replace(self, poses=frames.to_poses(machine.hexapod.rotation))
+        motion._known["frames"] = machine.hexapod, frames  # noqa: SLF001 - of the same class
+        return motion
+
+    def stretch(self, rows: slice) -> Motion:
+        """Some of the rows, in time order; all of them count."""
+        return self._of_rows(lambda values, _: values[rows])
+
+    def after(self, earlier: Motion) -> Motion:
+        """An earlier stretch and this one behind it, which has what the earlier one has; all rows count."""
+        before = earlier._rows()
+        return self._of_rows(lambda values, name: np.concatenate([before[name], values]))
+
+    def _rows(self) -> dict[str, NDArray[np.float64]]:
+        """Everything that has a value for each row."""
+        own = {name: getattr(self, name) for name in ("poses", "time_s", "load_n", "reading_mm")}
+        return {name: values for name, values in own.items() if values is not None} | dict(self.logged)
+
+    def _of_rows(self, change: Callable[[NDArray[np.float64], str], NDArray[np.float64]]) -> Motion:
+        changed = {name: change(values, name) for name, values in self._rows().items()}
+        logged = {name: changed.pop(name) for name in self.logged}
+        return replace(self, kept=slice(None), logged=logged, put_up=None, **changed)  # type: ignore[arg-type]
 
     @property
     def provides(self) -> frozenset[Need]:
@@ -294,10 +325,35 @@ class Effect:
         """Both effects together; arrays with and without the sample axis add up."""
         return Effect(**{f.name: _sum(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)})
 
+    def rows(self, rows: slice) -> Effect:
+        """The effect in some of the rows; what holds for every sample still does."""
+        taken = {}
+        for name, axes in EFFECT_SHAPES.items():
+            array = getattr(self, name)
+            taken[name] = array[rows] if array is not None and np.ndim(array) > len(axes) else array
+        return Effect(**taken)
+
+    def last(self, count: int) -> Effect:
+        """The effect in the last rows; what holds for every sample still does."""
+        return self.rows(slice(-count, None) if count else slice(0, 0))
+
     def times(self, values: NDArray[np.float64]) -> Effect:
         """The effect of parameter values, where `self` is a derivative by p parameters, shape (p,)."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         return Effect(**{name: None if array is None else array @ values for name, array in arrays.items()})
+
+
+EFFECT_SHAPES: dict[str, tuple[int, ...]] = {
+    "strut_mm": (STRUTS,),
+    "base_joint_mm": (STRUTS, 3),
+    "platform_joint_mm": (STRUTS, 3),
+    "tool_tip_mm": (3,),
+    "fixed_ball_mm": (3,),
+    "reading_mm": (),
+    "load_n": (STRUTS,),
+    "current_a": (STRUTS,),
+}
+"""Axes of each part of an effect, without those of samples and parameters."""
 
 
 def _sum(a: NDArray[np.float64] | None, b: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
@@ -343,6 +399,12 @@ class ErrorSource(ABC):
     where a strut turns round: no chord fits a step, however closely it is looked at. Where it hangs on machine or values,
     see `shortest_period_mm`."""
     texts: ClassVar[Texts]
+    looks_ahead: ClassVar[bool] = False
+    """True where the effect in a row hangs on rows that follow, as of a reading that is taken late. Such a source is asked
+    for whole runs only, and one of the machine's is not compensated: a program is compensated from its beginning on."""
+    builds_up: ClassVar[bool] = False
+    """True where errors build up over many rows, as those of a lag. To find a command for them by trial would take a trial
+    for each row; such a source answers `undone`."""
     candidate: ClassVar[bool] = True
     """Whether a diagnosis may name it; False for what only describes an error and is no cause of one."""
 
@@ -361,6 +423,57 @@ class ErrorSource(ABC):
     @abstractmethod
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Derivative of `effect` by each parameter: arrays with one further axis of length p, last."""
+
+    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> State:  # noqa: ARG002
+        """Return what is remembered before the first row of a run.
+
+        Args:
+            motion: the run, or as much of its beginning as is known: it shows which way the struts set out.
+            machine: nominal.
+            values: of the parameters, shape (p,).
+        """
+        return None
+
+    def advance(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: State
+    ) -> tuple[Effect, State]:
+        """Return the effect along one stretch of a program, and what is remembered behind its last row.
+
+        However a program is cut into stretches, each asked for with the state behind the one before, the effects are those of
+        `effect` for the whole. What a source does not need the path for has no state. One that needs the path and does not
+        say what it remembers is given all rows so far each time: right, and slow in long programs.
+
+        Args:
+            motion: the stretch, in time order; `straight`.
+            machine: nominal.
+            values: of the parameters, shape (p,).
+            state: of `begin`, or behind the stretch before; it stays as it is, so that a stretch can be asked for again.
+        """
+        if Need.PATH not in self.needs:
+            return self.effect(motion, machine, values), None
+        whole = motion if state is None else motion.after(state)
+        return self.effect(whole, machine, values).last(len(motion)), whole
+
+    def undone(
+        self,
+        motion: Motion,
+        reached: Motion,
+        machine: Machine,
+        values: NDArray[np.float64],
+        state: State,
+    ) -> NDArray[np.float64]:
+        """Return the strut errors along a stretch in which the struts come to certain lengths, shape (n, 6) [mm].
+
+        Asked of sources that `builds_up`.
+
+        Args:
+            motion: a command that nearly leads there.
+            reached: the stretch as this source alone should let the struts come to it.
+            machine: nominal.
+            values: of the parameters, shape (p,).
+            state: before the stretch.
+        """
+        raise NotImplementedError
 
     def shared_by(self, motion: Motion) -> str:
         """Name of the set of parameter values that this motion takes; motions with one name share the set."""
@@ -394,6 +507,11 @@ class ErrorSource(ABC):
         It has the same name and other parameters; a model has one of the two.
         """
         return None
+
+    @property
+    def has_history(self) -> bool:
+        """Whether its effect in a row hangs on the rows before."""
+        return Need.PATH in self.needs
 
     @property
     def of_currents(self) -> bool:
@@ -435,6 +553,24 @@ _HOW_TO_GIVE = {
     Need.CURRENT: "give recordings with motor currents, or a model without this source",
     Need.READING: "give recordings of the bar, or a model without this source",
 }
+
+
+class SourceWithHistory(ErrorSource):
+    """A source that says what it remembers: `begin` and `advance` have to be written, and a whole run is one stretch."""
+
+    @abstractmethod
+    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> State:
+        """Return what is remembered before the first row of a run."""
+
+    @abstractmethod
+    def advance(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: State
+    ) -> tuple[Effect, State]:
+        """Return the effect along one stretch, and what is remembered behind its last row."""
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+        """The effect along the whole run, taken as one stretch."""
+        return self.advance(motion, machine, values, self.begin(motion, machine, values))[0]
 
 
 class LinearSource(ErrorSource):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.travel import middle
-from dbbstation.sources.contract import Effect, Motion, Need, Owner, Parameter, Setup, Texts
+from dbbstation.sources.contract import EFFECT_SHAPES, Effect, ErrorSource, Motion, Need, Owner, Parameter, Setup, Texts
 from dbbstation.trace.columns import currents, temperatures
 
 if TYPE_CHECKING:
@@ -25,27 +25,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
-    from dbbstation.sources.contract import ErrorSource
 
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
-
-SHAPES: dict[str, tuple[int, ...]] = {
-    "strut_mm": (STRUTS,),
-    "base_joint_mm": (STRUTS, 3),
-    "platform_joint_mm": (STRUTS, 3),
-    "tool_tip_mm": (3,),
-    "fixed_ball_mm": (3,),
-    "reading_mm": (),
-    "load_n": (STRUTS,),
-    "current_a": (STRUTS,),
-}
-"""Axes of each part of an effect, without those of samples and parameters."""
 
 STEP = 1e-4
 """Share of a plausible size by which a derivative is checked."""
 
 AGREES = 1e-2
 """Share of its greatest value by which a derivative may differ from what the effect does."""
+
+SAME = 1e-9
+"""Share of the greatest effect by which two stretches may differ from the whole: rounding."""
 
 MOST_KINKS = 0.05
 """Share of samples where it may differ more: play has kinks, where no derivative holds."""
@@ -109,7 +99,33 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
         faults = _of_shapes(what, answer, len(motion), last)
         if faults:
             return faults
-    return _of_derivative(source, motion, machine, parameters, values) or _of_second_form(source, parameters, machine)
+    return (
+        _of_derivative(source, motion, machine, parameters, values)
+        or _of_history(source, motion, machine, values)
+        or _of_second_form(source, parameters, machine)
+    )
+
+
+def _of_history(source: ErrorSource, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> list[str]:
+    """Whether a program in two stretches has the effect of the whole, as a compensation needs it that goes forward."""
+    if source.looks_ahead or not source.has_history:
+        return []
+    motion = replace(motion, straight=True)
+    whole, half = source.effect(motion, machine, values), len(motion) // 2
+    first, rest = motion.stretch(slice(0, half)), motion.stretch(slice(half, None))
+    begun, state = source.advance(first, machine, values, source.begin(motion, machine, values))
+    gone_on, _ = source.advance(rest, machine, values, state)
+    for name, axes in EFFECT_SHAPES.items():
+        expected = getattr(whole, name)
+        if expected is None or np.ndim(expected) == len(axes):
+            continue
+        found = np.concatenate([getattr(begun, name), getattr(gone_on, name)])
+        if np.abs(found - expected).max() > SAME * np.abs(expected).max():
+            if type(source).advance is ErrorSource.advance:
+                what = f"{name} of its effect hangs on rows that follow: write it from the rows so far, or set"
+                return [f"{what} `looks_ahead = True`, with which it is fitted and predicted but not compensated"]
+            return [f"{name} of its `advance` along two stretches is not its effect along both together"]
+    return []
 
 
 def _of_second_form(source: ErrorSource, parameters: Sequence[Parameter], machine: Machine) -> list[str]:
@@ -165,7 +181,7 @@ def _circle(machine: Machine) -> Motion:
 
 def _of_shapes(what: str, answer: Effect, samples: int, last: tuple[int, ...]) -> list[str]:
     faults = []
-    for name, axes in SHAPES.items():
+    for name, axes in EFFECT_SHAPES.items():
         array = getattr(answer, name)
         if array is None:
             continue
@@ -192,7 +208,7 @@ def _of_derivative(
         step = np.zeros(len(parameters))
         step[k] = STEP * parameter.plausible
         more, less = (source.effect(motion, machine, values + sign * step) for sign in (1.0, -1.0))
-        for name in SHAPES:
+        for name in EFFECT_SHAPES:
             ends, exact = (getattr(more, name), getattr(less, name)), getattr(derivative, name)
             if (ends[0] is None or ends[1] is None) is not (exact is None):
                 faults.append(f"{name} stands in only one of its effect and its derivative")

@@ -228,3 +228,48 @@ def test_a_second_form_belongs_to_its_source(tmp_path, label, fault):
 
 
 IMPORTS = "from dbbstation.sources.contract import Need, Parameter  # noqa\nfrom dbbstation.sources.contract import "
+
+
+WOUND = """
+import numpy as np
+from dbbstation.sources.contract import Effect, LinearSource, Need, Owner, Parameter, Texts
+
+
+class Wound(LinearSource):
+    name = "wound"
+    belongs_to = Owner.MACHINE
+    needs = frozenset({Need.POSE, Need.PATH})
+    texts = Texts("a", "b", "c", "d", "e", "f")
+
+    def parameters(self, machine):
+        return (Parameter("share_1", "1", 1e-3, "of the way since the beginning"),)
+
+    def derivative(self, motion, machine, values):
+        length = motion.struts(machine).length_mm
+        way = np.abs(np.diff(length, axis=0, prepend=length[:1])).cumsum(axis=0)
+        return Effect(strut_mm=way[:, :, None])
+"""
+
+
+def test_a_source_with_a_history_that_says_nothing_of_states_goes_on_working(tmp_path):
+    assert "wound" in every_source([own(tmp_path, WOUND)])
+
+
+def test_one_that_looks_ahead_is_told_how_to_say_so(tmp_path):
+    ahead = WOUND.replace("way[:, :, None]", "(way - way[-1])[:, :, None]")
+    assert "hangs on rows that follow: write it from the rows so far, or set `looks_ahead = True`" in told(
+        own(tmp_path, ahead)
+    )
+    said = ahead.replace('name = "wound"', 'name = "wound"\n    looks_ahead = True')
+    assert "wound" in every_source([own(tmp_path, said, "said.py")])
+
+
+def test_states_that_do_not_hold_are_told(tmp_path):
+    forgets = (
+        WOUND
+        + """
+    def advance(self, motion, machine, values, state):
+        return self.effect(motion, machine, values), None
+"""
+    )
+    assert "of its `advance` along two stretches is not its effect along both" in told(own(tmp_path, forgets))

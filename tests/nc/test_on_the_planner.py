@@ -115,7 +115,7 @@ def circle_texts(linuxcnc, table2, crooked, bar_mm: float, feed: float, mm_s2: f
     return [programs[0].text for programs in both]
 
 
-@pytest.mark.parametrize("prefer", [None, Prefer.POSITION_ONLY])
+@pytest.mark.parametrize("prefer", [None, pytest.param(Prefer.POSITION_ONLY, marks=pytest.mark.nightly)])
 def test_a_small_circle_keeps_its_feed(linuxcnc, table2, crooked, prefer):
     """At 1 m/s², which is taken where the machine file does not say it; it took 1.37 times as long in steps of 0.1 degrees."""
     texts = circle_texts(linuxcnc, table2, crooked, 50.0, 1000.0, None, prefer)

@@ -6,10 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Texts, of_each_strut
-from dbbstation.sources.laws.play_ends import first_side
+from dbbstation.sources.contract import (
+    SMOOTH_MM,
+    Effect,
+    Motion,
+    Need,
+    Owner,
+    SourceWithHistory,
+    Texts,
+    of_each_strut,
+)
+from dbbstation.sources.laws.play_operator import PlayState, followed, leaning
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,7 +28,7 @@ if TYPE_CHECKING:
 MM_PER_UM = 1e-3
 
 
-class Backlash(ErrorSource):
+class Backlash(SourceWithHistory):
     """After a reversal a strut stays behind by its play, and goes on only when the drive has travelled through it.
 
     With x the commanded travel of a strut and w its play, the strut stands at y, which the drive takes along at
@@ -54,14 +62,21 @@ class Backlash(ErrorSource):
         """Six plays, full width."""
         return of_each_strut("strut_{}_um", "µm", 3.0, "play of strut {}, whole width; positive: it stays behind")
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
-        """Lag of each strut.
+    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
+        """Which end of its play each strut leans on.
 
         Raises:
             ModelError: the motion is no path.
         """
-        lag, _ = self._lag(motion, machine, values)
-        return Effect(strut_mm=lag)
+        self.require(motion)
+        return leaning(motion.struts(machine).length_mm)
+
+    def advance(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
+    ) -> tuple[Effect, PlayState]:
+        """Lag of each strut."""
+        lag, _, behind = self._lag(motion, machine, values, state)
+        return Effect(strut_mm=lag), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Each strut answers to its own play; analytic but for the samples at which a strut is taken along again.
@@ -69,40 +84,12 @@ class Backlash(ErrorSource):
         Raises:
             ModelError: the motion is no path.
         """
-        _, by_width = self._lag(motion, machine, values)
+        _, by_width, _ = self._lag(motion, machine, values, self.begin(motion, machine, values))
         return Effect(strut_mm=MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS))
 
     def _lag(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lag [mm] and its derivative by the width [mm/mm], shapes (n, 6)."""
-        self.require(motion)
-        travel = motion.struts(machine).length_mm
-        lag, by_width = np.empty_like(travel), np.empty_like(travel)
-        follow(travel, MM_PER_UM * np.abs(values), lag, by_width)
-        return np.where(values < 0.0, -lag, lag), by_width
-
-
-@compiled
-def follow(
-    travel: NDArray[np.float64],
-    width: NDArray[np.float64],
-    lag: NDArray[np.float64],
-    by_width: NDArray[np.float64],
-) -> None:
-    """Play operator of each column: lag y - x and its derivative by the width.
-
-    Shapes: travel x (n, m), width (m,) and not negative, lag and by_width (n, m), which are written.
-    """
-    count, columns = travel.shape
-    for i in range(columns):
-        half = 0.5 * width[i]
-        side = first_side(travel[:, i])
-        place = travel[0, i] + side * width[i]
-        for k in range(count):
-            if place < travel[k, i] - half:
-                place, side = travel[k, i] - half, -0.5
-            elif place > travel[k, i] + half:
-                place, side = travel[k, i] + half, 0.5
-            lag[k, i] = place - travel[k, i]
-            by_width[k, i] = side
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
+        """Lag [mm] and its derivative by the width [mm/mm], shapes (n, 6), and the state behind the last row."""
+        lag, by_width, behind = followed(motion.struts(machine).length_mm, MM_PER_UM * np.abs(values), state)
+        return np.where(values < 0.0, -lag, lag), by_width, behind

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
-from dbbstation.sources.causes.backlash import follow
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.laws.play_operator import followed, leaning
 from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
 from dbbstation.sources.laws.weights import platform_masses, stated_loads
 
@@ -58,6 +58,7 @@ class DriveFriction(ErrorSource):
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME, Need.CURRENT})
+    looks_ahead = True  # speeds are differences to the rows before and behind
     varies_with = "strut-speed-sign"
     form_uncertainty = 0.2  # friction differs along the screw and with temperature
     texts = Texts(
@@ -149,8 +150,7 @@ def directions(length_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     Args:
         length_mm: driven, in time order, shape (n, 6) [mm].
     """
-    lag, by_width = np.empty_like(length_mm), np.empty_like(length_mm)
-    follow(length_mm, np.full(length_mm.shape[1], TURNED_OVER_MM), lag, by_width)
+    lag, _, _ = followed(length_mm, np.full(length_mm.shape[1], TURNED_OVER_MM), leaning(length_mm))
     return -2.0 / TURNED_OVER_MM * lag
 
 

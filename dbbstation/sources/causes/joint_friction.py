@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.statics import stretch_mm, strut_tensions, transverse_load
-from dbbstation.sources.causes.backlash import follow
-from dbbstation.sources.contract import SMOOTH_MM, Effect, LinearSource, Motion, Need, Owner, Texts, of_each_strut
+from dbbstation.sources.contract import (
+    SMOOTH_MM,
+    Effect,
+    Motion,
+    Need,
+    Owner,
+    SourceWithHistory,
+    Texts,
+    of_each_strut,
+)
+from dbbstation.sources.laws.play_operator import PlayState, followed, leaning
 from dbbstation.sources.laws.weights import for_such_struts, strut_compliance
 
 if TYPE_CHECKING:
@@ -27,7 +37,7 @@ WIND_UP_RAD = 1e-4
 tenth of a millimetre at the platform. The step of friction spreads over about two degrees of a circle of 150 mm."""
 
 
-class JointFriction(LinearSource):
+class JointFriction(SourceWithHistory):
     """A base joint resists being turned, so that its strut drags at the platform, and all six struts stretch for it.
 
     The joint has two axes, as a universal joint has: e1 fixed in the base, level and square to the line from base
@@ -68,16 +78,37 @@ class JointFriction(LinearSource):
         meaning = f"force that swings strut {{}}, 1 m from its base joint; {for_such_struts(machine)}"
         return of_each_strut("strut_{}_n", "N", 10.0, meaning, positive=True)
 
-    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
+        """Which way each joint swings about its two axes.
+
+        Raises:
+            ModelError: the motion is no path.
+        """
+        self.require(motion)
+        return leaning(joint_angles(motion.struts(machine), outer_axes(machine.hexapod)).angle_rad)
+
+    def advance(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
+    ) -> tuple[Effect, PlayState]:
+        """Stretch of all struts.
+
+        Raises:
+            KinematicsError: a pose where the struts cannot hold the platform.
+        """
+        struts = motion.struts(machine)
+        drag, behind = friction_drag(struts, outer_axes(machine.hexapod), state)
+        tension = strut_tensions(struts, transverse_load(struts, values[:, None] * drag))
+        return Effect(strut_mm=stretch_mm(struts, strut_compliance(machine), tension)), behind
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Stretch of all struts per friction of each joint.
 
         Raises:
             ModelError: the motion is no path.
             KinematicsError: a pose where the struts cannot hold the platform.
         """
-        self.require(motion)
         struts = motion.struts(machine)
-        drag = friction_drag(struts, outer_axes(machine.hexapod))
+        drag, _ = friction_drag(struts, outer_axes(machine.hexapod), self.begin(motion, machine, values))
         by_joint = []
         for i in range(STRUTS):
             alone = np.zeros_like(drag)
@@ -96,11 +127,26 @@ def outer_axes(hexapod: Hexapod) -> NDArray[np.float64]:
     return unit
 
 
-def friction_drag(struts: Struts, axes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Forces on the platform's joints where each base joint has a friction of 1 N m about each axis, (n, 6, 3) [N].
+@dataclass(frozen=True, eq=False)
+class JointAngles:
+    """How the base joints stand, and which forces on the platform's joints a moment about their axes is.
+
+    Attributes:
+        angle_rad: about the outer axes of the six joints, then about their inner ones, shape (n, 12) [rad].
+        by_first: derivative of the angle about the outer axis by the platform joint, shape (n, 6, 3) [rad/mm].
+        by_second: the same about the inner axis.
+    """
+
+    angle_rad: NDArray[np.float64]
+    by_first: NDArray[np.float64]
+    by_second: NDArray[np.float64]
+
+
+def joint_angles(struts: Struts, axes: NDArray[np.float64]) -> JointAngles:
+    """How the base joints stand.
 
     Args:
-        struts: along a path, in time order.
+        struts: along a path.
         axes: outer axes of the base joints, shape (6, 3) [1].
     """
     unit = struts.unit
@@ -111,16 +157,43 @@ def friction_drag(struts: Struts, axes: NDArray[np.float64]) -> NDArray[np.float
     first = np.arctan2(np.einsum("nij,ij->ni", unit, level), -unit[:, :, 2])
     part = 1.0 - aside**2  # square of that part
     length = struts.length_mm[:, :, None]
-    by_first = round_axis / (length * part[:, :, None])
-    by_second = (axes - aside[:, :, None] * unit) / (length * np.sqrt(part)[:, :, None])
-    drag: NDArray[np.float64] = LEVER_MM * (
-        resistance(first)[:, :, None] * by_first + resistance(np.arcsin(aside))[:, :, None] * by_second
+    return JointAngles(
+        np.hstack([first, np.arcsin(aside)]),
+        round_axis / (length * part[:, :, None]),
+        (axes - aside[:, :, None] * unit) / (length * np.sqrt(part)[:, :, None]),
     )
-    return drag
 
 
-def resistance(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of a joint's friction that acts, against its movement, from -1 to 1, shape as the angles (n, m)."""
-    lag, by_width = np.empty_like(angle_rad), np.empty_like(angle_rad)
-    follow(np.ascontiguousarray(angle_rad), np.full(angle_rad.shape[1], WIND_UP_RAD), lag, by_width)
-    return 2.0 * lag / WIND_UP_RAD
+def friction_drag(
+    struts: Struts, axes: NDArray[np.float64], state: PlayState | None = None
+) -> tuple[NDArray[np.float64], PlayState]:
+    """Forces on the platform's joints where each base joint has a friction of 1 N m about each axis, (n, 6, 3) [N].
+
+    Args:
+        struts: along a path, in time order.
+        axes: outer axes of the base joints, shape (6, 3) [1].
+        state: of both axes of the joints before the first row; None where the path begins there.
+
+    Returns:
+        The forces, and the state behind the last row.
+    """
+    joints = joint_angles(struts, axes)
+    acting, behind = resistance(joints.angle_rad, leaning(joints.angle_rad) if state is None else state)
+    drag: NDArray[np.float64] = LEVER_MM * (
+        acting[:, :STRUTS, None] * joints.by_first + acting[:, STRUTS:, None] * joints.by_second
+    )
+    return drag, behind
+
+
+def resistance(angle_rad: NDArray[np.float64], state: PlayState) -> tuple[NDArray[np.float64], PlayState]:
+    """Share of a joint's friction that acts, against its movement, from -1 to 1, shape as the angles (n, m).
+
+    Args:
+        angle_rad: in time order [rad].
+        state: before the first row.
+
+    Returns:
+        The shares, and the state behind the last row.
+    """
+    lag, _, behind = followed(angle_rad, np.full(angle_rad.shape[1], WIND_UP_RAD), state)
+    return 2.0 * lag / WIND_UP_RAD, behind

@@ -12,15 +12,15 @@ from dbbstation.machine.statics import motor_loads, platform_weight, strut_tensi
 from dbbstation.sources.contract import (
     SMOOTH_MM,
     Effect,
-    ErrorSource,
     Motion,
     Need,
     Owner,
     Parameter,
+    SourceWithHistory,
     Texts,
     of_each_strut,
 )
-from dbbstation.sources.laws.play_ends import first_side
+from dbbstation.sources.laws.play_operator import PlayState, leaning
 from dbbstation.sources.laws.weights import platform_masses
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ FRICTION_N = (0.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
 """Frictions worth trying, from none to more than a strut carries in upright circles [N]."""
 
 
-class Play(ErrorSource):
+class Play(SourceWithHistory):
     """What has play in a strut lies where the load puts it; only where friction holds the load does it stay behind.
 
     With w the play, T the tension that the drive holds and R the friction of what lies behind the play, a strut that is
@@ -81,15 +81,26 @@ class Play(ErrorSource):
         meaning = "force in a strut below which friction holds it, all struts alike"
         return (*plays, Parameter("friction_n", "N", 100.0, meaning, FRICTION_N))
 
-    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
+    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> PlayState:  # noqa: ARG002
+        """Which end of its play each strut leans on where friction holds it.
+
+        Raises:
+            ModelError: the motion is no path.
+        """
+        self.require(motion)
+        return leaning(motion.struts(machine).length_mm)
+
+    def advance(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
+    ) -> tuple[Effect, PlayState]:
         """Where each strut lies in its play.
 
         Raises:
-            ModelError: the motion is no path, or the machine file has no masses.
+            ModelError: the machine file has no masses.
             KinematicsError: a pose where the struts cannot hold the platform.
         """
-        place, _ = self._places(motion, machine, values)
-        return Effect(strut_mm=place)
+        place, _, behind = self._places(motion, machine, values, state)
+        return Effect(strut_mm=place), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Each strut answers to its own play; the friction changes nothing but the samples at which a strut lets go.
@@ -98,15 +109,14 @@ class Play(ErrorSource):
             ModelError: the motion is no path, or the machine file has no masses.
             KinematicsError: a pose where the struts cannot hold the platform.
         """
-        _, by_width = self._places(motion, machine, values)
+        _, by_width, _ = self._places(motion, machine, values, self.begin(motion, machine, values))
         by_play = MM_PER_UM * by_width[:, :, None] * np.eye(STRUTS)
         return Effect(strut_mm=np.concatenate([by_play, np.zeros((*by_width.shape, 1))], axis=2))
 
     def _places(
-        self, motion: Motion, machine: Machine, values: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Error of each strut [mm] and its derivative by the width [mm/mm], shapes (n, 6)."""
-        self.require(motion)
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: PlayState
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
+        """Error of each strut [mm], its derivative by the width [mm/mm], shapes (n, 6), and the state behind the last row."""
         masses = platform_masses(self.name, machine)
         frames, struts = motion.frames(machine), motion.struts(machine)
         load = platform_weight(frames, masses)
@@ -114,36 +124,60 @@ class Play(ErrorSource):
             load += transverse_load(struts, transverse_pull(struts, machine.strut_masses))
         tension = motor_loads(struts, strut_tensions(struts, load), machine.strut_masses)
         width = MM_PER_UM * values[:STRUTS]
-        place, by_width = np.empty_like(tension), np.empty_like(tension)
-        settle(struts.length_mm, tension, np.abs(width), max(float(values[STRUTS]), 0.0), place, by_width)
-        return np.where(width < 0.0, -place, place), by_width
+        friction = max(float(values[STRUTS]), 0.0)
+        place, by_width, behind = settled(struts.length_mm, tension, np.abs(width), friction, state)
+        return np.where(width < 0.0, -place, place), by_width, behind
 
 
-@compiled
-def settle(
+def settled(
     travel: NDArray[np.float64],
     tension: NDArray[np.float64],
     width: NDArray[np.float64],
     friction: float,
+    state: PlayState,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
+    """Follow each column through its play.
+
+    Args:
+        travel: x, in time order, shape (n, m).
+        tension: positive where the load pulls, shape (n, m).
+        width: not negative, shape (m,).
+        friction: tension up to which a column is held.
+        state: before the first row.
+
+    Returns:
+        Error y - x and its derivative by the width, shapes (n, m), and the state behind the last row.
+    """
+    place, by_width = np.empty_like(tension), np.empty_like(tension)
+    at, side = state.place.copy(), state.side.copy()
+    _settle(np.ascontiguousarray(travel), np.ascontiguousarray(tension), width, friction, at, side, place, by_width)
+    return place, by_width, PlayState(at, side)
+
+
+@compiled
+def _settle(
+    travel: NDArray[np.float64],
+    tension: NDArray[np.float64],
+    width: NDArray[np.float64],
+    friction: float,
+    at: NDArray[np.float64],
+    side: NDArray[np.float64],
     place: NDArray[np.float64],
     by_width: NDArray[np.float64],
 ) -> None:
-    """Follow each column through its play: error y - x and its derivative by the width.
-
-    Shapes: travel x (n, m), tension (n, m), width (m,) and not negative, place and by_width (n, m), which are written.
-    """
     count, columns = travel.shape
     for i in range(columns):
         half = 0.5 * width[i]
-        # Where friction holds the strut at first.
-        side = first_side(travel[:, i])
-        at = travel[0, i] + side * width[i]
+        y, end = at[i], side[i]
+        if count > 0 and np.isnan(y):
+            y = travel[0, i] + end * width[i]
         for k in range(count):
-            error = at - travel[k, i]
+            error = y - travel[k, i]
             if tension[k, i] < -friction or (tension[k, i] <= friction and error < -half):
-                error, side = -half, -0.5
+                error, end = -half, -0.5
             elif tension[k, i] > friction or error > half:
-                error, side = half, 0.5
-            at = travel[k, i] + error
+                error, end = half, 0.5
+            y = travel[k, i] + error
             place[k, i] = error
-            by_width[k, i] = side
+            by_width[k, i] = end
+        at[i], side[i] = y, end

@@ -19,6 +19,7 @@ from dbbstation.sources.contract import (
     Texts,
     of_each_strut,
 )
+from dbbstation.sources.laws.turning import TURNED_MM, since_turning
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,9 +30,6 @@ MM_PER_UM = 1e-3
 
 DECAY_MM = tuple(float(f"{decay:.2g}") for decay in np.geomspace(0.0005, 0.8, 12))
 """Decay lengths worth trying: spikes that fade in 0.05 to 0.5 s, on circles of 100 to 150 mm at 500 to 2500 mm/min [mm]."""
-
-TURNED_MM = 1e-3
-"""A strut has turned round once it has come back by this: less is rounding of the program or of recorded angles."""
 
 
 class ReversalSpike(ErrorSource):
@@ -47,7 +45,10 @@ class ReversalSpike(ErrorSource):
     grows, so that the error can be compensated. At a = 0 the error is proportional to a. Where the rise is as long as
     the fading, 2|a| near l, much of a spike is cut off.
 
-    Before the first turning point of a run there is no spike.
+    Before the first turning point of a run there is no spike. Where a path is straight from row to row, as a program's is, a
+    strut turns at the outermost row; along a smooth one between the rows (`laws.turning`). What is left of a spike where
+    the strut turns again is wound off over 2|a| as well, so that the error goes on from its place; and a strut that has not come back by
+    a micrometre when it goes on as before has not turned.
     """
 
     name = "reversal-spike"
@@ -85,8 +86,23 @@ class ReversalSpike(ErrorSource):
         Raises:
             ModelError: the motion is no path.
         """
-        rise, _, decay, _ = self._spikes(motion, machine, values)
-        return Effect(strut_mm=rise * decay)
+        return Effect(strut_mm=self._along(motion, machine, values)[0])
+
+    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> NDArray[np.float64]:  # noqa: ARG002
+        """No strut has turned.
+
+        Raises:
+            ModelError: the motion is no path.
+        """
+        self.require(motion)
+        return _NOTHING
+
+    def advance(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: NDArray[np.float64]
+    ) -> tuple[Effect, NDArray[np.float64]]:
+        """Spikes of each strut along a stretch of a program."""
+        spike, _, _, behind = _straight(motion.struts(machine).length_mm, values, state)
+        return Effect(strut_mm=spike), behind
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """By the heights, each strut its own, and by the decay length.
@@ -94,115 +110,144 @@ class ReversalSpike(ErrorSource):
         Raises:
             ModelError: the motion is no path.
         """
-        rise, by_height, decay, by_length = self._spikes(motion, machine, values)
-        own = MM_PER_UM * (by_height * decay)[:, :, None] * np.eye(STRUTS)
-        return Effect(strut_mm=np.concatenate([own, (rise * by_length)[:, :, None]], axis=2))
+        _, by_height, by_length = self._along(motion, machine, values)
+        own = MM_PER_UM * by_height[:, :, None] * np.eye(STRUTS)
+        return Effect(strut_mm=np.concatenate([own, by_length[:, :, None]], axis=2))
 
-    def _spikes(
+    def _along(
         self, motion: Motion, machine: Machine, values: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Both factors of the spike and their derivatives, shapes (n, 6).
-
-        Returns:
-            Rise -s a (1 - exp(-d / 2|a|)) [mm], its derivative by a [1], exp(-sqrt(d / l)) [1], its derivative by l [1/mm].
-        """
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Spikes of a whole run [mm], their derivatives by the height [1] and by the decay length [1], shapes (n, 6)."""
         self.require(motion)
-        since = since_turning(motion.struts(machine).length_mm)
-        way, sign = np.abs(since), np.sign(since)
-        height, length = MM_PER_UM * values[:STRUTS], float(values[STRUTS])
-        # What rises over no way has risen; a strut that has not turned has no sign, and no spike.
-        ratio = np.divide(way, 2.0 * np.abs(height), out=np.full_like(way, np.inf), where=height != 0.0)
-        lacking = np.exp(-ratio)
-        by_height = -sign * (1.0 - lacking - np.where(lacking > 0.0, np.minimum(ratio, FULLY) * lacking, 0.0))
-        if length <= 0.0:  # the limit, which a fit may try: a spike without width
-            decay, by_length = np.zeros_like(way), np.zeros_like(way)
-        else:
-            root = np.sqrt(way / length)
-            decay = np.exp(-root)
-            by_length = root / (2.0 * length) * decay
-        return -sign * height * (1.0 - lacking), by_height, decay, by_length
+        travel = motion.struts(machine).length_mm
+        if motion.straight:
+            return _straight(travel, values, _NOTHING)[:3]
+        spike, by_height, by_length = (np.empty_like(travel) for _ in range(3))
+        _smooth(since_turning(travel), *_sizes(values), spike, by_height, by_length)
+        return spike, by_height, by_length
+
+
+def _sizes(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Heights, shape (6,), and decay length [mm]."""
+    return MM_PER_UM * values[:STRUTS], float(values[STRUTS])
+
+
+def _straight(
+    travel: NDArray[np.float64], values: NDArray[np.float64], state: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Spikes [mm], their derivatives by the height [1] and by the decay length [1], shapes (n, 6), and the state behind."""
+    spike, by_height, by_length = (np.empty_like(travel) for _ in range(3))
+    behind = state.copy()
+    _go_on(np.ascontiguousarray(travel), *_sizes(values), TURNED_MM, behind, spike, by_height, by_length)
+    return spike, by_height, by_length, behind
 
 
 FULLY = 750.0
 """Multiple of its own length after which an exponential is zero in double precision."""
 
+WAY, TURN, TURNED, OUTERMOST, LOW, HIGH, BACK = range(7)
+"""What is remembered of a strut: which way it goes (0 before that is known), where it last turned, whether it ever did, its
+outermost place since then, its range before the way is known, and whether it has come back from its outermost place."""
 
-def since_turning(travel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Signed way of each column since it last turned round, shape (n, m).
+LEFT, LEFT_SINCE = 7, 10
+"""Error at the turning point, and at the outermost place where it comes back; behind each its derivatives by height and
+decay length."""
 
-    The turning point lies between rows, in general: it is the vertex of the parabola through the outermost row and its
-    two neighbours, over the way of all columns together, so that rows need not be even. Zero before the first one.
-    Where the path has a corner or comes straight back, as a single column always does, the outermost row is the turning
-    point.
-    """
-    since = np.zeros_like(travel)
-    _since(np.ascontiguousarray(travel), TURNED_MM, since)
-    return since
-
-
-@inlined
-def _parabola(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, float, float, float]:
-    """Parabola of a column through row k and its neighbours, over the way of all columns from row to row.
-
-    Returns:
-        Slope at row k, half of minus the second derivative, both of `side` times the column, way from the row before
-        and way to the next; zeros where the path has a corner at k, or ends there.
-    """
-    if k < 1 or k + 1 >= travel.shape[0]:
-        return 0.0, 0.0, 0.0, 0.0
-    before = after = along = 0.0
-    for c in range(travel.shape[1]):
-        came, goes = travel[k, c] - travel[k - 1, c], travel[k + 1, c] - travel[k, c]
-        before, after, along = before + came * came, after + goes * goes, along + came * goes
-    if along <= 0.0:  # also where two rows are the same
-        return 0.0, 0.0, 0.0, 0.0
-    before, after = np.sqrt(before), np.sqrt(after)
-    rises = side * (travel[k, i] - travel[k - 1, i]) / before
-    falls = side * (travel[k, i] - travel[k + 1, i]) / after
-    return (rises * after - falls * before) / (before + after), (rises + falls) / (before + after), before, after
+_NOTHING = np.zeros((STRUTS, 13))
+_NOTHING[:, OUTERMOST] = np.nan
+_NOTHING.flags.writeable = False
 
 
 @inlined
-def _vertex(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, bool]:
-    """Turning point of a column whose outermost row is k, on the high (1.0) or low (-1.0) side, and whether k is behind.
+def _spike(way: float, sign: float, height: float, length: float) -> tuple[float, float, float]:
+    """Spike [mm] a way behind the turning point, and its derivatives by height [1] and decay length [1].
 
-    Of two rows almost equally far out each has its parabola. Were the turning point taken from one of them alone, it
-    would jump as the other becomes the outermost, and a compensation that moves them could go to and fro for ever;
-    hence no less than the neighbour's parabola in the middle between both.
+    What rises over no way has risen; a strut that has not turned has no sign, and no spike. A decay length of zero, which a
+    fit may try, is its limit, a spike without width.
     """
-    slope, bend, before, after = _parabola(travel, i, k, side)
-    if bend <= 0.0:
-        return travel[k, i], True
-    top = side * travel[k, i] + slope * slope / (4.0 * bend)
-    beside, step = (k + 1, after) if slope > 0.0 else (k - 1, before)
-    middle = side * (travel[k, i] + travel[beside, i]) / 2.0
-    top = max(top, middle + _parabola(travel, i, beside, side)[1] * step * step / 4.0)
-    return side * top, slope <= 0.0
+    if length <= 0.0:
+        return 0.0, 0.0, 0.0
+    ratio = way / (2.0 * abs(height)) if height != 0.0 else np.inf
+    lacking = np.exp(-ratio)
+    root = np.sqrt(way / length)
+    decay = np.exp(-root)
+    steeper = min(ratio, FULLY) * lacking if lacking > 0.0 else 0.0
+    rise = -sign * height * (1.0 - lacking)
+    return rise * decay, -sign * (1.0 - lacking - steeper) * decay, rise * root / (2.0 * length) * decay
 
 
 @compiled
-def _since(travel: NDArray[np.float64], turned: float, since: NDArray[np.float64]) -> None:
+def _smooth(
+    since: NDArray[np.float64],
+    height: NDArray[np.float64],
+    length: float,
+    spike: NDArray[np.float64],
+    by_height: NDArray[np.float64],
+    by_length: NDArray[np.float64],
+) -> None:
+    """Spikes at signed ways since the turning points, shape (n, 6) [mm]."""
+    count, columns = since.shape
+    for k in range(count):
+        for i in range(columns):
+            found = _spike(abs(since[k, i]), np.sign(since[k, i]), height[i], length)
+            spike[k, i], by_height[k, i], by_length[k, i] = found
+
+
+@inlined
+def _behind(
+    way: float, sign: float, height: float, length: float, left: NDArray[np.float64]
+) -> tuple[float, float, float]:
+    """The spike and what is left of the one before, shape (3,), wound off over 2|a|."""
+    spike, by_height, by_length = _spike(way, sign, height, length)
+    if left[0] == 0.0 or height == 0.0:
+        return spike, by_height, by_length
+    ratio = way / (2.0 * abs(height))
+    kept = np.exp(-ratio)
+    by_height += kept * (left[1] + left[0] * min(ratio, FULLY) / height)
+    return spike + kept * left[0], by_height, by_length + kept * left[2]
+
+
+@compiled
+def _go_on(  # noqa: C901 - what is remembered decides in one pass
+    travel: NDArray[np.float64],
+    height: NDArray[np.float64],
+    length: float,
+    turned: float,
+    memory: NDArray[np.float64],
+    spike: NDArray[np.float64],
+    by_height: NDArray[np.float64],
+    by_length: NDArray[np.float64],
+) -> None:
+    """Spikes along a stretch that is straight from row to row; `memory`, shape (6, 13), is that behind it when done."""
     count, columns = travel.shape
     for i in range(columns):
-        turn, way, has_turned = 0.0, 0.0, False  # where the column last turned, and which way it goes
-        low = high = 0  # outermost rows since then
+        m = memory[i]
         for k in range(count):
-            x = travel[k, i]
-            low = k if x < travel[low, i] else low
-            high = k if x > travel[high, i] else high
-            new = 0.0
-            if way >= 0.0 and travel[high, i] - x > turned:
-                new = -1.0
-            elif way <= 0.0 and x - travel[low, i] > turned:
-                new = 1.0
-            if new != 0.0:
-                start = high if new < 0.0 else low
-                if way != 0.0:  # the first movement is one that was already under way
-                    turn, is_behind = _vertex(travel, i, start, -new)
-                    has_turned = True
-                    # An outermost row that is still before the turning point belongs to the movement before.
-                    for j in range(start if is_behind else start + 1, k):
-                        since[j, i] = travel[j, i] - turn
-                way, low, high = new, k, k
-            if has_turned:
-                since[k, i] = x - turn
+            x, found = travel[k, i], (0.0, 0.0, 0.0)
+            if np.isnan(m[OUTERMOST]):
+                m[OUTERMOST] = m[LOW] = m[HIGH] = x
+            if m[WAY] == 0.0:
+                m[LOW], m[HIGH] = min(x, m[LOW]), max(x, m[HIGH])
+                if m[HIGH] - x > turned:
+                    m[WAY] = -1.0
+                elif x - m[LOW] > turned:
+                    m[WAY] = 1.0
+                m[OUTERMOST] = x
+            elif m[WAY] * (x - m[OUTERMOST]) >= 0.0:
+                m[OUTERMOST], m[BACK] = x, 0.0
+                if m[TURNED] != 0.0:
+                    found = _behind(m[WAY] * (x - m[TURN]), m[WAY], height[i], length, m[LEFT : LEFT + 3])
+            else:
+                if m[BACK] == 0.0:
+                    m[BACK] = 1.0
+                    if m[TURNED] != 0.0:
+                        way = m[WAY] * (m[OUTERMOST] - m[TURN])
+                        found = _behind(way, m[WAY], height[i], length, m[LEFT : LEFT + 3])
+                    m[LEFT_SINCE], m[LEFT_SINCE + 1], m[LEFT_SINCE + 2] = found
+                way = m[WAY] * (m[OUTERMOST] - x)
+                found = _behind(way, -m[WAY], height[i], length, m[LEFT_SINCE : LEFT_SINCE + 3])
+                if way > turned:
+                    m[WAY], m[TURN], m[TURNED], m[BACK] = -m[WAY], m[OUTERMOST], 1.0, 0.0
+                    m[LEFT : LEFT + 3] = m[LEFT_SINCE : LEFT_SINCE + 3]
+                    m[OUTERMOST] = x
+            spike[k, i], by_height[k, i], by_length[k, i] = found

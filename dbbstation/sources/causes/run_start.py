@@ -35,6 +35,7 @@ class RunStart(ErrorSource):
     name = "run-start"
     belongs_to = Owner.MOUNTING
     needs = frozenset({Need.POSE, Need.PATH})
+    looks_ahead = True  # the turn may have begun earlier or later
     varies_with = "angle"
     candidate = False
     texts = Texts(

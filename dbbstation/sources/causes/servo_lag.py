@@ -9,6 +9,7 @@ import numpy as np
 from dbbstation.machine.compiled import compiled
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.sources.contract import SMOOTH_MM, Effect, ErrorSource, Motion, Need, Owner, Texts, of_each_strut
+from dbbstation.sources.laws.loop import STANDING, LoopState, driven, undone
 from dbbstation.sources.laws.rates import driven_in_time, speed_mm_s
 
 if TYPE_CHECKING:
@@ -29,6 +30,9 @@ class ServoLag(ErrorSource):
     A negative tau is a strut ahead of its command, as feed-forward makes it: the same equation, which then leads back
     from what is still to come. The error and its derivative go through zero without a kink, so that a fit may too.
 
+    Along a program, which is straight from row to row, the loop is solved from its rows alone (`laws.loop`): what is still to
+    come is not asked, and a strut ahead of its command is so by -tau dx/dt.
+
     A lag that all struts have in common is a delay of the whole machine, to first order the same as `time-skew`, and
     a circle about a ball in its centre does not show it but by its shrinkage, (v tau)² / 2R: 0.2 µm at 1000 mm/min,
     150 mm and 15 ms. Where the turn is found in the recording by feed-in and feed-out, these come late as well, and
@@ -40,6 +44,7 @@ class ServoLag(ErrorSource):
     belongs_to = Owner.MACHINE
     detail_mm = SMOOTH_MM
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
+    builds_up = True
     varies_with = "strut-speed"
     form_uncertainty = 0.1  # a drive lags by a filter, not by one time
     texts = Texts(
@@ -68,8 +73,31 @@ class ServoLag(ErrorSource):
         Raises:
             ModelError: the motion is no path or has no time.
         """
-        lag, _ = self._lag(motion, machine, values)
-        return Effect(strut_mm=lag)
+        return Effect(strut_mm=self._lag(motion, machine, values)[0])
+
+    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> LoopState:  # noqa: ARG002
+        """The struts stand still.
+
+        Raises:
+            ModelError: the motion is no path or has no time.
+        """
+        self.require(motion)
+        return STANDING
+
+    def advance(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
+    ) -> tuple[Effect, LoopState]:
+        """Lag of each strut along a stretch of a program."""
+        length, time_s = motion.struts(machine).length_mm, np.asarray(motion.time_s)
+        lag, _, behind = driven(length, time_s, S_PER_MS * values, state)
+        return Effect(strut_mm=lag), behind
+
+    def undone(
+        self, motion: Motion, reached: Motion, machine: Machine, values: NDArray[np.float64], state: LoopState
+    ) -> NDArray[np.float64]:
+        """From the speed of what is reached."""
+        commanded, wanted = motion.struts(machine).length_mm, reached.struts(machine).length_mm
+        return undone(commanded, wanted, np.asarray(motion.time_s), S_PER_MS * values, state)
 
     def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:
         """Each strut answers to its own time.
@@ -77,7 +105,7 @@ class ServoLag(ErrorSource):
         Raises:
             ModelError: the motion is no path or has no time.
         """
-        _, by_constant = self._lag(motion, machine, values)
+        by_constant = self._lag(motion, machine, values)[1]
         return Effect(strut_mm=S_PER_MS * by_constant[:, :, None] * np.eye(STRUTS))
 
     def _lag(
@@ -85,6 +113,9 @@ class ServoLag(ErrorSource):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Error of each strut [mm] and its derivative by its time constant [mm/s], shapes (n, 6)."""
         self.require(motion)
+        if motion.straight:
+            length = motion.struts(machine).length_mm
+            return driven(length, np.asarray(motion.time_s), S_PER_MS * values, STANDING)[:2]
         time_s, length, place = driven_in_time(motion, machine)
         speed, step, constant = speed_mm_s(time_s, length), np.diff(time_s), S_PER_MS * values
         lag, by_constant = followed(speed, step, np.abs(constant))

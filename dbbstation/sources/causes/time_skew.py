@@ -38,6 +38,7 @@ class TimeSkew(ErrorSource):
     name = "time-skew"
     belongs_to = Owner.INSTRUMENT
     needs = frozenset({Need.POSE, Need.PATH, Need.TIME})
+    looks_ahead = True  # the reading belongs to a pose that is still to come
     varies_with = "speed"
     form_uncertainty = 0.05  # clocks drift a little
     texts = Texts(

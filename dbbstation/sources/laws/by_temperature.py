@@ -69,6 +69,21 @@ class FollowsTemperature(LinearSource):
         super().require(motion)
         self._columns(motion)
 
+    @property
+    def has_history(self) -> bool:
+        """Growth counts from the first row, where no session says otherwise."""
+        return True
+
+    def begin(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Motion:  # noqa: ARG002
+        """The first row, from which growth counts."""
+        return motion.stretch(slice(0, 1))
+
+    def advance(
+        self, motion: Motion, machine: Machine, values: NDArray[np.float64], state: Motion
+    ) -> tuple[Effect, Motion]:
+        """Effect along a stretch, counted from the first row of the run."""
+        return self.effect(motion.after(state), machine, values).last(len(motion)), state
+
     def warmer_k(self, motion: Motion) -> NDArray[np.float64]:
         """How much warmer than when the session began, shape (n, 1) or, of struts, (n, 6) [K]."""
         self.require(motion)

@@ -11,17 +11,17 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.sources.causes.backlash import Backlash, follow
+from dbbstation.sources.causes.backlash import Backlash
 from dbbstation.sources.causes.strut_reference_length import StrutReferenceLength
 from dbbstation.sources.contract import Fitted
+from dbbstation.sources.laws.play_operator import followed, leaning
 from tests.sources.runs import concealed_share, jig_runs, random_run, run
 
 BACKLASH = Backlash()
 
 
 def lag_of(travel, width):
-    lag, by_width = np.empty((len(travel), 1)), np.empty((len(travel), 1))
-    follow(np.ascontiguousarray(travel[:, None]), np.array([width]), lag, by_width)
+    lag, by_width, _ = followed(travel[:, None], np.array([width]), leaning(travel[:, None]))
     return lag[:, 0], by_width[:, 0]
 
 

@@ -14,8 +14,9 @@ from dbbstation.machine.kinematics import inverse
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.sources.causes.reversal_spike import DECAY_MM, ReversalSpike, since_turning
+from dbbstation.sources.causes.reversal_spike import DECAY_MM, ReversalSpike
 from dbbstation.sources.contract import Effect, Fitted
+from dbbstation.sources.laws.turning import since_turning
 from tests.sources.runs import DEG_PER_S, circle, concealed_share, jig_runs, random_run, run
 
 SPIKE = ReversalSpike()
@@ -242,7 +243,9 @@ def test_it_is_compensated(reference):
     wanted = replace(run(PLACE, TILT, step_deg=0.5), kept=slice(None))
     commanded = compensated(model, wanted)
     assert np.abs(commanded - wanted.poses)[:, :3].max() > 1e-3
-    assert np.allclose(model.actual_poses(replace(wanted, poses=commanded)), wanted.poses, rtol=0, atol=1e-8)
+    assert np.allclose(
+        model.actual_poses(replace(wanted, poses=commanded, straight=True)), wanted.poses, rtol=0, atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("height_um", [8.0, -8.0])
@@ -251,7 +254,9 @@ def test_it_is_compensated_wherever_rows_lie_about_the_turning_points(reference,
     for offset_deg in rng.uniform(0, 1, 20):
         wanted = circle(PLACE, TILT, np.arange(0, 360) + offset_deg, is_path=True)
         commanded = compensated(model, wanted)
-        assert np.allclose(model.actual_poses(replace(wanted, poses=commanded)), wanted.poses, rtol=0, atol=1e-8)
+        assert np.allclose(
+            model.actual_poses(replace(wanted, poses=commanded, straight=True)), wanted.poses, rtol=0, atol=1e-8
+        )
 
 
 def test_single_poses_are_refused(reference, rng):

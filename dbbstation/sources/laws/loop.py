@@ -1,0 +1,187 @@
+"""A position loop that is fed with a program: from row to row, with what it remembers.
+
+A program is straight between its rows and bends at them. The speed at a row is that of the parabola through it and the two rows
+before where the path goes on evenly, and that of the last straight piece where it bends or changes its feed:
+
+    v = s + w (s - s') h / (h + h'),    w = max(0, s . s') / max(s . s, s' . s')
+
+with s and s' the mean speeds of all struts over the last two steps h and h'. In a smooth path w is 1 within the step, so that v
+is right to its square; behind a stop or a corner of 90 degrees w is 0. The loop y + tau v(y) = x is solved with this speed of the output, as
+backward differences do [Gear, Numerical Initial Value Problems in Ordinary Differential Equations, 1971, ch. 11]: what
+to command for a wanted output follows from the output's speed, and does not swing from row to row.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.compiled import compiled, inlined
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.sources.laws.rates import SHORTEST_S
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+INPUT, INPUT_SPEED, OUTPUT, OUTPUT_SPEED, BY_CONSTANT, SPEED_BY_CONSTANT = range(6)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopState:
+    """What six loops remember.
+
+    Attributes:
+        rows: steps so far: 0 before the first row, 2 once there is a speed.
+        time_s: of the last row [s].
+        step_s: last step [s].
+        memory: commanded and driven length [mm], their mean speeds over the last step [mm/s], and the derivatives of the
+            driven length and its speed by the time constant, each shape (6,): shape (6, 6).
+    """
+
+    rows: int
+    time_s: float
+    step_s: float
+    memory: NDArray[np.float64]
+
+
+STANDING = LoopState(0, 0.0, 0.0, np.zeros((6, STRUTS)))
+"""Before a program: nothing has moved."""
+
+
+def driven(
+    length_mm: NDArray[np.float64], time_s: NDArray[np.float64], constant_s: NDArray[np.float64], state: LoopState
+) -> tuple[NDArray[np.float64], NDArray[np.float64], LoopState]:
+    """Errors y - x of loops along a stretch of a program.
+
+    Args:
+        length_mm: commanded, in time order, shape (n, 6) [mm].
+        time_s: of the rows, shape (n,); rows within `SHORTEST_S` are one, and have one error [s].
+        constant_s: tau, shape (6,); a negative one is a strut ahead by -tau dx/dt [s].
+        state: before the first row.
+
+    Returns:
+        Errors [mm] and their derivatives by tau [mm/s], shapes (n, 6), and the state behind the last row.
+    """
+    lag, by_constant, memory = np.empty_like(length_mm), np.empty_like(length_mm), state.memory.copy()
+    clock = np.array([state.rows, state.time_s, state.step_s])
+    lengths, times = np.ascontiguousarray(length_mm), np.ascontiguousarray(time_s)
+    _drive(lengths, times, constant_s, SHORTEST_S, clock, memory, lag, by_constant)
+    return lag, by_constant, LoopState(int(clock[0]), float(clock[1]), float(clock[2]), memory)
+
+
+def undone(
+    length_mm: NDArray[np.float64],
+    reached_mm: NDArray[np.float64],
+    time_s: NDArray[np.float64],
+    constant_s: NDArray[np.float64],
+    state: LoopState,
+) -> NDArray[np.float64]:
+    """Errors y - x of loops that reach y along a stretch, shape (n, 6) [mm].
+
+    Args:
+        length_mm: a command that nearly leads there, which says where the path bends, shape (n, 6) [mm].
+        reached_mm: y, shape (n, 6) [mm].
+        time_s: of the rows, shape (n,) [s].
+        constant_s: tau, shape (6,) [s].
+        state: before the first row.
+    """
+    error = np.empty_like(length_mm)
+    clock = np.array([state.rows, state.time_s, state.step_s])
+    length, reached, time = (np.ascontiguousarray(array) for array in (length_mm, reached_mm, time_s))
+    _undo(length, reached, time, constant_s, SHORTEST_S, clock, state.memory.copy(), error)
+    return error
+
+
+@inlined
+def _even(length: NDArray[np.float64], memory: NDArray[np.float64], h: float, clock: NDArray[np.float64]) -> float:
+    """How much of the change of speed counts, w h / (h + h')."""
+    both = new = old = 0.0
+    for i in range(len(length)):
+        speed = (length[i] - memory[INPUT, i]) / h
+        both += speed * memory[INPUT_SPEED, i]
+        new += speed * speed
+        old += memory[INPUT_SPEED, i] * memory[INPUT_SPEED, i]
+    return both / max(new, old) * h / (h + clock[2]) if clock[0] > 1.0 and both > 0.0 else 0.0
+
+
+@compiled
+def _undo(
+    length: NDArray[np.float64],
+    reached: NDArray[np.float64],
+    time: NDArray[np.float64],
+    constant: NDArray[np.float64],
+    shortest: float,
+    clock: NDArray[np.float64],
+    memory: NDArray[np.float64],
+    error: NDArray[np.float64],
+) -> None:
+    count, columns = length.shape
+    needed, needed_speed = memory[INPUT].copy(), memory[INPUT_SPEED].copy()
+    for k in range(count):
+        h = time[k] - clock[1]
+        if clock[0] == 0.0 or h <= shortest:
+            for i in range(columns):
+                error[k, i] = memory[OUTPUT, i] - needed[i]
+                memory[INPUT, i], memory[OUTPUT, i] = length[k, i], reached[k, i]
+                needed[i] = reached[k, i] - error[k, i]
+            if clock[0] == 0.0:
+                clock[0], clock[1] = 1.0, time[k]
+            continue
+        share = _even(length[k], memory, h, clock)
+        gain = (1.0 + share) / h
+        for i in range(columns):
+            tau, y = constant[i], reached[k, i]
+            if tau < 0.0:
+                x = (y - tau * (gain * needed[i] + share * needed_speed[i])) / (1.0 - tau * gain)
+            else:
+                x = y + tau * (gain * (y - memory[OUTPUT, i]) - share * memory[OUTPUT_SPEED, i])
+            error[k, i] = y - x
+            memory[OUTPUT_SPEED, i], memory[OUTPUT, i] = (y - memory[OUTPUT, i]) / h, y
+            needed_speed[i], needed[i] = (x - needed[i]) / h, x
+            memory[INPUT_SPEED, i], memory[INPUT, i] = (length[k, i] - memory[INPUT, i]) / h, length[k, i]
+        clock[0], clock[1], clock[2] = 2.0, time[k], h
+
+
+@compiled
+def _drive(
+    length: NDArray[np.float64],
+    time: NDArray[np.float64],
+    constant: NDArray[np.float64],
+    shortest: float,
+    clock: NDArray[np.float64],
+    memory: NDArray[np.float64],
+    lag: NDArray[np.float64],
+    by_constant: NDArray[np.float64],
+) -> None:
+    count, columns = length.shape
+    for k in range(count):
+        h = time[k] - clock[1]
+        if clock[0] == 0.0 or h <= shortest:
+            for i in range(columns):
+                error = memory[OUTPUT, i] - memory[INPUT, i]
+                memory[INPUT, i], memory[OUTPUT, i] = length[k, i], length[k, i] + error
+                lag[k, i], by_constant[k, i] = error, memory[BY_CONSTANT, i]
+            if clock[0] == 0.0:
+                clock[0], clock[1] = 1.0, time[k]
+            continue
+        share = _even(length[k], memory, h, clock)
+        for i in range(columns):
+            tau, x = constant[i], length[k, i]
+            speed = (x - memory[INPUT, i]) / h
+            at, by_at = memory[OUTPUT, i], memory[BY_CONSTANT, i]
+            if tau < 0.0:
+                ahead = (1.0 + share) * speed - share * memory[INPUT_SPEED, i]
+                y, by_y = x - tau * ahead, -ahead
+            else:
+                gain = (1.0 + share) / h
+                before = gain * at + share * memory[OUTPUT_SPEED, i]
+                by_before = gain * by_at + share * memory[SPEED_BY_CONSTANT, i]
+                y = (x + tau * before) / (1.0 + tau * gain)
+                by_y = (before - gain * y + tau * by_before) / (1.0 + tau * gain)
+            memory[INPUT, i], memory[INPUT_SPEED, i] = x, speed
+            memory[OUTPUT, i], memory[OUTPUT_SPEED, i] = y, (y - at) / h
+            memory[BY_CONSTANT, i], memory[SPEED_BY_CONSTANT, i] = by_y, (by_y - by_at) / h
+            lag[k, i], by_constant[k, i] = y - x, by_y
+        clock[0], clock[1], clock[2] = 2.0, time[k], h

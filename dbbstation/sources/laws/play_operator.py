@@ -1,0 +1,98 @@
+"""What has play, or winds up and slides: the play operator, and what it remembers.
+
+The kernel is part of several sources; the compiler keeps its code on disk under this file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.compiled import compiled
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class PlayState:
+    """Where each of m columns lies in its play.
+
+    Attributes:
+        place: y, in the unit of the travel, shape (m,); NaN before the first row.
+        side: derivative of y - x by the width, from -1/2 to 1/2, shape (m,); before the first row the end of the play that
+            the drive leans on.
+    """
+
+    place: NDArray[np.float64]
+    side: NDArray[np.float64]
+
+
+def leaning(travel: NDArray[np.float64]) -> PlayState:
+    """Return the state before a run that begins in a movement which was already under way.
+
+    -1/2 behind a column that grows at first, +1/2 behind one that shrinks, 0 for one that never moves.
+
+    Args:
+        travel: of the run, or of its beginning, shape (n, m).
+    """
+    side = np.zeros(travel.shape[1])
+    _lean(np.ascontiguousarray(travel), side)
+    return PlayState(np.full(travel.shape[1], np.nan), side)
+
+
+def followed(
+    travel: NDArray[np.float64], width: NDArray[np.float64], state: PlayState
+) -> tuple[NDArray[np.float64], NDArray[np.float64], PlayState]:
+    """Play operator of each column: y_k = y_{k-1} limited to x_k - w/2 ... x_k + w/2.
+
+    Args:
+        travel: x, in time order, shape (n, m).
+        width: w, not negative, shape (m,).
+        state: before the first row.
+
+    Returns:
+        Lag y - x and its derivative by the width, shapes (n, m), and the state behind the last row.
+    """
+    lag, by_width = np.empty_like(travel), np.empty_like(travel)
+    place, side = state.place.copy(), state.side.copy()
+    _follow(np.ascontiguousarray(travel), width, place, side, lag, by_width)
+    return lag, by_width, PlayState(place, side)
+
+
+@compiled
+def _lean(travel: NDArray[np.float64], side: NDArray[np.float64]) -> None:
+    count, columns = travel.shape
+    for i in range(columns):
+        k = 1
+        while k < count and travel[k, i] == travel[0, i]:
+            k += 1
+        if k < count:
+            side[i] = -0.5 if travel[k, i] > travel[0, i] else 0.5
+
+
+@compiled
+def _follow(
+    travel: NDArray[np.float64],
+    width: NDArray[np.float64],
+    place: NDArray[np.float64],
+    side: NDArray[np.float64],
+    lag: NDArray[np.float64],
+    by_width: NDArray[np.float64],
+) -> None:
+    count, columns = travel.shape
+    for i in range(columns):
+        half = 0.5 * width[i]
+        at, end = place[i], side[i]
+        if count > 0 and np.isnan(at):
+            at = travel[0, i] + end * width[i]
+        for k in range(count):
+            if at < travel[k, i] - half:
+                at, end = travel[k, i] - half, -0.5
+            elif at > travel[k, i] + half:
+                at, end = travel[k, i] + half, 0.5
+            lag[k, i] = at - travel[k, i]
+            by_width[k, i] = end
+        place[i], side[i] = at, end

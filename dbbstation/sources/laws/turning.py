@@ -1,0 +1,96 @@
+"""Where a strut turned round, along a smooth path that is known at rows only."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.compiled import compiled, inlined
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+TURNED_MM = 1e-3
+"""A strut has turned round once it has come back by this: less is rounding of the program or of recorded angles."""
+
+
+def since_turning(travel: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed way of each column since it last turned round, shape (n, m).
+
+    The turning point lies between rows, in general: it is the vertex of the parabola through the outermost row and its
+    two neighbours, over the way of all columns together, so that rows need not be even. Zero before the first one.
+    Where the path has a corner or comes straight back, as a single column always does, the outermost row is the turning
+    point.
+    """
+    since = np.zeros_like(travel)
+    _since(np.ascontiguousarray(travel), TURNED_MM, since)
+    return since
+
+
+@inlined
+def _parabola(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, float, float, float]:
+    """Parabola of a column through row k and its neighbours, over the way of all columns from row to row.
+
+    Returns:
+        Slope at row k, half of minus the second derivative, both of `side` times the column, way from the row before
+        and way to the next; zeros where the path has a corner at k, or ends there.
+    """
+    if k < 1 or k + 1 >= travel.shape[0]:
+        return 0.0, 0.0, 0.0, 0.0
+    before = after = along = 0.0
+    for c in range(travel.shape[1]):
+        came, goes = travel[k, c] - travel[k - 1, c], travel[k + 1, c] - travel[k, c]
+        before, after, along = before + came * came, after + goes * goes, along + came * goes
+    if along <= 0.0:  # also where two rows are the same
+        return 0.0, 0.0, 0.0, 0.0
+    before, after = np.sqrt(before), np.sqrt(after)
+    rises = side * (travel[k, i] - travel[k - 1, i]) / before
+    falls = side * (travel[k, i] - travel[k + 1, i]) / after
+    return (rises * after - falls * before) / (before + after), (rises + falls) / (before + after), before, after
+
+
+@inlined
+def _vertex(travel: NDArray[np.float64], i: int, k: int, side: float) -> tuple[float, bool]:
+    """Turning point of a column whose outermost row is k, on the high (1.0) or low (-1.0) side, and whether k is behind.
+
+    Of two rows almost equally far out each has its parabola. Were the turning point taken from one of them alone, it
+    would jump as the other becomes the outermost, and a compensation that moves them could go to and fro for ever;
+    hence no less than the neighbour's parabola in the middle between both.
+    """
+    slope, bend, before, after = _parabola(travel, i, k, side)
+    if bend <= 0.0:
+        return travel[k, i], True
+    top = side * travel[k, i] + slope * slope / (4.0 * bend)
+    beside, step = (k + 1, after) if slope > 0.0 else (k - 1, before)
+    middle = side * (travel[k, i] + travel[beside, i]) / 2.0
+    top = max(top, middle + _parabola(travel, i, beside, side)[1] * step * step / 4.0)
+    return side * top, slope <= 0.0
+
+
+@compiled
+def _since(travel: NDArray[np.float64], turned: float, since: NDArray[np.float64]) -> None:
+    count, columns = travel.shape
+    for i in range(columns):
+        turn, way, has_turned = 0.0, 0.0, False  # where the column last turned, and which way it goes
+        low = high = 0  # outermost rows since then
+        for k in range(count):
+            x = travel[k, i]
+            low = k if x < travel[low, i] else low
+            high = k if x > travel[high, i] else high
+            new = 0.0
+            if way >= 0.0 and travel[high, i] - x > turned:
+                new = -1.0
+            elif way <= 0.0 and x - travel[low, i] > turned:
+                new = 1.0
+            if new != 0.0:
+                start = high if new < 0.0 else low
+                if way != 0.0:  # the first movement is one that was already under way
+                    turn, is_behind = _vertex(travel, i, start, -new)
+                    has_turned = True
+                    # An outermost row that is still before the turning point belongs to the movement before.
+                    for j in range(start if is_behind else start + 1, k):
+                        since[j, i] = travel[j, i] - turn
+                way, low, high = new, k, k
+            if has_turned:
+                since[k, i] = x - turn

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from dbbstation.cli.correction import largest_correction_option
+from dbbstation.cli.keeping import keeping_options
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
@@ -35,8 +36,9 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
     type=Finite(0.001, 1000.0),
     default=0.1,
     show_default=True,
-    help="Greatest distance between a straight move and the path [µm].",
+    help="Greatest distance between a straight move and the path, arcs and correction together [µm].",
 )
+@keeping_options
 @click.option(
     "--time-s",
     type=Finite(),
@@ -56,6 +58,8 @@ def compensate(
     out: Path,
     start: str | None,
     chord_um: float,
+    prefer: str | None,
+    accepted_um: float | None,
     time_s: float | None,
     largest_mm: float,
     force: bool,
@@ -63,17 +67,22 @@ def compensate(
 ) -> None:
     r"""Compensate an NC program: what it writes takes the real machine where PROGRAM means to go.
 
-    Moves at feed are split where the correction bends. The program must be in machine coordinates and name all six
-    axes in its first move, or --start says where the machine stands. It must be whole (M2, M30 or percent signs), not
-    compensated yet, and of no other machine. Travel, feeds and the size of corrections are checked before anything is
-    written.
+    Moves at feed are split into the longest pieces that keep the chord error. Where the control cannot keep the feed in
+    such pieces, the program is refused with the feed that it reaches, unless --prefer decides.
+
+    The program must be in machine coordinates and name all six axes in its first move, or --start says where the machine
+    stands. It must be whole (M2, M30 or percent signs), not compensated yet, and of no other machine. Travel, feeds and the
+    size of corrections are checked before anything is written.
 
     \b
     Examples:
       dbbstation compensate part.ngc --model model.yaml --out part-compensated.ngc
       dbbstation compensate part.nc --from linuxcnc --model model.yaml --out true.ngc --start 0,0,-1000,0,0,0
+      dbbstation compensate part.ngc --model model.yaml --out fast.ngc --prefer feed
     """
-    from dbbstation.cli.programs import loaded_inverse, origin_of, parsed_pose, print_programs, read_source
+    from dataclasses import replace
+
+    from dbbstation.cli.programs import loaded_inverse, origin_of, parsed_pose, preferred, print_programs, read_source
     from dbbstation.files.atomic import refuse_existing, write_text
     from dbbstation.files.own_dialects import dialect_given
     from dbbstation.nc.export import compensated_program
@@ -86,6 +95,7 @@ def compensate(
     reader = dialect_of_file(str(program_file), text) if source is None else dialect_given(source)
     path = reader.read(text, str(program_file), start=pose)
     inverse = loaded_inverse(model_file, time_s, source_files, largest_mm)
+    inverse = replace(inverse, prefer=preferred(prefer), accepted_um=accepted_um)
     done = compensated_program(
         path,
         written_in,
@@ -94,4 +104,4 @@ def compensate(
         origin=origin_of({"program file": program_file}, inverse),
     )
     write_text(out, done.text, force=force)
-    print_programs([(out, done)], written_in.name, model_file, as_json=as_json)
+    print_programs([(out, done)], written_in, inverse.model.machine, model_file, as_json=as_json)

@@ -9,9 +9,11 @@ import click
 from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
 from dbbstation.cli.circle_options import approach_of, circle_options
 from dbbstation.cli.correction import largest_correction_option
+from dbbstation.cli.keeping import keeping_options
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
+from dbbstation.nc.limits import CIRCLE_CHORD_MM
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
 
@@ -32,6 +34,14 @@ _FILE = click.Path(path_type=Path, dir_okay=False)
 @source_file_option
 @chosen_tests_options
 @circle_options
+@click.option(
+    "--chord-um",
+    type=Finite(0.001, 1000.0),
+    default=1e3 * CIRCLE_CHORD_MM,
+    show_default=True,
+    help="With --model: greatest distance between a straight move and the circle [µm].",
+)
+@keeping_options
 @click.option(
     "--time-s",
     type=Finite(),
@@ -54,6 +64,9 @@ def program(
     step_deg: float,
     clearance_mm: float,
     bar_stays_on: bool,
+    chord_um: float,
+    prefer: str | None,
+    accepted_um: float | None,
     time_s: float | None,
     largest_mm: float,
     force: bool,
@@ -65,14 +78,19 @@ def program(
     are written or none. A program goes above its first point, comes down to it, waits for the bar to be put on, runs
     the path of a run and waits for the bar to be taken off.
 
+    Points of compensated programs are as far apart as the control needs for the feed, within --chord-um; where that is not
+    far enough, the program is refused with the feed that is reached, unless --prefer decides.
+
     \b
     Examples:
       dbbstation program --plan table2.yaml --machine machine.yaml --out nominal
       dbbstation program --plan table2.yaml --machine machine.yaml --model model.yaml --out compensated
       dbbstation program --plan table2.yaml --machine machine.yaml --test a,f --out two --json
     """
+    from dataclasses import replace
+
     from dbbstation.cli.output import say
-    from dbbstation.cli.programs import loaded_inverse, origin_of, print_programs
+    from dbbstation.cli.programs import loaded_inverse, origin_of, preferred, print_programs
     from dbbstation.cli.progress import count_bar
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.formats.machine import read_machine
@@ -83,6 +101,8 @@ def program(
     written_in = dialect_given(dialect)
     plan, machine = read_plan(plan_file), read_machine(machine_file)
     inverse = None if model_file is None else loaded_inverse(model_file, time_s, source_files, largest_mm)
+    if inverse is not None:
+        inverse = replace(inverse, prefer=preferred(prefer), accepted_um=accepted_um)
     with count_bar("programs") as writing:
         programs = circle_programs(
             plan,
@@ -92,10 +112,12 @@ def program(
             origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse),
             tests=chosen_of(plan.name, plan.tests, tests, exclude),
             step_deg=step_deg,
+            chord_mm=chord_um / 1e3,
             approach=approach_of(clearance_mm, bar_stays_on=bar_stays_on),
             progress=writing,
         )
     write_folder(out, {each.name: each.text for each in programs}, force=force)
-    print_programs([(out / each.name, each) for each in programs], written_in.name, model_file, as_json=as_json)
+    written = [(out / each.name, each) for each in programs]
+    print_programs(written, written_in, None if inverse is None else machine, model_file, as_json=as_json)
     if not as_json:
         say(f"{len(programs)} programs written to {out}, all within the machine's travel")

@@ -15,7 +15,9 @@ from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.model import read_model
 from dbbstation.files.own_sources import every_source
 from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.nc.compensate import Prefer
 from dbbstation.nc.export import Inverse
+from dbbstation.nc.kept import said_acceleration
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.nc.dialect import Dialect
     from dbbstation.nc.export import Program
 
 
@@ -87,25 +91,48 @@ def parsed_pose(text: str) -> NDArray[np.float64]:
     return pose
 
 
+def preferred(name: str | None) -> Prefer | None:
+    """Return what `--prefer` says."""
+    return None if name is None else Prefer(name)
+
+
 def print_programs(
     written: Sequence[tuple[Path, Program]],
-    dialect: str,
+    dialect: Dialect,
+    machine: Machine | None,
     model_file: Path | None,
     *,
     as_json: bool,
 ) -> None:
-    """Print what was written, as a table or as JSON."""
+    """Print what was written, as a table or as JSON, and for compensated programs what the machine accelerates with."""
+    if dialect.look_ahead is None:
+        machine = None
     if not as_json:
         rows = [
-            [str(path), each.points, *map(_or_empty, (each.greatest_um, each.uncertainty_um))] for path, each in written
+            [
+                str(path),
+                each.points,
+                *map(
+                    _or_empty, (each.greatest_um, each.uncertainty_um, each.chord_um, each.feed_s, each.nominal_feed_s)
+                ),
+            ]
+            for path, each in written
         ]
-        print_table(["program", "points", "greatest correction / µm", "model's u along the path / µm"], rows)
+        correction = ["greatest correction / µm", "model's u along the path / µm"]
+        print_table(["program", "points", *correction, "chord error / µm", "time at feed / s", "nominal / s"], rows)
+        for path, each in written:
+            if each.cost:
+                say(f"{path}: {each.cost}")
+        if machine is not None:
+            say(f"pieces are chosen for {dialect.name} at {said_acceleration(machine)}")
         _say_uncertainty([each for _, each in written])
         return
     print_json(
         {
-            "dialect": dialect,
+            "dialect": dialect.name,
             "model_sha256": None if model_file is None else hashlib.sha256(_content(model_file)).hexdigest(),
+            "acceleration_mm_s2": None if machine is None else machine.planned_acceleration_mm_s2,
+            "acceleration_known": None if machine is None else machine.acceleration_mm_s2 is not None,
             "programs": [
                 {
                     "file": str(path),
@@ -117,6 +144,9 @@ def print_programs(
                     "model_uncertainty_um": each.uncertainty_um,
                     "model_uncertainty_by_axis_um": dict(zip("xyz", each.uncertainty_by_axis_um, strict=False)) or None,
                     "model_uncertainty_not_known_because": each.why_unknown or None,
+                    "tilt_left_um": each.tilt_left_um,
+                    "feed_s": each.feed_s,
+                    "nominal_feed_s": each.nominal_feed_s,
                 }
                 for path, each in written
             ],
@@ -129,16 +159,18 @@ def _or_empty(value: float | None) -> float | str:
 
 
 def _say_uncertainty(programs: Sequence[Program]) -> None:
-    """Set what the model knows of the path against the chord error that was asked for."""
+    """Set what the model knows of the paths, where it knows least, against the chord error that was asked for."""
     for why in dict.fromkeys(each.why_unknown for each in programs if each.why_unknown):
         say(f"how well the model knows the path is not known in every coordinate: {why}")
-    for each in programs:
-        if each.uncertainty_um is not None and each.chord_asked_um is not None:
-            knows = f"the model knows the path within {each.uncertainty_um:.2g} µm (standard uncertainty)"
-            asked = f"the chord error asked for is {each.chord_asked_um:g} µm"
-            if each.uncertainty_um > each.chord_asked_um:
-                asked += ": moves are split finer than the model knows them"
-            say(f"{knows}, {asked}")
+    uncertain_um = max((each.uncertainty_um for each in programs if each.uncertainty_um is not None), default=None)
+    asked_um = next((each.chord_asked_um for each in programs if each.chord_asked_um is not None), None)
+    if uncertain_um is None or asked_um is None:
+        return
+    knows = f"the model knows the path within {uncertain_um:.2g} µm (standard uncertainty)"
+    asked = f"the chord error asked for is {asked_um:g} µm"
+    if uncertain_um > asked_um:
+        asked += ": moves are split finer than the model knows them"
+    say(f"{knows}, {asked}")
 
 
 def _content(path: Path) -> bytes:

@@ -1,17 +1,15 @@
-"""An NC dialect by its name, or one of the user's own by its Python file."""
+"""An NC dialect by its name, or one of the user's own by its Python file, tried before it is used."""
 
 from __future__ import annotations
 
 from pathlib import Path
-
-import numpy as np
 
 from dbbstation.catalogue import Found, in_words
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.own_classes import classes_in_files, line_in
 from dbbstation.nc.dialect import Dialect
 from dbbstation.nc.registry import dialect_named
-from dbbstation.nc.toolpath import ToolpathBuilder
+from dbbstation.nc.trial import faults_of
 
 CONTRACT = "see `A new dialect` in docs/nc.md"
 
@@ -42,7 +40,7 @@ def dialect_given(name_or_file: str) -> Dialect:
 
 
 def _tried(found: Found[Dialect]) -> Dialect:
-    """Return a dialect made from a class, after it has written a move and read it.
+    """Return a dialect made from a class, after it has written and read all that a program may say.
 
     Raises:
         InputError: what it lacks.
@@ -55,24 +53,11 @@ def _tried(found: Found[Dialect]) -> Dialect:
     if not said:
         try:
             dialect = kind()
-            said = _unlike(dialect)
+            said = faults_of(dialect)
         except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
-            said = [f"{in_words(error)}, when it was tried on two moves"]
+            said = [f"{in_words(error)}, when it was tried"]
             line = line_in(error, place.file) or line
         else:
             if not said:
                 return dialect
     raise InputError([Problem(place.file, line, 0, f"{kind.__name__}: {what}", found.remedy) for what in said])
-
-
-def _unlike(dialect: Dialect) -> list[str]:
-    """What a dialect reads otherwise than it wrote it."""
-    builder = ToolpathBuilder("trial")
-    builder.rapid(np.array([10.0, -20.0, -1000.0, 1.0, -2.0, 3.0]))
-    builder.feed(np.array([[10.5, -20.0, -1000.0, 1.0, -2.0, 3.5]]), 600.0)
-    wrote = builder.built()
-    read = dialect.read(dialect.write(wrote), "trial" + dialect.extension)
-    moves = read.poses[read.is_move]
-    if moves.shape != (2, 6) or not np.allclose(moves, wrote.poses[wrote.is_move], atol=1e-3):
-        return ["it does not read the two moves that it wrote"]
-    return []

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 DESCRIPTION = frozenset({"name"})
 """Keys that say nothing of the machine itself."""
 
-NOT_PREDICTED = frozenset({"travel", "joint_tolerance_mm"})
+NOT_PREDICTED = frozenset({"travel", "joint_tolerance_mm", "acceleration_mm_s2"})
 """Keys that no prediction of a calibrated model uses: what the machine may reach, and what a fit took for likely."""
 
 CONTROL = frozenset({"base_joints_mm", "platform_joints_mm", "rotation", "reference_length_error_mm"})

@@ -21,6 +21,10 @@ tools. It keeps senseless numbers out of programs; what the machine really reach
 GREATEST_TURN_DEG_MIN = 36_000.0
 """The same for moves that only turn: a hundred turns per minute [deg/min]."""
 
+ACCELERATION_MM_S2 = 1000.0
+"""Acceleration of the tool tip that a control is taken to plan with where the machine file says nothing: 1 m/s², a tenth of
+gravity, at the lower end of machine tools. Pieces that keep their feed with it keep it with more [mm/s²]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Hexapod:
@@ -139,6 +143,7 @@ class Machine:
         joint_axes: of universal joints; None where not known, or where the joints are balls.
         greatest_feed_mm_min: of the tool tip [mm/min]; None where not known.
         greatest_turn_deg_min: of the tilt angles where the tool tip stands still [deg/min]; None where not known.
+        acceleration_mm_s2: of the tool tip, that the control plans with [mm/s²]; None where not known.
     """
 
     name: str
@@ -153,11 +158,17 @@ class Machine:
     joint_axes: JointAxes | None = None
     greatest_feed_mm_min: float | None = None
     greatest_turn_deg_min: float | None = None
+    acceleration_mm_s2: float | None = None
 
     @property
     def feed_limit_mm_min(self) -> float:
         """Greatest F of a move of the tool tip that is written [mm/min]."""
         return GREATEST_FEED_MM_MIN if self.greatest_feed_mm_min is None else self.greatest_feed_mm_min
+
+    @property
+    def planned_acceleration_mm_s2(self) -> float:
+        """Acceleration by which pieces of moves are chosen [mm/s²]."""
+        return ACCELERATION_MM_S2 if self.acceleration_mm_s2 is None else self.acceleration_mm_s2
 
     @property
     def turn_limit_deg_min(self) -> float:

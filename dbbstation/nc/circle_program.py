@@ -28,6 +28,9 @@ CORNER_DWELL_S = 0.3
 LEAST_CORNER_MM = 1e-4
 """The control may round the corners of the polygon by this much; 0.1 µm is below what a bar can see."""
 
+EVEN_RAD = 1e-9
+"""Steps that differ by less are the same."""
+
 BAR_ON = "put the bar on its balls, start recording, then continue"
 BAR_OFF = "stop recording, take the bar off, then continue"
 
@@ -68,6 +71,7 @@ def circle_toolpath(
     first, last = circle.poses(_ends_deg(circle), circle.feed_in_mm)
     path = ToolpathBuilder(name)
     path.corner_mm = max(LEAST_CORNER_MM, chord_error_mm(circle, step_deg))
+    path.guard = ()
     if approach is not None:
         path.rapid(_raised(first, approach.clear_mm))
     path.feed(first[None], circle.feed_mm_min)
@@ -77,7 +81,12 @@ def circle_toolpath(
     arc = circle.poses(circle.theta_deg(arc_phi_deg(circle, step_deg)))
     path.feed(arc[:1], circle.feed_mm_min)
     path.dwell(CORNER_DWELL_S)
-    path.feed(arc[1:], circle.feed_mm_min)
+    x, y, _ = circle.centre_mm
+    turned = np.diff(np.radians(circle.theta_deg(arc_phi_deg(circle, step_deg))))
+    # One step each on the overshoot and on the turn.
+    parts = np.flatnonzero(np.abs(np.diff(turned)) > EVEN_RAD) + 1
+    for poses, angles in zip(np.split(arc[1:], parts), np.split(turned, parts), strict=True):
+        path.feed(poses, circle.feed_mm_min, arc=(x, y, float(angles.mean())))
     path.dwell(CORNER_DWELL_S)
     path.feed(last[None], circle.feed_mm_min)
     path.dwell(OUTER_DWELL_S)

@@ -1,64 +1,67 @@
-"""Compensation of any toolpath: the machine model inverted along the path, long moves split where they bend."""
+"""Compensation of any toolpath: the machine model inverted along the path, moves in pieces that keep chord and feed."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from types import MappingProxyType
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import StationError
-from dbbstation.model.compensation import Passed, begun, compensated_on
+from dbbstation.nc.curve import Curve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
-from dbbstation.nc.toolpath import Step, Toolpath, in_pieces, rounded
-from dbbstation.sources.contract import Motion
+from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, cuts
+from dbbstation.nc.splitting import SHORTEST_MM, looked_at, moves_of, rows_as_pieces, runs_of, split
+from dbbstation.nc.toolpath import Step, rounded
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from numpy.typing import NDArray
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
+    from dbbstation.nc.planner import Planner
+    from dbbstation.nc.splitting import Pieces
+    from dbbstation.nc.toolpath import Toolpath
 
 CHORD_MM = 1e-4
 """Greatest distance between the straight commanded move and the curve that would take the tool exactly along the
-straight wanted one: 0.1 µm, a tenth of what a ball bar repeats."""
+wanted one: 0.1 µm, a tenth of what a ball bar repeats."""
 
-LEVER_MM = 100.0
-"""The tilt between points may be off by as much as moves a point this far from the tool tip by the chord error."""
-
-FIRST_PIECE_MM, FIRST_PIECE_DEG = 50.0, 5.0
-"""Moves are looked at in pieces of at most this size before any is halved."""
-
-OF_A_PERIOD = 0.25
-"""Before any is halved, pieces are at most this share of the shortest period in the model: start, middle and end of a longer
-one can all lie on the zeros of a wave. On 150 lines with drawn screw errors the worst place was 2.0 µm off without this,
-0.11 µm with the whole period or half of it, 0.10 µm with a quarter or a tenth [docs/nc.md]."""
-
-LOOKED_AT = (0.19, 0.5, 0.73)
-"""Shares of a piece at which its distance from the curve is taken: not evenly spaced, so that no wave is met at its
-zeros each time. With the middle alone the same lines were 0.27, 0.23 and 0.12 µm off with a period, a half, a quarter."""
-
-MOST_PIECES = 1_000_000
-"""As many as `rs274.reader.MOST_ROWS`: the path itself is held in memory."""
-
-PIECES_AT_ONCE = 512
-"""Pieces, before any is halved, that are split and inverted together: enough for arrays to be quick, and few megabytes."""
-
-SHORTEST_MM, SHORTEST_DEG = 0.05, 0.01
-"""Pieces are not halved below this: a step of the correction (backlash at a strut's reversal) has no chord that fits,
-and is placed within this distance."""
-
-HISTORY_MM, HISTORY_DEG = 5.0, 1.0
-"""Steps in which rapids are followed for the sake of backlash and friction; they are written as one move all the same,
-since nothing is cut on the way."""
+DENSELY = np.arange(1, 14) / 13.0
+"""Shares of a piece at which its distance from the curve is reported: a prime number of parts, so that no wave with some
+periods in a piece is met at its zeros."""
 
 FEED_KEPT = 1e-3
 """A feed stays as it is while the compensated move is as long as the wanted one within this share."""
+
+
+class Prefer(StrEnum):
+    """What to keep where the chord and the feed cannot both be kept."""
+
+    ACCURACY = "accuracy"
+    """The chord: F is lowered to what the pieces let the control reach."""
+    FEED = "feed"
+    """The feed: pieces as long as it needs, as near to the path as such pieces can be."""
+    POSITION_ONLY = "position-only"
+    """Both, at the tool tip: A, B and C stay as they are programmed, and their correction is left out."""
+
+
+@dataclass(frozen=True)
+class Slow:
+    """The move that loses most of its feed.
+
+    Attributes:
+        line: of the program; 0 where there is none.
+        asked_mm_min: F of the program.
+        reached_mm_min: F at which it would lose none.
+        chord_um: chord error at which it would keep its F, with pieces of the length that F needs [µm].
+    """
+
+    line: int
+    asked_mm_min: float
+    reached_mm_min: float
+    chord_um: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +71,23 @@ class Compensation:
     Attributes:
         toolpath: poses rounded as they will be written.
         greatest_um: largest shift of a programmed point, or of one `LEVER_MM` from the tip by the tilt [µm].
-        chord_um: largest distance found between a commanded move and the curve that it stands for [µm]; None where
-            moves were not split.
+        chord_um: largest distance between a commanded move and the curve that it stands for, looked for at `DENSELY` places
+            of each piece [µm].
+        chord_line: line of the program where that is; 0 where there is none.
+        tilt_um: largest correction of the tilt that was left out, as felt at `LEVER_MM` [µm].
+        seconds: time in moves at feed, by the planner's rule [s].
+        nominal_seconds: of the toolpath that was compensated [s].
+        slow: where the feed is lost; None where it is kept.
     """
 
     toolpath: Toolpath
     greatest_um: float
-    chord_um: float | None
+    chord_um: float
+    chord_line: int
+    tilt_um: float
+    seconds: float
+    nominal_seconds: float
+    slow: Slow | None
 
 
 def compensate_toolpath(
@@ -82,107 +95,68 @@ def compensate_toolpath(
     model: MachineModel,
     *,
     chord_mm: float | None = CHORD_MM,
+    keep_arcs: bool = False,
     started_s: float | None = None,
     largest_mm: float = LARGEST_CORRECTION_MM,
+    planner: Planner = LOOKS_AHEAD,
+    prefer: Prefer | None = None,
 ) -> Compensation:
     """Return the toolpath that takes the actual machine along the given one.
 
     The path is inverted from its beginning to its end, rapids included, so that sources with a history see the one that the
-    machine will have. Stretches of `PIECES_AT_ONCE` are split and inverted one after the other.
+    machine will have.
 
     Args:
         toolpath: as it should be.
         model: calibrated model; what belongs to the machine is inverted.
-        chord_mm: moves at feed are split until they keep this tolerance; None writes one move for each.
+        chord_mm: moves at feed are written in the longest pieces that keep this tolerance; None writes one move for each.
+        keep_arcs: chords of arcs stay as they are: they were chosen for the feed before.
         started_s: start of the program on the time scale of the model's sessions, for sources that need time [s];
             None: not known.
         largest_mm: greatest correction that is applied, of the tip and of a point `LEVER_MM` from it by the tilt [mm].
+        planner: the control on its machine, which says how long pieces must be for their feed.
+        prefer: what to keep where chord and feed cannot both be kept; None: the chord, and F as it is.
 
     Raises:
         KinematicsError: a pose that the machine cannot take.
         StationError: a correction is larger than that, or the path has too many pieces.
         ModelError: a source needs what a program does not give, such as temperatures, or the time where it is None.
     """
-    behind = _Inverted.before(toolpath)
-    parts, number, greatest_mm = [behind], 0, 0.0
-    for first in _first_pieces(toolpath, chord_mm, model):
-        pieces: _Pieces | None = first
-        while pieces is not None:
-            _check_number(toolpath, number + len(pieces.row))
-            inverted = _inverted(toolpath, pieces, behind, model, started_s)
-            shift_mm = _felt_mm(inverted.commanded - toolpath.between(pieces.row, pieces.end))
-            _check_corrections(toolpath, pieces, shift_mm, largest_mm)
-            bent = _can_be_halved(toolpath, pieces) & (chord_mm is not None and inverted.off_mm > chord_mm)
-            pieces = pieces.halved(bent) if bent.any() else None
-        behind = inverted
-        number += len(inverted.pieces.row)
-        greatest_mm = max(greatest_mm, float(shift_mm.max(initial=0.0)))
-        parts.append(inverted)
-    pieces = _Pieces.joined([part.pieces for part in parts])
-    commanded, off_mm = (np.concatenate([getattr(part, name) for part in parts]) for name in ("commanded", "off_mm"))
+    curve = Curve(toolpath, model, started_s, hold_tilt=prefer is Prefer.POSITION_ONLY)
+    short: dict[int, float] = {}
+    if chord_mm is None:
+        pieces, runs = rows_as_pieces(toolpath), moves_of(toolpath)
+    else:
+        needed_mm = _needed_mm(toolpath, planner, prefer)
+        runs = runs_of(toolpath, needed_mm)
+        whole = np.zeros(len(toolpath), dtype=np.bool_)
+        if keep_arcs and toolpath.arc is not None:
+            whole = toolpath.arc[:, 2] != 0.0
+        pieces, short = split(curve, model, chord_mm, needed_mm, runs, for_feed=prefer is Prefer.FEED, whole=whole)
+    at = looked_at(curve, pieces, DENSELY)
+    commanded = at[:, -1]
+    shift_mm = felt_mm(commanded - toolpath.between(*row_and_share(pieces.end)))
+    _check_corrections(toolpath, pieces, shift_mm, largest_mm)
+    off_mm = _off_mm(toolpath, pieces, at)
+    corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
+    done = _assembled(toolpath, pieces, commanded, runs, model.machine, corner_mm)
+    slow = _slowest(toolpath, done, _Of(runs, runs[pieces.row[_written(toolpath, pieces)]]), planner, short)
+    if slow is not None and prefer is Prefer.ACCURACY:
+        done = _slowed(done, planner)
+    worst = int(np.argmax(off_mm)) if len(off_mm) else 0
     return Compensation(
-        toolpath=_assembled(toolpath, pieces, commanded, model.machine),
-        greatest_um=1e3 * greatest_mm,
-        chord_um=None if chord_mm is None else 1e3 * float(off_mm.max(initial=0.0)),
+        toolpath=done,
+        greatest_um=1e3 * float(shift_mm.max(initial=0.0)),
+        chord_um=1e3 * float(off_mm.max(initial=0.0)),
+        chord_line=int(toolpath.line[pieces.row[worst]]) if len(off_mm) else 0,
+        tilt_um=1e3 * curve.tilt_left_mm,
+        seconds=float(_seconds(done, planner).sum()),
+        nominal_seconds=float(_seconds(toolpath, planner).sum()),
+        slow=slow,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Pieces:
-    """Rows in pieces: the row of each piece, and the shares of the row where it begins and ends, shapes (k,)."""
-
-    row: NDArray[np.int64]
-    begin: NDArray[np.float64]
-    end: NDArray[np.float64]
-
-    @classmethod
-    def joined(cls, parts: Sequence[_Pieces]) -> _Pieces:
-        """Return pieces of stretches that follow each other as those of one."""
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("row", "begin", "end")))
-
-    def halved(self, which: NDArray[np.bool_]) -> _Pieces:
-        """Return the pieces with some of them cut in two."""
-        again = 1 + which.astype(np.int64)
-        part, share = in_pieces(again)
-        begin, width = self.begin[part], (self.end - self.begin)[part]
-        return _Pieces(self.row[part], begin + width * (share - 1.0 / again[part]), begin + width * share)
-
-
-def _first_pieces(toolpath: Toolpath, chord_mm: float | None, model: MachineModel) -> Iterator[_Pieces]:
-    """Pieces before any is halved, by stretches of whole rows with about `PIECES_AT_ONCE` of them."""
-    history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
-    cutting = np.maximum(toolpath.tip_mm / FIRST_PIECE_MM, toolpath.turn_deg / FIRST_PIECE_DEG)
-    cutting = np.maximum(cutting, _way_mm(toolpath, model.machine) / (OF_A_PERIOD * model.shortest_period_mm))
-    if chord_mm is None:
-        cutting = np.ones(len(toolpath))
-    number = np.maximum(np.ceil(np.where(toolpath.kind == Step.RAPID, history, cutting)), 1.0)
-    _check_number(toolpath, number.sum())
-    # A stretch begins with a move: a stop belongs to the move before.
-    moves = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
-    stretch = np.maximum.accumulate(np.where(moves, np.cumsum(number) // PIECES_AT_ONCE, 0.0))
-    edges = [0, *(np.flatnonzero(np.diff(stretch)) + 1), len(number)] if len(number) else []
-    for first, last in pairwise(edges):
-        row, end = in_pieces(number[first:last].astype(np.int64))
-        row += first
-        yield _Pieces(row, end - 1.0 / number[row], end)
-
-
-def _way_mm(toolpath: Toolpath, machine: Machine) -> NDArray[np.float64]:
-    """Bound of the way of the tool tip and of every platform joint in each row, which bounds a strut's, shape (n,) [mm].
-
-    The platform turns by the three angles one after the other: by their sum at most, √3 times the root of their squares.
-    """
-    reach_mm = float(np.linalg.norm(machine.hexapod.platform_joints_mm, axis=1).max())
-    return toolpath.tip_mm + math.sqrt(3.0) * reach_mm * np.radians(toolpath.turn_deg)
-
-
-def _check_number(toolpath: Toolpath, pieces: float) -> None:
-    if pieces > MOST_PIECES:
-        what = f"the path is too long to be compensated at once: {pieces:.0f} pieces, at most {MOST_PIECES}"
-        raise StationError(what, where=toolpath.name, remedy="compensate it in parts, or allow a larger chord error")
-
-
-def _check_corrections(toolpath: Toolpath, pieces: _Pieces, shift_mm: NDArray[np.float64], largest_mm: float) -> None:
+def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: NDArray[np.float64], largest_mm: float) -> None:
     """Refuse corrections that no machine needs."""
     if shift_mm.max(initial=0.0) <= largest_mm:
         return
@@ -196,119 +170,138 @@ def _check_corrections(toolpath: Toolpath, pieces: _Pieces, shift_mm: NDArray[np
     )
 
 
+def _off_mm(toolpath: Toolpath, pieces: Pieces, at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far the curve leaves each piece at feed, at `DENSELY` places, shape (k,) [mm]."""
+    begin, end = at[:, 0], at[:, -1]
+    off = np.array([felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(DENSELY)])
+    return np.where(toolpath.kind[pieces.row] == Step.FEED, off.max(axis=0, initial=0.0), 0.0)
+
+
+def _needed_mm(toolpath: Toolpath, planner: Planner, prefer: Prefer | None) -> NDArray[np.float64]:
+    """Length of a piece that keeps the feed of each row, shape (n,) [mm]: 0 where any length does.
+
+    Every move turns A, B and C once it is compensated, unless they are held. A move that turns them as it is programmed
+    is as slow as its length lets it be, compensated or not.
+    """
+    limited = planner.limited(toolpath)
+    mm_s = np.where(toolpath.kind == Step.FEED, np.nan_to_num(toolpath.feed) / 60.0, 0.0)
+    mm_s = np.where(limited, np.minimum(mm_s, planner.reached_mm_s(_move_mm(toolpath))), mm_s)
+    turns = limited if prefer is Prefer.POSITION_ONLY else cuts(toolpath)
+    return np.where(turns, planner.needed_mm(mm_s), 0.0)
+
+
+def _move_mm(toolpath: Toolpath) -> NDArray[np.float64]:
+    """Length of the written move that each row belongs to, shape (n,) [mm]: LinuxCNC runs an arc as one."""
+    number = moves_of(toolpath)
+    return np.asarray(np.bincount(number, weights=toolpath.tip_mm)[number], dtype=np.float64)
+
+
 @dataclass(frozen=True, eq=False)
-class _Inverted:
-    """One stretch, inverted.
+class _Of:
+    """Number of the run that each row belongs to: of the toolpath as it was, shape (n,), and of the compensated one, (k,)."""
 
-    Attributes:
-        pieces: k of them.
-        commanded: poses at the ends of all pieces, shape (k, 6) [mm, deg]; NaN before the machine's place is known.
-        off_mm: how far each piece passes the curve, shape (k,) [mm].
-        standing: pose that is commanded last, shape (6,); NaN where the machine's place is not known yet.
-        passed: what the model remembers; None before the machine's place is known.
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
+
+    def lost(self, before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sums of each run, those of the compensated toolpath over those of the other, shape (2, runs)."""
+        count = int(self.before[-1]) + 1
+        pairs = ((self.after, after), (self.before, before))
+        return np.array([np.bincount(number, weights=each, minlength=count) for number, each in pairs])
+
+
+def _slowest(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner, short: dict[int, float]) -> Slow | None:
+    """Return the move that loses most of its feed; None where all keep it, and all together with their ramps.
+
+    Args:
+        toolpath: as it was.
+        done: compensated, with F as it was.
+        of: runs of their rows.
+        planner: the control on its machine.
+        short: how near to the curve the pieces are that the feed needs, by run [mm].
     """
+    cutting = cuts(done)
+    if not cutting.any():
+        return None
+    reached = planner.speed_mm_s(done)
+    # A move that turns A, B and C is as slow as its length lets it be, an arc as one move.
+    own = np.where(planner.limited(toolpath), planner.reached_mm_s(_move_mm(toolpath)), np.inf)
+    asked = np.minimum(planner.speed_mm_s(replace(toolpath, poses=_tilt_held(toolpath))), own)
+    at_feed = np.where(cuts(toolpath), toolpath.tip_mm / asked, 0.0)
+    takes, took = of.lost(at_feed, np.where(cutting, done.tip_mm / reached, 0.0))
+    # What a ramp costs is no loss of a move by itself: there may be many of them.
+    ramp_s = np.zeros(len(took))
+    np.maximum.at(ramp_s, of.before, asked / planner.acceleration_mm_s2)
+    lost = np.where((takes - took > ramp_s) & (took > 0.0), takes / np.where(took > 0.0, took, 1.0), 1.0)
+    worst = int(np.argmax(lost))
+    if lost[worst] <= KEPT:
+        return _lost_in_ramps(toolpath, done, of, planner)
+    row = int(np.argmin(np.where(cutting & (of.after == worst), reached, np.inf)))
+    chord_um = 1e3 * short.get(worst, np.nan)
+    return Slow(int(done.line[row]), float(done.feed[row]), 60.0 * float(reached[row]), chord_um)
 
-    pieces: _Pieces
-    commanded: NDArray[np.float64]
-    off_mm: NDArray[np.float64]
-    standing: NDArray[np.float64]
-    passed: Passed | None
 
-    @classmethod
-    def before(cls, toolpath: Toolpath) -> _Inverted:
-        """Return what is there before the first row."""
-        nothing = np.empty(0)
-        pieces = _Pieces(np.empty(0, dtype=np.int64), nothing, nothing)
-        return cls(pieces, np.empty((0, toolpath.poses.shape[1])), nothing, np.full(6, np.nan), None)
+def _tilt_held(toolpath: Toolpath) -> NDArray[np.float64]:
+    """Poses of the toolpath, shape (n, 6), with A, B and C at zero."""
+    return np.where(np.arange(6) < 3, toolpath.poses, 0.0)  # noqa: PLR2004 - X, Y and Z
 
 
-def _inverted(
+def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner) -> Slow | None:
+    """Return the move that loses most in its ramps, with the feed at which all together lose little enough."""
+
+    def share(of_feed: float) -> float:
+        slower = [
+            replace(path, feed_mm_min=of_feed * path.feed_mm_min, feed_deg_min=of_feed * path.feed_deg_min)
+            for path in (toolpath, done)
+        ]
+        nominal, own = (_seconds(path, planner).sum() for path in slower)
+        return float(own / nominal)
+
+    if share(1.0) <= KEPT:
+        return None
+    low, high = 0.0, 1.0
+    for _ in range(20):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if share(middle) <= KEPT else (low, middle)
+    takes, took = of.lost(_seconds(toolpath, planner), _seconds(done, planner))
+    row = int(np.argmax((of.before == int(np.argmax(takes - took))) & (toolpath.kind == Step.FEED)))
+    feed = float(toolpath.feed[row])
+    return Slow(int(toolpath.line[row]), feed, low * feed, np.nan)
+
+
+def _seconds(path: Toolpath, planner: Planner) -> NDArray[np.float64]:
+    """Time of each row at feed, zero in others, shape (n,) [s]."""
+    return np.where(path.kind == Step.FEED, planner.seconds(path), 0.0)
+
+
+def _slowed(done: Toolpath, planner: Planner) -> Toolpath:
+    """The toolpath with no F beyond what the control reaches, so that it runs evenly."""
+    mm_min = np.floor(60.0 * planner.reached_mm_s(np.maximum(done.tip_mm, SHORTEST_MM)))
+    slower = planner.limited(done) & (done.feed_mm_min > mm_min)
+    return replace(done, feed_mm_min=np.where(slower, mm_min, done.feed_mm_min))
+
+
+def _assembled(
     toolpath: Toolpath,
-    pieces: _Pieces,
-    behind: _Inverted,
-    model: MachineModel,
-    started_s: float | None,
-) -> _Inverted:
-    """Invert a stretch behind another.
+    pieces: Pieces,
+    commanded: NDArray[np.float64],
+    runs: NDArray[np.int64],
+    machine: Machine,
+    corner_mm: float,
+) -> Toolpath:
+    """The toolpath with one row for each piece, rapids in one.
 
-    Rows that do not move take over the pose before them. Of those that last a while the end is inverted as well, and what is
-    commanded for it is commanded for the move before: what acts in time comes to rest there.
+    Corners between the pieces of a move may be rounded by as much as the pieces may leave the path: such a corner needs
+    no more at full feed, and no less.
     """
-    goes_anywhere = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
-    known = ~np.isnan(toolpath.before[pieces.row][:, 0])
-    if not known.any():
-        nowhere = np.full((len(known), 6), np.nan)
-        return replace(behind, pieces=pieces, commanded=nowhere, off_mm=np.zeros(len(known)))
-    goes = known & goes_anywhere[pieces.row]
-    waits = known & ~goes & (toolpath.duration_s[pieces.row] > 0.0)
-    # In time order: where the machine stands first, then the places in every piece that leads somewhere, its end last.
-    inside = np.append(LOOKED_AT, 1.0)
-    taken = np.repeat(goes, len(inside))
-    taken[len(inside) - 1 :: len(inside)] |= waits
-    share = (pieces.begin[:, None] + (pieces.end - pieces.begin)[:, None] * inside).reshape(-1)
-    share[len(inside) - 1 :: len(inside)] = pieces.end
-    row, share = np.repeat(pieces.row, len(inside))[taken], share[taken]
-    path = toolpath.between(row, share)
-    begin_s = toolpath.end_s - toolpath.duration_s
-    time_s = begin_s[row] + share * toolpath.duration_s[row]
-    if behind.passed is None:
-        first = pieces.row[int(np.argmax(known))]
-        path = np.vstack([toolpath.before[first], path])
-        time_s = np.append(begin_s[first], time_s)
-    wanted = Motion(poses=path, is_path=True, time_s=None if started_s is None else started_s + time_s)
-    inverse, passed = compensated_on(behind.passed or begun(model, wanted), wanted)
-    if behind.passed is not None:
-        inverse = np.vstack([behind.standing, inverse])
-    place = np.cumsum(taken).reshape(-1, len(inside))
-    # The last piece before the next that leads somewhere.
-    numbers = np.arange(len(goes))
-    following = np.minimum.accumulate(np.where(goes, numbers, len(goes))[::-1])[::-1]
-    at_rest = np.append(following[1:], len(goes)) - 1
-    commanded = np.where(known[:, None], inverse[place[at_rest, -1]], np.nan)
-    before = inverse[place[:, 0] - 1]
-    at_feed = goes & (toolpath.kind[pieces.row] == Step.FEED)
-    passes = [
-        _felt_mm(inverse[place[:, k]] - (before + part * (commanded - before))) for k, part in enumerate(LOOKED_AT)
-    ]
-    return _Inverted(pieces, commanded, np.where(at_feed, np.max(passes, axis=0), 0.0), commanded[-1], passed)
-
-
-def _felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What differences of poses, shape (k, 6), are at the tip or, where more, by their tilt at the lever, (k,) [mm].
-
-    Zero where a place is not known.
-    """
-    tilted_mm = LEVER_MM * np.radians(np.linalg.norm(off[:, 3:], axis=1))
-    felt: NDArray[np.float64] = np.nan_to_num(np.maximum(np.linalg.norm(off[:, :3], axis=1), tilted_mm))
-    return felt
-
-
-def _can_be_halved(toolpath: Toolpath, pieces: _Pieces) -> NDArray[np.bool_]:
-    share = pieces.end - pieces.begin
-    long: NDArray[np.bool_] = (share * toolpath.tip_mm[pieces.row] > SHORTEST_MM) | (
-        share * toolpath.turn_deg[pieces.row] > SHORTEST_DEG
-    )
-    return long
-
-
-def _assembled(toolpath: Toolpath, pieces: _Pieces, commanded: NDArray[np.float64], machine: Machine) -> Toolpath:
-    """The toolpath with one row for each piece, rapids in one."""
-    last = np.append(pieces.row[1:] != pieces.row[:-1], True)
-    written = last | (toolpath.kind[pieces.row] == Step.FEED)
-    row = pieces.row[written]
-    place = {int(old): new for new, old in enumerate(row) if int(old) in toolpath.text}
-    bare = replace(
-        toolpath,
-        kind=toolpath.kind[row],
-        poses=rounded(commanded[written]),
-        feed_mm_min=toolpath.feed_mm_min[row],
-        feed_deg_min=toolpath.feed_deg_min[row],
-        dwell_s=toolpath.dwell_s[row],
-        line=toolpath.line[row],
-        text=MappingProxyType({place[old]: text for old, text in toolpath.text.items()}),
-    )
-    share = (pieces.end - pieces.begin)[written]
-    feed = _feeds(bare, toolpath.feed[row], share * toolpath.tip_mm[row], share * toolpath.duration_s[row])
+    row = pieces.row
+    written, of = _written(toolpath, pieces), runs[row]
+    begin_mm, begin_s = _until(toolpath, pieces.begin)
+    end_mm, end_s = _until(toolpath, pieces.end)
+    bare = toolpath.divided(row[written], rounded(commanded[written]))
+    inner = np.append(of[1:] == of[:-1], False)[: len(row)][written]
+    bare = replace(bare, corners_mm=np.where(inner, np.fmax(bare.corners_mm, corner_mm), bare.corners_mm))
+    feed = _feeds(bare, toolpath.feed[row[written]], (end_mm - begin_mm)[written], (end_s - begin_s)[written])
     # A wanted move that takes no time at all, as a turn with a few nanometres of way, has no such feed: the machine's own
     # limits are what slows it down, whatever F says.
     return replace(
@@ -316,6 +309,21 @@ def _assembled(toolpath: Toolpath, pieces: _Pieces, commanded: NDArray[np.float6
         feed_mm_min=np.where(bare.only_turns, bare.feed_mm_min, np.minimum(feed, machine.feed_limit_mm_min)),
         feed_deg_min=np.where(bare.only_turns, np.minimum(feed, machine.turn_limit_deg_min), bare.feed_deg_min),
     )
+
+
+def _written(toolpath: Toolpath, pieces: Pieces) -> NDArray[np.bool_]:
+    """Which pieces become a row: all at feed, the last one of a rapid."""
+    row = pieces.row
+    last = np.append(row[1:] != row[:-1], True)[: len(row)]
+    return np.asarray(last | (toolpath.kind[row] == Step.FEED))
+
+
+def _until(toolpath: Toolpath, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Way of the tool tip [mm] and time [s] from the begin of the program to places, shapes (k,)."""
+    at = np.arange(len(toolpath) + 1)
+    ways = (np.concatenate([[0.0], np.cumsum(each)]) for each in (toolpath.tip_mm, toolpath.duration_s))
+    way_mm, time_s = (np.interp(places, at, way) for way in ways)
+    return way_mm, time_s
 
 
 def _feeds(

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from dbbstation.nc.planner import LookAhead
     from dbbstation.nc.toolpath import Toolpath
 
 
@@ -33,6 +34,8 @@ class Dialect(ABC):
     """Of its program files, with the dot."""
     what: ClassVar[str]
     """The control, in one line."""
+    look_ahead: ClassVar[LookAhead | None] = None
+    """How far the control looks ahead in moves that turn A, B or C; None: as far as the feed needs."""
 
     @abstractmethod
     def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:

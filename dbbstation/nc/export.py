@@ -9,14 +9,19 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.machine.difference import check_model_is_of
+from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
-from dbbstation.nc.compensate import CHORD_MM, compensate_toolpath
-from dbbstation.nc.limits import LARGEST_CORRECTION_MM
+from dbbstation.nc.compensate import CHORD_MM, Prefer, Slow, compensate_toolpath
+from dbbstation.nc.kept import check_chord, check_feed, cost, too_slow
+from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
+from dbbstation.nc.mark import marked
 from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
+from dbbstation.nc.planner import Planner
 from dbbstation.nc.reach import STEP_DEG as REACH_DEG
 from dbbstation.nc.reach import STEP_MM as REACH_MM
 from dbbstation.nc.reach import check_feeds, check_reach
+from dbbstation.nc.systems import in_systems
 from dbbstation.sources.contract import Motion
 
 if TYPE_CHECKING:
@@ -42,6 +47,8 @@ class Inverse:
         started_s: start of each program on the time scale of the model's sessions [s]; None where not known.
         identified: the same model with the covariance of its values; None where that is not known.
         largest_mm: greatest correction that is applied [mm].
+        prefer: what to keep where chord and feed cannot both be kept; None: refuse the program then.
+        accepted_um: chord error that is accepted where the one asked for is missed [µm]; None: none is.
     """
 
     model: MachineModel
@@ -49,6 +56,8 @@ class Inverse:
     started_s: float | None = None
     identified: IdentifiedModel | None = None
     largest_mm: float = LARGEST_CORRECTION_MM
+    prefer: Prefer | None = None
+    accepted_um: float | None = None
 
 
 @dataclass(frozen=True)
@@ -60,12 +69,16 @@ class Program:
         text: the program.
         points: moves at feed.
         greatest_um: largest correction of a programmed point [µm]; None in a nominal program.
-        chord_um: largest chord error that splitting left [µm]; None where nothing was split.
-        chord_asked_um: chord error that was asked for [µm]; None where nothing was split.
+        chord_um: largest distance between a move and the path that it stands for [µm]; None in a nominal program.
+        chord_asked_um: chord error that was asked for [µm]; None in a nominal program.
         uncertainty_um: greatest standard uncertainty of the model's tool tip along the path, all three coordinates together [µm];
             None where not known.
         uncertainty_by_axis_um: the same of X, Y and Z each; None where not known, empty where no model is.
         why_unknown: why one of them is not known; empty where all are.
+        tilt_left_um: correction of the tilt that was left out, as felt 100 mm from the tip [µm]; None in a nominal program.
+        feed_s: time of all moves at feed, as the control plans them [s]; None in a nominal program.
+        nominal_feed_s: of the program that it was made from [s]; None in a nominal program.
+        cost: what a preference cost, in words; empty without one.
     """
 
     name: str
@@ -77,6 +90,10 @@ class Program:
     uncertainty_um: float | None = None
     uncertainty_by_axis_um: tuple[float | None, ...] = ()
     why_unknown: str = ""
+    tilt_left_um: float | None = None
+    feed_s: float | None = None
+    nominal_feed_s: float | None = None
+    cost: str = ""
 
 
 def circle_programs(
@@ -88,6 +105,7 @@ def circle_programs(
     origin: Mapping[str, str] | None = None,
     tests: Sequence[str] = (),
     step_deg: float = STEP_DEG,
+    chord_mm: float = CIRCLE_CHORD_MM,
     approach: Approach | None = USUAL_APPROACH,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
 ) -> list[Program]:
@@ -100,14 +118,15 @@ def circle_programs(
         inverse: compensate with this; None for nominal programs.
         origin: where plan and machine come from, for the header.
         tests: names of the tests wanted; empty for all.
-        step_deg: greatest angle between programmed points [deg].
+        step_deg: angle between programmed points [deg]; in compensated programs it is larger where the feed needs that.
+        chord_mm: greatest distance of a compensated program's moves from the circle [mm].
         approach: see `circle_toolpath`.
         progress: told how many of how many are done.
 
     Raises:
         TravelError: a program leaves the travel; none is returned then.
         ModelError: the model is of another nominal machine, or has a source that needs what a program lacks.
-        StationError: a test that the plan does not have.
+        StationError: a test that the plan does not have, or a circle whose chord and feed cannot both be kept.
     """
     if inverse is not None:
         check_model_is_of(machine, inverse.model.machine)
@@ -120,10 +139,16 @@ def circle_programs(
     for name, direction in runs:
         progress(len(programs), len(runs))
         circle = plan.tests[name].run(direction)
-        path = circle_toolpath(circle, f"test {name} {direction}", step_deg=step_deg, approach=approach)
-        header = _circle_header(path.name, circle, step_deg, {"plan": plan.name, "machine": machine.name})
+        title = f"test {name} {direction}"
+        step = (
+            step_deg
+            if inverse is None
+            else _step_deg(circle, title, step_deg, chord_mm, inverse.prefer, machine, dialect)
+        )
+        path = circle_toolpath(circle, title, step_deg=step, approach=approach)
+        header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name})
         header += _said(origin or {})
-        programs.append(_program(path, machine, dialect, f"{name}-{direction}", inverse, None, header))
+        programs.append(_program(path, machine, dialect, f"{name}-{direction}", inverse, chord_mm, header, split=False))
     progress(len(programs), len(runs))
     return programs
 
@@ -181,13 +206,14 @@ def compensated_program(
         KinematicsError: a pose that the machine cannot take.
         ModelError: the model has a source that needs what a program lacks.
         MachineError: a feed that the machine does not reach.
-        StationError: the program is compensated already or for another machine, or its corrections are too large.
+        StationError: the program is compensated already or for another machine, its corrections are too large, or chord
+            and feed cannot both be kept.
     """
     machine = inverse.model.machine
     check_nominal(path)
     check_machine(path, machine)
     header = [f"machine: {machine.name}", *_said(origin or {})]
-    return _program(path, machine, dialect, path.name, inverse, chord_mm, header)
+    return _program(path, machine, dialect, path.name, inverse, chord_mm, header, split=True)
 
 
 def _program(
@@ -196,21 +222,35 @@ def _program(
     dialect: Dialect,
     stem: str,
     inverse: Inverse | None,
-    chord_mm: float | None,
+    chord_mm: float,
     header: list[str],
+    *,
+    split: bool,
 ) -> Program:
     name = stem if stem.endswith(dialect.extension) else stem + dialect.extension
     check_reach(machine, path)
     check_feeds(machine, path)
     if inverse is None:
         return Program(name, dialect.write(path, header), _points(path))
-    model, started_s = inverse.model, inverse.started_s
-    done = compensate_toolpath(path, model, chord_mm=chord_mm, started_s=started_s, largest_mm=inverse.largest_mm)
+    check_joints(inverse.model.machine)
+    asked_um, prefer = 1e3 * chord_mm, inverse.prefer
+    done = compensate_toolpath(
+        path,
+        inverse.model,
+        chord_mm=chord_mm,
+        keep_arcs=not split,
+        started_s=inverse.started_s,
+        largest_mm=inverse.largest_mm,
+        planner=planner_of(machine, dialect),
+        prefer=prefer,
+    )
     check_reach(machine, done.toolpath)
+    check_chord(path.name, done, asked_um, inverse.accepted_um, prefer)
+    check_feed(path.name, done, asked_um, machine, prefer)
+    spent = "" if prefer is None else cost(done, asked_um, prefer)
     header = [*header, *_said(inverse.origin), f"{COMPENSATED} {done.greatest_um:.3f} um"]
-    asked_um = None if chord_mm is None else 1e3 * chord_mm
-    if asked_um is not None:
-        header.append(f"moves split to keep a chord error of {asked_um:g} um")
+    header.append(f"chord error asked for {asked_um:g} um, reached {done.chord_um:.3f} um")
+    header += [spent] if spent else []
     together_um, by_axis_um, why = _uncertainty_um(path, inverse)
     if together_um is not None:
         header.append(f"standard uncertainty of the model along the path {together_um:.3f} um at most")
@@ -223,11 +263,57 @@ def _program(
             f"standard uncertainty of the model along the path at most: {', '.join(each)}",
             f"not known because {why}",
         ]
-    mark = checksum(done.toolpath)
-    text = dialect.write(replace(done.toolpath, numbers=(mark, mark)), header)
+    finished = marked(in_systems(done.toolpath))
+    number = checksum(finished)
     return Program(
-        name, text, _points(done.toolpath), done.greatest_um, done.chord_um, asked_um, together_um, by_axis_um, why
+        name,
+        dialect.write(replace(finished, numbers=(number, number)), header),
+        _points(finished),
+        done.greatest_um,
+        done.chord_um,
+        asked_um,
+        together_um,
+        by_axis_um,
+        why,
+        done.tilt_um,
+        done.seconds,
+        done.nominal_seconds,
+        spent,
     )
+
+
+def planner_of(machine: Machine, dialect: Dialect) -> Planner:
+    """Return the control of a dialect on a machine."""
+    return Planner(machine.planned_acceleration_mm_s2, dialect.look_ahead)
+
+
+def _step_deg(
+    circle: Circle,
+    name: str,
+    step_deg: float,
+    chord_mm: float,
+    prefer: Prefer | None,
+    machine: Machine,
+    dialect: Dialect,
+) -> float:
+    """Angle between the points of a compensated circle [deg]: what its feed needs, and no less than was asked for.
+
+    Raises:
+        StationError: such a chord leaves the circle by more than `chord_mm`.
+    """
+    if prefer in {Prefer.ACCURACY, Prefer.POSITION_ONLY}:
+        return step_deg
+    planner = planner_of(machine, dialect)
+    # The arc is divided evenly: its steps may be smaller by a part in its number of points.
+    needed_mm = 1.01 * float(planner.needed_mm(np.array(circle.feed_mm_min / 60.0)))
+    step = max(step_deg, float(np.degrees(needed_mm / circle.radius_mm)))
+    error_mm = chord_error_mm(circle, step)
+    if step > step_deg and error_mm > chord_mm and prefer is None:
+        longest_mm = np.array(np.sqrt(8.0 * circle.radius_mm * chord_mm) / 1.01)
+        reached = 60.0 * float(planner.reached_mm_s(longest_mm))
+        slow = Slow(0, circle.feed_mm_min, reached, 1e3 * error_mm)
+        raise too_slow(name, slow, 1e3 * chord_mm, machine, None)
+    return step
 
 
 UNCERTAIN_AT = 2000

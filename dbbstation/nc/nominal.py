@@ -10,6 +10,7 @@ import numpy as np
 
 from dbbstation.errors import StationError
 from dbbstation.nc.dialect import plain
+from dbbstation.nc.mark import is_marked
 from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, Step
 
 if TYPE_CHECKING:
@@ -45,15 +46,19 @@ def checksum(toolpath: Toolpath) -> int:
 def check_nominal(toolpath: Toolpath) -> None:
     """Refuse a program that was compensated before.
 
-    It says so in a comment; and in case somebody took the comments out, its first and its last line carry the checksum
-    of its motion as their line number.
+    It says so in a comment. In case somebody took the comments out, its poses have the mark in their last decimals; and its first
+    and its last line carry the checksum of its motion as their line number, which tells programs of a few poses.
 
     Raises:
         StationError: it is compensated already.
     """
     said = any(text.startswith(COMPENSATED) for text in toolpath.text.values())
-    if said or (toolpath.numbers and checksum(toolpath) in toolpath.numbers):
-        how = "says its header" if said else "says the checksum in its line numbers"
+    how = "says its header" if said else ""
+    if not how and toolpath.numbers and checksum(toolpath) in toolpath.numbers:
+        how = "says the checksum in its line numbers"
+    if not how and is_marked(toolpath):
+        how = "say the last decimals of its poses"
+    if how:
         raise StationError(
             f"this program is compensated already, {how}",
             where=toolpath.name,

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import IntEnum
+from dataclasses import dataclass, field, replace
+from enum import IntEnum, StrEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -43,6 +43,32 @@ class Step(IntEnum):
     COMMENT = 4
     FUNCTION = 5
     """Spindle, coolant: words that move nothing and mean the same to every control."""
+    OPTIONAL_STOP = 6
+    """Stop that the operator has switched on or off (M1)."""
+    MESSAGE = 7
+    """What the control shows or writes to a file: its keyword, a comma, the text, as in `MSG, hello`."""
+    SYSTEM = 8
+    """From here on numbers count in this work coordinate system, `G54` to `G59.3`."""
+
+
+class Ending(StrEnum):
+    """How a program ends."""
+
+    STOP = "M2"
+    REWIND = "M30"
+    TEXT = "%"
+    """With its text, between percent signs: spindle and coolant stay as they are."""
+
+
+ACTIVE_SYSTEM, MACHINE_SYSTEM = -1, 0
+"""Coordinates in which numbers count: the work system that the control happens to have; the machine's own (G53)."""
+
+SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+"""Work coordinate systems in order, from number 1."""
+
+PIECE_CORNER_MM = 1e-4
+"""How far corners between the pieces of one exact move may be rounded: 0.1 µm, below what a bar can see. An exact stop
+belongs to the ends of the move that was written; its pieces meet at angles that need far less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,10 +86,18 @@ class Toolpath:
         line: line of the program that each row came from, counted from 1, shape (n,); 0 where there is none.
         text: words of `PAUSE`, `COMMENT` and `FUNCTION` rows, by row.
         start: pose before the first row, shape (6,); None where unknown.
-        corner_mm: how far the control may round corners [mm]: 0 for exact path, infinite for as much as the feed
-            needs, None where the program does not say.
+        corners_mm: how far the control may round the corner at the end of each row, shape (n,) [mm]: 0 for exact path,
+            infinite for as much as the feed needs, NaN where the program does not say.
+        system: in which the numbers of each row count, shape (n,): `MACHINE_SYSTEM`, `ACTIVE_SYSTEM`, or 1 to 9 for one
+            of `SYSTEMS`.
+        frame: in which the place of each axis was named last, up to each row, shape (n, 6): values as in `system`.
+        guard: not None where the program stops, says why and ends before it moves, if the work system in force or one of
+            these, G92 or a tool length is not zero.
+        ending: how the program ends.
         numbers: line numbers of the first and the last line that have one; a compensated program carries its checksum
             there.
+        arc: of rows that are chords of an arc: X and Y of its centre [mm] and the angle that the chord spans [rad],
+            counter-clockwise positive, shape (n, 3); the angle is 0 in straight rows. None: there are no arcs.
     """
 
     name: str
@@ -73,13 +107,52 @@ class Toolpath:
     feed_deg_min: NDArray[np.float64]
     dwell_s: NDArray[np.float64]
     line: NDArray[np.int64]
+    corners_mm: NDArray[np.float64]
+    system: NDArray[np.int8]
+    frame: NDArray[np.int8]
     text: Mapping[int, str] = field(default_factory=dict)
     start: NDArray[np.float64] | None = None
-    corner_mm: float | None = None
+    guard: tuple[str, ...] | None = None
+    ending: Ending = Ending.STOP
     numbers: tuple[int, ...] = ()
+    arc: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    @property
+    def corner_mm(self) -> float | None:
+        """How far corners may be rounded at the first move [mm]; None where the program does not say."""
+        corners = self.corners_mm[self.is_move]
+        return None if not len(corners) or np.isnan(corners[0]) else float(corners[0])
+
+    def divided(self, row: NDArray[np.int64], poses: NDArray[np.float64]) -> Toolpath:
+        """The toolpath with some rows in several pieces.
+
+        A text goes with the last piece of its row, and so does an exact stop.
+
+        Args:
+            row: that each piece ends in, rising, shape (k,); rows that a piece goes through to the end of a later one are
+                missing, and have no text.
+            poses: after each piece, shape (k, 6) [mm, deg].
+        """
+        last = np.append(row[1:] != row[:-1], True)[: len(row)]
+        place = dict(zip(row[last].tolist(), np.flatnonzero(last).tolist(), strict=True))
+        corners = self.corners_mm[row]
+        return replace(
+            self,
+            kind=self.kind[row],
+            poses=poses,
+            feed_mm_min=self.feed_mm_min[row],
+            feed_deg_min=self.feed_deg_min[row],
+            dwell_s=self.dwell_s[row],
+            line=self.line[row],
+            corners_mm=np.where((corners == 0.0) & ~last, PIECE_CORNER_MM, corners),
+            system=self.system[row],
+            frame=self.frame[row],
+            text=MappingProxyType({place[old]: text for old, text in self.text.items()}),
+            arc=None,
+        )
 
     @property
     def is_move(self) -> NDArray[np.bool_]:
@@ -135,10 +208,17 @@ class Toolpath:
         return self._interpolated(time_s, self.end_s)
 
     def between(self, row: NDArray[np.int64], share: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Poses within rows, shape (k, 6): `share` 0 before the row, 1 after it, both of shape (k,)."""
+        """Poses within rows, shape (k, 6): `share` 0 before the row, 1 after it, both of shape (k,).
+
+        In chords of an arc they lie on the arc.
+        """
         before, after = self.before[row], self.poses[row]
+        inside = before + share[:, None] * (after - before)
+        if self.arc is not None:
+            chord = np.flatnonzero(self.arc[row, 2] != 0.0)
+            inside[chord, :2] = _on_arc(before[chord, :2], after[chord, :2], self.arc[row[chord]], share[chord])
         # The end of a row is its programmed pose to the last bit.
-        return np.where(share[:, None] == 1.0, after, before + share[:, None] * (after - before))
+        return np.where(share[:, None] == 1.0, after, inside)
 
     def subdivided(self, step_mm: float, step_deg: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Rows and shares, shapes (k,), that pass through all moves in pieces no longer than these steps."""
@@ -160,6 +240,21 @@ class Toolpath:
 
 
 _NO_FEED = (np.nan, np.nan)
+_STRAIGHT = (0.0, 0.0, 0.0)
+
+
+class _Rows(NamedTuple):
+    """Rows of a toolpath that were added together; what is one value holds for all of them."""
+
+    kind: Step
+    poses: NDArray[np.float64]
+    feed: tuple[float, float]
+    dwell_s: float
+    line: int
+    corner_mm: float
+    system: int
+    frame: NDArray[np.int8]
+    arc: tuple[float, float, float]
 
 
 class ToolpathBuilder:
@@ -168,42 +263,82 @@ class ToolpathBuilder:
     Args:
         name: of the program.
         start: pose before the first row, shape (6,) [mm, deg]; None where unknown.
+
+    Attributes:
+        corner_mm: how far the control may round the corners of the moves that follow [mm]; None: not said.
+        system: in which the numbers of the moves that follow count, as `Toolpath.system`.
+        guard: as `Toolpath.guard`.
+        ending: how the program ends.
     """
 
     def __init__(self, name: str, start: NDArray[np.float64] | None = None) -> None:
         self.name = name
         self.corner_mm: float | None = None
+        self.system = ACTIVE_SYSTEM
+        self.guard: tuple[str, ...] | None = None
+        self.ending = Ending.STOP
         self.numbers: tuple[int, ...] = ()
         self._start = start
         self._pose = np.full(6, np.nan) if start is None else np.asarray(start, dtype=np.float64)
-        self._rows: list[tuple[Step, NDArray[np.float64], tuple[float, float], float, int]] = []
+        self._frame = np.full(6, ACTIVE_SYSTEM, dtype=np.int8)
+        self._rows: list[_Rows] = []
         self._text: dict[int, str] = {}
         self._count = 0
 
-    def rapid(self, pose: NDArray[np.float64], *, line: int = 0) -> None:
-        """Add a move as fast as the machine can, to a pose of shape (6,) [mm, deg]."""
-        self._add(Step.RAPID, pose[None], _NO_FEED, 0.0, line)
-
-    def feed(self, poses: NDArray[np.float64], mm_min: float, deg_min: float | None = None, *, line: int = 0) -> None:
-        """Add moves at a feed through poses of shape (k, 6) [mm, deg].
+    def rapid(
+        self,
+        pose: NDArray[np.float64],
+        *,
+        line: int = 0,
+        named: Sequence[int] = range(6),
+        system: int | None = None,
+    ) -> None:
+        """Add a move as fast as the machine can.
 
         Args:
-            poses: to go through.
+            pose: to go to, shape (6,) [mm, deg].
+            line: of the program.
+            named: axes that the line names, 0 to 5; the others stay where they are.
+            system: in which this move's numbers count; None: as those before it.
+        """
+        self._named(named, system)
+        self._add(Step.RAPID, pose[None], line=line, system=system)
+
+    def feed(
+        self,
+        poses: NDArray[np.float64],
+        mm_min: float,
+        deg_min: float | None = None,
+        *,
+        line: int = 0,
+        named: Sequence[int] = range(6),
+        system: int | None = None,
+        arc: tuple[float, float, float] = _STRAIGHT,
+    ) -> None:
+        """Add moves at a feed.
+
+        Args:
+            poses: to go through, shape (k, 6) [mm, deg].
             mm_min: feed of the tool tip [mm/min].
             deg_min: feed of moves that only turn [deg/min]; None: the same number.
             line: of the program.
+            named: axes that the line names, 0 to 5; the others stay where they are.
+            system: in which the numbers of these moves count; None: as those before them.
+            arc: that the moves are chords of, as a row of `Toolpath.arc`.
         """
-        self._add(Step.FEED, poses, (mm_min, mm_min if deg_min is None else deg_min), 0.0, line)
+        self._named(named, system)
+        feed = (mm_min, mm_min if deg_min is None else deg_min)
+        self._add(Step.FEED, poses, feed, line=line, system=system, arc=arc)
 
     def dwell(self, seconds: float, *, line: int = 0) -> None:
         """Add a stop of known duration."""
-        self._add(Step.DWELL, self._pose[None], _NO_FEED, seconds, line)
+        self._add(Step.DWELL, self._pose[None], dwell_s=seconds, line=line)
 
     def say(self, kind: Step, text: str, *, line: int = 0) -> None:
-        """Add a pause, a comment or a function with its words."""
+        """Add a row that is no move and no dwell, with its words."""
         if text:
             self._text[self._count] = text
-        self._add(kind, self._pose[None], _NO_FEED, 0.0, line)
+        self._add(kind, self._pose[None], line=line)
 
     def taken_back(self) -> str:
         """Remove the last row, which `say` added, and return its text."""
@@ -212,36 +347,90 @@ class ToolpathBuilder:
         return self._text.pop(self._count, "")
 
     @property
+    def last_kind(self) -> Step | None:
+        """Kind of the last row; None where there is none."""
+        return self._rows[-1].kind if self._rows else None
+
+    @property
     def last_text(self) -> str:
         """Text of the last row; empty where it has none."""
         return self._text.get(self._count - 1, "")
 
     def built(self) -> Toolpath:
         """Return the toolpath of all rows so far."""
-        count = np.array([len(poses) for _, poses, *_ in self._rows], dtype=np.int64)
+        count = np.array([len(rows.poses) for rows in self._rows], dtype=np.int64)
+
+        def each(values: list[Any], kind: type) -> NDArray[Any]:
+            return np.repeat(np.array(values, dtype=kind), count, axis=0)
+
         return Toolpath(
             name=self.name,
-            kind=np.repeat(np.array([row[0] for row in self._rows], dtype=np.int8), count),
-            poses=np.vstack([np.empty((0, 6)), *(row[1] for row in self._rows)]),
-            feed_mm_min=np.repeat(np.array([row[2][0] for row in self._rows], dtype=np.float64), count),
-            feed_deg_min=np.repeat(np.array([row[2][1] for row in self._rows], dtype=np.float64), count),
-            dwell_s=np.repeat(np.array([row[3] for row in self._rows], dtype=np.float64), count),
-            line=np.repeat(np.array([row[4] for row in self._rows], dtype=np.int64), count),
+            kind=each([rows.kind for rows in self._rows], np.int8),
+            poses=np.vstack([np.empty((0, 6)), *(rows.poses for rows in self._rows)]),
+            feed_mm_min=each([rows.feed[0] for rows in self._rows], np.float64),
+            feed_deg_min=each([rows.feed[1] for rows in self._rows], np.float64),
+            dwell_s=each([rows.dwell_s for rows in self._rows], np.float64),
+            line=each([rows.line for rows in self._rows], np.int64),
+            corners_mm=self._corners_mm(count),
+            system=each([rows.system for rows in self._rows], np.int8),
+            frame=each([rows.frame for rows in self._rows], np.int8).reshape(-1, 6),
             text=MappingProxyType(dict(self._text)),
             start=self._start,
-            corner_mm=self.corner_mm,
+            guard=self.guard,
+            ending=self.ending,
             numbers=self.numbers,
+            arc=each([rows.arc for rows in self._rows], np.float64).reshape(-1, 3),
         )
 
     def __len__(self) -> int:
         return self._count
 
+    def _corners_mm(self, count: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Of each row; an arc that became chords stops at its own ends only."""
+        corners = np.repeat(np.array([rows.corner_mm for rows in self._rows], dtype=np.float64), count)
+        last = np.zeros(len(corners), dtype=np.bool_)
+        last[np.cumsum(count) - 1] = True
+        inner: NDArray[np.float64] = np.where((corners == 0.0) & ~last, PIECE_CORNER_MM, corners)
+        return inner
+
+    def _named(self, named: Sequence[int], system: int | None) -> None:
+        frame = self._frame.copy()
+        frame[list(named)] = self.system if system is None else system
+        self._frame = frame
+
     def _add(
-        self, kind: Step, poses: NDArray[np.float64], feed: tuple[float, float], dwell_s: float, line: int
+        self,
+        kind: Step,
+        poses: NDArray[np.float64],
+        feed: tuple[float, float] = _NO_FEED,
+        *,
+        dwell_s: float = 0.0,
+        line: int,
+        system: int | None = None,
+        arc: tuple[float, float, float] = _STRAIGHT,
     ) -> None:
-        self._rows.append((kind, np.array(poses, dtype=np.float64), feed, dwell_s, line))
+        corner_mm = np.nan if self.corner_mm is None else self.corner_mm
+        poses = np.array(poses, dtype=np.float64)
+        counted = self.system if system is None else system
+        self._rows.append(_Rows(kind, poses, feed, dwell_s, line, corner_mm, counted, self._frame, arc))
         self._count += len(poses)
-        self._pose = self._rows[-1][1][-1]
+        self._pose = poses[-1]
+
+
+def _on_arc(
+    before: NDArray[np.float64],
+    after: NDArray[np.float64],
+    arc: NDArray[np.float64],
+    share: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """X and Y at shares of chords, shape (k, 2), turned about the centre; of a spiral the radius changes evenly [mm]."""
+    centre, turned = arc[:, :2], share * arc[:, 2]
+    first, last = before - centre, after - centre
+    radius = np.linalg.norm(first, axis=1)
+    scale = 1.0 + share * (np.linalg.norm(last, axis=1) / radius - 1.0)
+    cos, sin = scale * np.cos(turned), scale * np.sin(turned)
+    x, y = first.T
+    return centre + np.column_stack([cos * x - sin * y, sin * x + cos * y])
 
 
 def in_pieces(pieces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -18,7 +18,8 @@ from tests.plant.session import record
 FIXTURES = shipped_folder("fixtures")
 STORED = {
     "dbb-machine/1": FIXTURES / "machines" / "reference.yaml",
-    "dbb-machine/2": FIXTURES / "machines" / "every-key.yaml",
+    "dbb-machine/2": FIXTURES / "machines" / "greatest-feed.yaml",
+    "dbb-machine/3": FIXTURES / "machines" / "every-key.yaml",
     "dbb-jig/1": FIXTURES / "jigs" / "reference-plate.yaml",
     "dbb-plan/1": shipped_folder("protocols") / "plans" / "table2.yaml",
     "dbb-plan/2": FIXTURES / "plans" / "every-key.yaml",

@@ -156,6 +156,9 @@ def make_models(folder: Path) -> None:
         formula_variance=np.array([1e-8] * 6 + [0.0] * 4),
     )
     write_model(folder / "null-space.yaml", unseen, provenance=origin, force=True)
+    planned = replace(faster, acceleration_mm_s2=1500.0)
+    model = replace(model, model=MachineModel(planned, fitted))
+    write_model(folder / "acceleration.yaml", model, provenance=origin, force=True)
 
 
 if __name__ == "__main__":

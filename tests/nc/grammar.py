@@ -10,6 +10,11 @@ def program(seed: int) -> str:
     return _Author(random.Random(seed)).program()  # noqa: S311 - the same programs each time, nothing secret
 
 
+def part(seed: int) -> str:
+    """One program that the reference machine can run, with all that a program may say; the same seed gives the same text."""
+    return _Machinist(random.Random(seed)).program()  # noqa: S311 - the same programs each time, nothing secret
+
+
 class _Author:
     def __init__(self, draw: random.Random) -> None:
         self.draw = draw
@@ -21,7 +26,9 @@ class _Author:
             draw.choice(["G21 G90 G94", "G21 G90 G94 G17 G40 G49 G64", "g90g21", "(part) G21 G90", "G20 G90", "G90"])
         )
         if draw.random() < 0.3:
-            lines.append(draw.choice(["G61", "G64", "G64 P0.01", "G64 P0.01 Q0", "S1200 M3", "F100", "G91.1", "G54"]))
+            lines.append(
+                draw.choice(["G61", "G64", "G64 P0.01", "G64 P0.01 Q0", "S1200 M3", "F100", "G91.1", "G54", "G55"])
+            )
         lines.append(
             draw.choice(["G0 X0 Y0 Z-1000 A0 B0 C0", "G0 X1.5 Y-2 Z-40 A0 B0 C0", "G1 X0 Y0 Z-1000 A1 B2 C0 F500"])
         )
@@ -135,6 +142,143 @@ class _Author:
     def odd(self) -> str:
         return self.draw.choice(ODD)
 
+
+class _Machinist(_Author):
+    """Keeps count of units, distances and the pose, so that no move leaves the travel and no arc its circle."""
+
+    def __init__(self, draw: random.Random) -> None:
+        super().__init__(draw)
+        self.pose = [0.0, 0.0, -1000.0, 0.0, 0.0, 0.0]
+        self.unit_mm, self.absolute, self.has_feed = 1.0, True, False
+
+    def program(self) -> str:
+        draw = self.draw
+        percent = draw.random() < 0.2
+        lines = ["%"] if percent else []
+        lines.append(draw.choice(["G21 G90 G94", "G21 G90 G94 G17 G40 G49", "g90g21", "(part) G21 G90"]))
+        lines += [draw.choice([*PATHS, *WORK_SYSTEMS, *SPEEDS, *SAID]) for _ in range(draw.randint(0, 3))]
+        lines.append("G0 X0 Y0 Z-1000 A0 B0 C0")
+        for _ in range(draw.randint(3, 12)):
+            lines += self.blocks()
+        lines += (
+            ["%"]
+            if percent and draw.random() < 0.5
+            else [draw.choice(["M2", "M30", "M5 M9 M2", "M02"]), *lines[:percent]]
+        )
+        return "\n".join(lines) + "\n"
+
+    def blocks(self) -> list[str]:
+        draw, kind = self.draw, self.draw.random()
+        if kind < 0.4:
+            return [self.dressed(self.straight())]
+        if kind < 0.55:
+            return [self.dressed(self.round())]
+        if kind < 0.62:
+            self.unit_mm = draw.choice([1.0, 1.0, 25.4])
+            self.has_feed = False
+            return [("G21" if self.unit_mm == 1.0 else "G20") + " G94"]
+        if kind < 0.67:
+            self.absolute = draw.random() < 0.6
+            return ["G90" if self.absolute else "G91"]
+        if kind < 0.72:
+            return self.in_machine()
+        return [self.dressed(draw.choice([*PATHS, *WORK_SYSTEMS, *SPEEDS, *SAID, *STOPS, *DWELLS[:3]]))]
+
+    def dressed(self, text: str) -> str:
+        """As somebody else would write it; comments and messages stay in one piece, and N stands first."""
+        draw = self.draw
+        if "(" in text or ";" in text:
+            return text
+        words = text.split(" ")
+        if draw.random() < 0.1:
+            draw.shuffle(words)
+        text = draw.choice([" ", " ", " ", "", "\t"]).join(words)
+        text = text.lower() if draw.random() < 0.1 else text
+        text = f"N{draw.randint(0, 999)} {text}" if draw.random() < 0.15 else text
+        return text + (draw.choice([" (note)", " ; note", ";", " ()"]) if draw.random() < 0.1 else "")
+
+    def words(self, axes: list[int]) -> str:
+        """Words that lead some axes to places within the travel, in the units and distances that hold."""
+        words = []
+        for axis in axes:
+            low, high = BOX[axis]
+            unit = self.unit_mm if axis < 3 else 1.0
+            base = 0.0 if self.absolute else self.pose[axis]
+            written = round((self.draw.uniform(low, high) - base) / unit, 3 if unit == 1.0 else 4)
+            self.pose[axis] = base + written * unit
+            words.append(f"{'XYZABC'[axis]}{written:.{self.draw.choice([4, 5])}f}")
+        return " ".join(words)
+
+    def speed(self) -> str:
+        if self.has_feed and self.draw.random() < 0.6:
+            return ""
+        self.has_feed = True
+        # So slow that short pieces with A, B and C keep it on a control that does not look ahead there.
+        return f" F{self.draw.uniform(5, 40) / self.unit_mm:.3f}"
+
+    def straight(self) -> str:
+        draw = self.draw
+        tip, turn = (
+            sorted(draw.sample(range(3), draw.randint(1, 3))),
+            sorted(draw.sample(range(3, 6), draw.randint(1, 3))),
+        )
+        axes = draw.choice([tip, tip, tip + turn, turn])
+        if draw.random() < 0.3:
+            return f"G0 {self.words(axes)}"
+        return f"G1 {self.words(axes)}{self.speed()}"
+
+    def round(self) -> str:
+        draw = self.draw
+        radius = round(draw.uniform(0.3, 4.0) / self.unit_mm, 4)
+        code, turns = draw.choice(["G2", "G3"]), draw.choice(["", "", "", " P1", " P2"])
+        if draw.random() < 0.5:
+            x, y = draw.choice([(radius, 0.0), (0.0, -radius), (radius, radius)])
+            rise = f" {self.words([2])}" if draw.random() < 0.4 else ""
+            return f"{code} I{x:.4f} J{y:.4f}{rise}{turns}{self.speed()}"
+        x = self.pose[0] / self.unit_mm if self.absolute else 0.0
+        end = round(x + radius, 4)
+        self.pose[0] = end * self.unit_mm if self.absolute else self.pose[0] + end * self.unit_mm
+        sign = draw.choice(["", "-"])
+        return f"{code} X{end:.4f} R{sign}{radius * draw.uniform(0.55, 1.5):.4f}{self.speed()}"
+
+    def in_machine(self) -> list[str]:
+        """As programs have it: up in machine coordinates, over there, down again; sometimes less tidy."""
+        draw = self.draw
+        before = [] if self.absolute else ["G90"]
+        self.absolute = True
+        kind = draw.random()
+        if kind < 0.6:
+            up = f"G53 G0 {self.words([2])}"
+            return [*before, up, f"G0 {self.words([0, 1, 3, 4, 5])}", f"G0 {self.words([2])}"]
+        if kind < 0.8:
+            return [
+                *before,
+                f"G53 G1 {self.words([0, 1, 2, 3, 4, 5])}{self.speed()}",
+                f"G0 {self.words([0, 1, 2, 3, 4, 5])}",
+            ]
+        return [*before, f"G53 G1 {self.words([draw.randrange(3)])}{self.speed()}"]
+
+
+BOX = [(-60.0, 60.0), (-60.0, 60.0), (-1040.0, -960.0), (-5.0, 5.0), (-5.0, 5.0), (-4.5, 4.5)]
+PATHS = ["G61", "G64", "G64 P0.01", "G64 P0.02 Q0"]
+WORK_SYSTEMS = ["G54", "G55", "G54 (left vice)"]
+SPEEDS = ["S0.00001 M3", "S0.5", "S1200 M4", "M3 S800", "M5", "M7", "M8", "M9", "S12345.678 M3"]
+SAID = [
+    "(MSG, look)",
+    "(DEBUG, system #5220)",
+    "(PRINT, line)",
+    "(LOG, begun)",
+    "(msg,small) ; after",
+    "(one) (MSG, last)",
+]
+SAID += [
+    "(MSG, first) (only a comment)",
+    "; (MSG, no message)",
+    "(a comment)",
+    "( MSG , not one either)",
+    "(LOGOPEN, part.log)",
+]
+STOPS = ["M0", "M1", "M0 (MSG, look)", "M01", "(MSG, turn the part)\nM0"]
 
 WRONG_ARCS = ["X5", "I5", "X5 Y5 I5", "R5", "X4 R2", "Z3 I2 J2", "A5 I4", "X3 I0.001", "X10 I4 R3", ""]
 DWELLS = ["G4 P0.5", "G4 P0", "G04 P2", "G4 P1 X5", "G4 P1 G1 X2 F100"]

@@ -2,20 +2,40 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tests.nc.planner.required import needs
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 RS274 = shutil.which("rs274")
 
-_CALL = re.compile(
-    r"(STRAIGHT_TRAVERSE|STRAIGHT_FEED|ARC_FEED|DWELL|PROGRAM_STOP|OPTIONAL_PROGRAM_STOP|SET_FEED_RATE|USE_LENGTH_UNITS)"
-    r"\(([^)]*)\)"
-)
+needs_rs274 = needs("" if RS274 else "LinuxCNC's interpreter rs274 is not installed")
+
+_CALL = re.compile(r"\s*\d+ N(?:\.+|\d+)\s*(?P<name>[A-Z]\w+)\((?P<arguments>.*)\)\s*")
+
+_STATE = {"USE_LENGTH_UNITS", "SET_FEED_RATE", "SET_MOTION_CONTROL_MODE"}
+"""Calls that change what later calls mean, and are nothing by themselves."""
+
+_MOVES = {"STRAIGHT_TRAVERSE": "RAPID", "STRAIGHT_FEED": "FEED", "ARC_FEED": "ARC"}
+_STOPS = {"PROGRAM_STOP": "PAUSE", "OPTIONAL_PROGRAM_STOP": "OPTIONAL_STOP", "DWELL": "DWELL"}
+MOTION = frozenset((*_MOVES.values(), *_STOPS.values()))
+"""Kinds of events that move the machine or keep it waiting."""
+
+_SILENT = {"COMMENT", "ON_RESET", "SET_G92_OFFSET", "SET_XY_ROTATION", "SET_FEED_REFERENCE", "SET_FEED_MODE", "FINISH"}
+_SILENT |= {"SET_NAIVECAM_TOLERANCE", "SELECT_PLANE", "USE_TOOL_LENGTH_OFFSET"}
+"""Calls that are no event: they follow from others, or mean nothing to the machine."""
+
+INCH_MM = 25.4
 
 
 @dataclass(frozen=True)
@@ -23,13 +43,16 @@ class Event:
     """One thing that a program makes the machine do.
 
     Attributes:
-        kind: RAPID, FEED, ARC, DWELL or PAUSE.
-        pose: after it, shape (6,) [mm, deg].
+        kind: RAPID, FEED, ARC, DWELL, PAUSE, OPTIONAL_STOP; SAID for messages, spindle, coolant, work systems, the end.
+        pose: after it, in the coordinates of the program, shape (6,) [mm, deg].
         feed: of the tip [mm/min] and of moves that only turn [deg/min].
         centre_mm: of an arc, X and Y [mm].
         turns: of an arc, positive counter-clockwise; 1 for less than a full turn or one.
         dwell_s: of a dwell [s].
         unit_mm: length unit of the program at this place; printed numbers have four decimals of it [mm].
+        corner: path control in force, as printed, lengths in millimetres.
+        offset: of the work system in force, shape (6,) [mm, deg].
+        said: call and arguments of a SAID event, as printed.
     """
 
     kind: str
@@ -39,16 +62,31 @@ class Event:
     turns: int = 0
     dwell_s: float = 0.0
     unit_mm: float = 1.0
+    corner: str = ""
+    offset: np.ndarray | None = None
+    said: str = ""
 
 
-def calls(text: str | bytes, folder: Path) -> list[tuple[str, str]] | None:
-    """Calls with their arguments as printed; None where the program is refused."""
+def printed(
+    text: str | bytes, folder: Path, parameters: Mapping[int, float] | None = None
+) -> list[tuple[str, str]] | None:
+    """Every call with its arguments as printed, and what PRINT writes; None where the program is refused.
+
+    Args:
+        text: the program.
+        folder: for its files.
+        parameters: numbered parameters that the control has at the start, lengths in inches.
+    """
+    assert RS274 is not None, "LinuxCNC's interpreter rs274 is not installed: package linuxcnc-uspace"
     (folder / "tool.tbl").write_text("T1 P1 D0.1 Z0\n")
-    (folder / "rs274.var").write_text("")
+    stored = sorted((parameters or {}).items())
+    (folder / "rs274.var").write_text("".join(f"{number}\t{value:.9f}\n" for number, value in stored))
     (folder / "program.ngc").write_bytes(text if isinstance(text, bytes) else text.encode())
     done = subprocess.run(
-        [str(RS274), "-g", "-t", "tool.tbl", "-v", "rs274.var", "program.ngc"],
+        [RS274, "-g", "-t", "tool.tbl", "-v", "rs274.var", "program.ngc"],
         cwd=folder,
+        # It keeps its tools in $HOME/.tool.mmap; two that run at once with one such file end with a bus error.
+        env=os.environ | {"HOME": str(folder)},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -56,32 +94,78 @@ def calls(text: str | bytes, folder: Path) -> list[tuple[str, str]] | None:
         check=False,
         timeout=60,
     )
-    return None if done.returncode else _CALL.findall(done.stdout)
+    if done.returncode < 0:
+        raise subprocess.CalledProcessError(done.returncode, "rs274", stderr=done.stderr)
+    if done.returncode:
+        return None
+    found = []
+    for line in done.stdout.splitlines():
+        call = _CALL.fullmatch(line)
+        if call is not None:
+            found.append((call["name"], call["arguments"]))
+        elif line.strip():
+            found.append(("PRINT", line))
+    return found
 
 
-def events(text: str | bytes, folder: Path) -> list[Event] | None:
+def calls(text: str | bytes, folder: Path) -> list[tuple[str, str]] | None:
+    """Calls that move, stop, or change feed and units; None where the program is refused."""
+    known = {*_MOVES, *_STOPS, "SET_FEED_RATE", "USE_LENGTH_UNITS"}
+    made = printed(text, folder)
+    return None if made is None else [call for call in made if call[0] in known]
+
+
+def events(text: str | bytes, folder: Path, parameters: Mapping[int, float] | None = None) -> list[Event] | None:
     """What a program does, in millimetres and degrees; None where it is refused."""
-    made = calls(text, folder)
+    made = printed(text, folder, parameters)
     if made is None:
         return None
-    unit, feed, pose = 1.0, (0.0, 0.0), np.zeros(6)
-    found: list[Event] = []
-    for name, printed in made:
+    control = _Control()
+    return [event for name, arguments in made if (event := control.event(name, arguments)) is not None]
+
+
+class _Control:
+    """What holds until a call changes it."""
+
+    def __init__(self) -> None:
+        self.unit_mm, self.feed, self.pose, self.corner, self.offset = 1.0, (0.0, 0.0), np.zeros(6), "", np.zeros(6)
+
+    def event(self, name: str, arguments: str) -> Event | None:
+        """The event of a call; None where it only changes what holds, or means nothing to the machine."""
+        if name in _SILENT:
+            return None
+        if name in _MOVES:
+            return self._move(name, _numbers(arguments))
+        if name in _STOPS:
+            return Event(_STOPS[name], self.pose, dwell_s=float(arguments or 0.0))
+        if name == "SET_G5X_OFFSET":
+            system, *offset = _numbers(arguments)
+            self.offset = np.array(offset[:6]) * ([self.unit_mm] * 3 + [1.0] * 3)
+            return Event("SAID", self.pose, said=f"{name}({system:g})")
+        if name in _STATE:
+            self._set(name, arguments)
+            return None
+        return Event("SAID", self.pose, said=f"{name}({arguments})")
+
+    def _set(self, name: str, arguments: str) -> None:
         if name == "USE_LENGTH_UNITS":
-            unit = 25.4 if "INCHES" in printed else 1.0
-            continue
-        numbers = np.array([float(number) for number in printed.split(",") if number.strip()])
-        if name == "SET_FEED_RATE":
-            feed = (float(numbers[0]) * unit, float(numbers[0]))
-        elif name.startswith("STRAIGHT"):
-            pose = np.concatenate([numbers[:3] * unit, numbers[3:]])
-            found.append(Event("RAPID" if name.endswith("TRAVERSE") else "FEED", pose, feed, unit_mm=unit))
-        elif name == "ARC_FEED":
-            x, y, i, j, turns, z, *angles = numbers
-            pose = np.array([x * unit, y * unit, z * unit, *angles])
-            found.append(Event("ARC", pose, feed, (i * unit, j * unit), int(turns), unit_mm=unit))
-        elif name == "DWELL":
-            found.append(Event("DWELL", pose, dwell_s=float(numbers[0])))
+            self.unit_mm = INCH_MM if "INCHES" in arguments else 1.0
+        elif name == "SET_FEED_RATE":
+            self.feed = (float(arguments) * self.unit_mm, float(arguments))
         else:
-            found.append(Event("PAUSE", pose))
-    return found
+            mode, _, allowed = arguments.partition(",")
+            self.corner = f"{mode} {float(allowed) * self.unit_mm:.4f}" if allowed else mode
+
+    def _move(self, name: str, numbers: list[float]) -> Event:
+        unit, centre, turns = self.unit_mm, (0.0, 0.0), 0
+        if name == "ARC_FEED":
+            x, y, i, j, rotation, z, *angles = numbers
+            numbers, centre, turns = [x, y, z, *angles], (i * unit, j * unit), int(rotation)
+        self.pose = np.array(numbers[:6]) * ([unit] * 3 + [1.0] * 3)
+        return Event(
+            _MOVES[name], self.pose, self.feed, centre, turns, unit_mm=unit, corner=self.corner, offset=self.offset
+        )
+
+
+def _numbers(arguments: str) -> list[float]:
+    return [float(number) for number in arguments.split(",") if number.strip()]

@@ -17,7 +17,7 @@ from dbbstation.files.source_text import decode
 from dbbstation.nc.export import Inverse, compensated_program
 from dbbstation.nc.nominal import check_nominal
 from dbbstation.nc.toolpath import Step
-from tests.nc.interpreter import RS274, events
+from tests.nc.interpreter import events, needs_rs274
 
 WHOLE = b"""%
 (part) ; one
@@ -114,7 +114,7 @@ def test_accepted_mutants_are_compensated_or_refused_by_name(linuxcnc, crooked):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(RS274 is None, reason="LinuxCNC's interpreter rs274 is not installed")
+@needs_rs274
 def test_mutants_that_linuxcnc_refuses_are_refused(linuxcnc, tmp_path):
     for data in mutants(3, 600):
         if read(linuxcnc, data) is not None:

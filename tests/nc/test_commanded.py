@@ -37,10 +37,8 @@ def test_a_nominal_program_commands_the_nominal_circle(linuxcnc, all_runs):
 
 
 @pytest.mark.slow
-def test_a_compensated_program_commands_what_takes_the_machine_round_the_nominal_circle(
-    linuxcnc, table2, reference, crooked
-):
-    for program in circle_programs(table2, reference, linuxcnc, inverse=Inverse(crooked)):
+def test_a_compensated_program_commands_what_takes_the_machine_round_the_nominal_circle(linuxcnc, table2, crooked):
+    for program in circle_programs(table2, crooked.machine, linuxcnc, inverse=Inverse(crooked)):
         name, direction = program.name.removesuffix(".ngc").split("-")
         test = table2.tests[name]
         circle = next(test.run(each) for each in test.directions if each == direction)
@@ -59,9 +57,9 @@ def test_a_compensated_program_commands_what_takes_the_machine_round_the_nominal
         assert np.linalg.norm(along[:, :3], axis=1).max() < 1e-3 * 225.0 / 180.0 * np.pi * circle.radius_mm
 
 
-def test_at_its_points_the_circle_is_met_to_the_rounding(linuxcnc, table2, reference, crooked):
+def test_at_its_points_the_circle_is_met_to_the_rounding(linuxcnc, table2, crooked):
     circle = table2.tests["d"].circle
-    (program, _) = circle_programs(table2, reference, linuxcnc, inverse=Inverse(crooked), tests=["d"])
+    (program, _) = circle_programs(table2, crooked.machine, linuxcnc, inverse=Inverse(crooked), tests=["d"])
     path = linuxcnc.read(program.text, program.name)
     arc = np.flatnonzero(np.abs(path.tip_mm - 0.26) < 0.01)
     middle = (path.end_s[arc[0]] - path.duration_s[arc[0]] + path.end_s[arc[-1]]) / 2.0

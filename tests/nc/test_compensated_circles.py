@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.circle_program import arc_phi_deg, chord_error_mm, circle_toolpath
-from dbbstation.nc.compensate import compensate_toolpath
+from dbbstation.nc.compensate import Prefer, compensate_toolpath
 from dbbstation.nc.export import Inverse, circle_programs
 from dbbstation.nc.toolpath import Step, Toolpath, in_pieces
 from dbbstation.plan.circle import Circle
@@ -40,7 +42,8 @@ def test_thirty_programs_take_the_machine_to_the_nominal_circles(compensated, ta
             circle = test.run(direction)
             wanted = circle.poses(circle.theta_deg(arc_phi_deg(circle, 0.1)))
             path = compensated[f"{name}-{direction}.ngc"]
-            arc = path.poses[path.kind == Step.FEED][1:-1]
+            # The move down to the first point may be in pieces.
+            arc = path.poses[path.kind == Step.FEED][-len(wanted) - 1 : -1]
             off = reached(crooked, arc) - wanted
             worst_mm = max(worst_mm, np.linalg.norm(off[:, :3], axis=1).max())
             worst_deg = max(worst_deg, np.abs(off[:, 3:]).max())
@@ -79,6 +82,7 @@ def test_feed_in_goes_along_the_bar(compensated, table2, crooked):
 def test_a_machine_without_errors_gets_the_nominal_program(linuxcnc, table2, reference):
     perfect = Inverse(MachineModel(reference))
     nominal = circle_programs(table2, reference, linuxcnc, tests=["h"])
+    perfect = replace(perfect, prefer=Prefer.POSITION_ONLY)
     same = circle_programs(table2, reference, linuxcnc, inverse=perfect, tests=["h"])
     for program, other in zip(nominal, same, strict=True):
         assert other.greatest_um == pytest.approx(0.0, abs=1e-6)
@@ -93,4 +97,4 @@ def test_nominal_and_compensated_programs_differ_in_numbers_only(linuxcnc, all_r
     np.testing.assert_array_equal(done.feed_mm_min, path.feed_mm_min)
     assert done.text == path.text
     assert abs(done.end_s[-1] - path.end_s[-1]) < 0.02
-    assert linuxcnc.write(done).splitlines()[1] == "G64 P0.0001 Q0"
+    assert "G64 P0.0001 Q0" in linuxcnc.write(done).splitlines()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.metadata
+import textwrap
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -12,13 +14,17 @@ import dbbstation.nc.dialects
 from dbbstation.errors import InputError, StationError
 from dbbstation.files.own_dialects import dialect_given
 from dbbstation.nc.dialect import Dialect
+from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 from dbbstation.nc.registry import GROUP, dialect_named, dialect_of_file, known_dialects
+from dbbstation.nc.rs274.reader import read_program
 from dbbstation.nc.toolpath import ToolpathBuilder
+from dbbstation.nc.words import CannotSayError
 
 ONE_FILE = '''
 """A dialect for a test."""
 
 from dbbstation.nc.dialect import Dialect
+from dbbstation.nc.export import Inverse, circle_programs, compensated_program
 
 
 class Shouting(Dialect):
@@ -165,3 +171,86 @@ def test_what_a_dialect_of_ones_own_lacks_is_told(tmp_path, old, new, why):
     (tmp_path / "own.py").write_text(OWN.replace(old, new))
     with pytest.raises(InputError, match=why):
         dialect_given(str(tmp_path / "own.py"))
+
+
+def own(tmp_path, body: str) -> str:
+    """A file with LinuxCNC's language and something wrong in it."""
+    (tmp_path / "own.py").write_text(f"import re\n{OWN}\n{textwrap.indent(textwrap.dedent(body), '    ')}\n")
+    return str(tmp_path / "own.py")
+
+
+def editing(edit: str) -> str:
+    """The body of a dialect that edits LinuxCNC's text by a pattern."""
+    return f"def write(self, path, header=()):\n    text = LinuxCNC.write(self, path, header)\n    return {edit}\n"
+
+
+SABOTAGE = {
+    "ten times the feed": (editing("re.sub('F600', 'F6000', text)"), r"wrote `feed in mm/min 600` and reads `.* 6000`"),
+    "no dwells": (editing("re.sub('G4 .*\\n', '', text)"), r"it loses `dwell in s 0\.5` \(dwells\)"),
+    "no stops": ("def pause(self, text):\n    return f'({text})'", r"wrote `pause` and reads `feed to"),
+    "stops that cannot be switched off": (
+        editing("text.replace('M1\\n', 'M0\\n')"),
+        r"wrote `optional stop` and reads `pause`",
+    ),
+    "no spindle": (editing("re.sub('S1200 M3\\n', '', text)"), r"it loses `S1200`"),
+    "the spindle the other way": (editing("text.replace('S1200 M3', 'S1200 M4')"), r"wrote `M3` and reads `M4`"),
+    "a spindle without decimals": (editing("text.replace('S0.00001', 'S0')"), r"wrote `S0\.00001` and reads `S0`"),
+    "no coolant": (editing("text.replace('M8\\n', '')"), r"it loses `M8` \(coolant\)"),
+    "a tool dropped": (
+        "def function(self, words):\n    return re.sub('T.*', '(no tool)', words)",
+        r"it loses `T2` \(a tool\)",
+    ),
+    "no messages": (editing("re.sub(r'\\(MSG, hello\\)', '', text)"), r"it loses `message MSG, hello`"),
+    "no work system": (editing("text.replace('G55\\n', '')"), r"it loses `system G55`"),
+    "no machine coordinates": (editing("text.replace('G53 ', '')"), r"wrote `rapid in machine coordinates to"),
+    "no exact stop": (editing("text.replace('G61\\n', '')"), r"path control"),
+    "no guard": ("def guard(self, systems):\n    return ''", r"it loses `a guard against offsets`"),
+    "M2 for M30": (editing("text.replace('M30', 'M2')"), r"wrote `end by M30` and reads `end by M2`"),
+    "stops before dwells": (
+        editing("re.sub(r'(G4 P12.25)\\n((?:.*\\n)*?)(M0)\\n', r'\\3\\n\\2\\1\\n', text)"),
+        r"\(all in one program\)",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", SABOTAGE)
+def test_a_dialect_that_drops_or_changes_anything_is_refused(tmp_path, what):
+    body, why = SABOTAGE[what]
+    with pytest.raises(InputError, match=why):
+        dialect_given(own(tmp_path, body))
+
+
+def test_a_dialect_that_says_what_it_has_no_words_for_is_taken(tmp_path, crooked):
+    body = """
+        def optional_stop(self):
+            raise self.cannot_say("an optional stop (M1)")
+    """
+    dialect = dialect_given(own(tmp_path, body))
+    path = read_program("G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\nG1 X1 F100\nM1\nM2\n", "part.ngc")
+    with pytest.raises(CannotSayError, match=r"part\.ngc:4: the dialect own has no words for an optional stop \(M1\)"):
+        compensated_program(path, dialect, Inverse(crooked))
+
+
+EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "sinumerik.py"
+
+
+def test_the_example_of_the_documentation_is_a_dialect(linuxcnc, crooked, table2):
+    """A part and a ball-bar run, compensated, read back in its language as in LinuxCNC's."""
+    dialect = dialect_given(str(EXAMPLE))
+    part = "G21 G90 G54\nG0 X0 Y0 Z-1000 A0 B0 C0\nS800 M3\nG61\nG1 X50 F500\n(MSG, turn it)\nM0\nG4 P0.5\nG1 A5 F60\nM30\n"
+    path = read_program(part, "part.ngc")
+    texts = [compensated_program(path, one, Inverse(crooked)).text for one in (linuxcnc, dialect)]
+    runs = [
+        circle_programs(table2, crooked.machine, one, inverse=Inverse(crooked), tests=["g"])
+        for one in (linuxcnc, dialect)
+    ]
+    texts += [programs[0].text for programs in runs]
+    for one, other in ((texts[0], texts[1]), (texts[2], texts[3])):
+        mine, yours = linuxcnc.read(one, "x.ngc"), dialect.read(other, "x.mpf")
+        np.testing.assert_array_equal(mine.kind, yours.kind)
+        np.testing.assert_array_equal(mine.poses, yours.poses)
+        np.testing.assert_array_equal(mine.corners_mm, yours.corners_mm)
+        np.testing.assert_allclose(mine.duration_s, yours.duration_s, rtol=1e-12)
+        assert (mine.text, mine.guard, mine.ending) == (yours.text, yours.guard, yours.ending)
+    with pytest.raises(CannotSayError, match="the work system G59"):
+        dialect.write(read_program(part.replace("G54", "G59"), "part.ngc"))

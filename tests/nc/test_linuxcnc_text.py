@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from dbbstation.nc.circle_program import circle_toolpath
-from dbbstation.nc.dialects.linuxcnc import digits
+from dbbstation.nc.rs274.guard import guard_lines
 from dbbstation.nc.toolpath import Step, ToolpathBuilder
+from dbbstation.nc.words import digits
 from dbbstation.plan.circle import Circle, Direction
 
 SMALL = Circle(
@@ -25,11 +26,14 @@ SMALL = Circle(
     direction=Direction.CCW,
 )
 
+GUARD = "\n".join(guard_lines())
+
 # From 270 degrees (-Y) counter-clockwise through 540 degrees to 90 degrees (+Y), a point every 90 degrees. The chord
 # error is 100 (1 - cos 45°) = 29.289322 mm, and as much may be cut off the corners.
-GOLDEN = """\
+GOLDEN = f"""\
 ; a small circle
 ; 0.1 um, [1?]
+{GUARD}
 G21 G90 G94 G17 G40 G49
 G64 P29.28932 Q0
 G0 X10.000000 Y-82.000000 Z-1080.000000 A5.0000000 B-2.5000000 C0.0000000
@@ -62,6 +66,7 @@ def test_a_small_circle_reads_as_worked_out_by_hand(linuxcnc):
 
 def test_with_the_bar_on_there_are_no_rapids_and_no_stops(linuxcnc):
     lines = linuxcnc.write(circle_toolpath(SMALL, "small", step_deg=90.0, approach=None)).splitlines()
+    lines = lines[lines.index("G21 G90 G94 G17 G40 G49") :]
     assert lines[2] == "G1 X10.000000 Y-82.000000 Z-1100.000000 A5.0000000 B-2.5000000 C0.0000000 F600"
     assert lines[3] == "G4 P1"
     assert lines[-2:] == ["G4 P1", "M2"]

@@ -41,7 +41,7 @@ def test_a_turn_without_a_way_takes_its_feed_in_degrees():
 def test_comments_pauses_functions_and_the_end():
     path = read_program("%\n" + FIRST + "(one) ; two\nS1200 M3\n(MSG, look)\nM0\nM1\nM2\nrubbish\n%\n", "part.ngc")
     assert [path.text.get(row, "") for row in range(1, len(path))] == ["one", "two", "S1200 M3", "look", ""]
-    assert [Step(kind).name for kind in path.kind[1:]] == ["COMMENT", "COMMENT", "FUNCTION", "PAUSE", "PAUSE"]
+    assert [Step(kind).name for kind in path.kind[1:]] == ["COMMENT", "COMMENT", "FUNCTION", "PAUSE", "OPTIONAL_STOP"]
     assert len(read_program("%\n" + FIRST + "%\nG0 X5\n", "part.ngc")) == 1
 
 
@@ -103,7 +103,6 @@ def test_a_helix_moves_the_other_axes_evenly():
         ("G0 X5 P7", 7, "nothing in this line uses P7"),
         ("G53 G2 X5 R5 F100", 1, "G53 goes with G0 and G1"),
         ("G20 F10 G1 X1", 5, "counts in the units before it on some controls"),
-        ("G64 P0.01", 1, "on the way"),
         ("G90.1 G2 X5 I2.5 F10", 10, "both I and J"),
     ],
 )

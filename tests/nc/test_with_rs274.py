@@ -11,9 +11,9 @@ import pytest
 from dbbstation.nc.circle_program import circle_toolpath
 from dbbstation.nc.compensate import compensate_toolpath
 from dbbstation.nc.toolpath import Step
-from tests.nc.interpreter import RS274, calls
+from tests.nc.interpreter import calls, needs_rs274
 
-pytestmark = pytest.mark.skipif(RS274 is None, reason="LinuxCNC's interpreter rs274 is not installed")
+pytestmark = needs_rs274
 
 BY_HAND = """\
 G21 G90 G94 G17 G64 P0.001

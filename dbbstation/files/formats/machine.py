@@ -1,4 +1,4 @@
-"""`dbb-machine/2`, which has all of `dbb-machine/1`: the nominal machine, as its controller believes it."""
+"""`dbb-machine/3`, which has all of `dbb-machine/2` and `/1`: the nominal machine, as its controller believes it."""
 
 import math
 from dataclasses import asdict
@@ -132,6 +132,9 @@ class MachineParts(Schema):
     """Greatest feed of the tool tip [mm/min]; programs with a larger F are refused. Without it 100000."""
     greatest_turn_deg_min: Annotated[float, Quantity("deg/min", 10, 500_000)] | None = None
     """Greatest speed of the tilt angles [deg/min], for the F of moves that only turn. Without it 36000."""
+    acceleration_mm_s2: Annotated[float, Quantity("mm/s²", 50, 50_000)] | None = None
+    """Acceleration of the tool tip that the control plans with [mm/s²], for the pieces of compensated programs. Without
+    it 1000."""
     masses: MassesSchema | None = None
     """What gravity acts on; needed by the sources that model it."""
     compliance: ComplianceSchema | None = None
@@ -162,6 +165,7 @@ class MachineParts(Schema):
             joint_axes=None if axes is None else JointAxes(np.array(axes.base), np.array(axes.platform)),
             greatest_feed_mm_min=self.greatest_feed_mm_min,
             greatest_turn_deg_min=self.greatest_turn_deg_min,
+            acceleration_mm_s2=self.acceleration_mm_s2,
         )
 
 
@@ -183,6 +187,7 @@ def machine_parts(machine: Machine) -> MachineParts:
             "joint_tolerance_mm": machine.joint_tolerance_mm,
             "greatest_feed_mm_min": machine.greatest_feed_mm_min,
             "greatest_turn_deg_min": machine.greatest_turn_deg_min,
+            "acceleration_mm_s2": machine.acceleration_mm_s2,
             "masses": machine.masses and asdict(machine.masses),
             "compliance": machine.compliance and asdict(machine.compliance),
             "strut_masses": machine.strut_masses and asdict(machine.strut_masses),
@@ -206,7 +211,7 @@ def machine_data(parts: MachineParts) -> dict[str, Any]:
 class MachineFile(MachineParts):
     """A hexapod machine tool as its controller believes it: joints, travel, screws, masses."""
 
-    format: Literal["dbb-machine/1", "dbb-machine/2"]
+    format: Literal["dbb-machine/1", "dbb-machine/2", "dbb-machine/3"]
     """Name and version of this format."""
 
 

@@ -66,8 +66,14 @@ SINCE: dict[str, dict[str, int]] = {
     },
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},
     "dbb-settings": {"largest_bar_age_h": 2, "profile": 2},
-    "dbb-machine": _OF_MACHINES,
-    "dbb-model": {**_OF_MACHINES, "provenance": 3, "null_space": 4, "formula_variance": 4},
+    "dbb-machine": {**_OF_MACHINES, "acceleration_mm_s2": 3},
+    "dbb-model": {
+        **_OF_MACHINES,
+        "provenance": 3,
+        "acceleration_mm_s2": 4,
+        "null_space": 4,
+        "formula_variance": 4,
+    },
 }
 """Keys that came after the first version of a format, with the version. A file of an older version must not have them: a
 program of that time would refuse it without saying that a newer one reads it."""

@@ -3,37 +3,33 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+import re
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from dbbstation.nc.dialect import Dialect, plain
+from dbbstation.nc.dialect import plain
+from dbbstation.nc.planner import LookAhead
+from dbbstation.nc.rs274.guard import guard_lines
 from dbbstation.nc.rs274.reader import read_program
-from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, Step, rounded
+from dbbstation.nc.toolpath import Ending
+from dbbstation.nc.words import WordDialect, digits
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from dbbstation.nc.toolpath import Toolpath
-
-AXES = "XYZABC"
-DECIMALS = (DECIMALS_MM,) * 3 + (DECIMALS_DEG,) * 3
 
 MODES = "G21 G90 G94 G17 G40 G49"
 """Millimetres, absolute, feed per minute, arcs in XY, no cutter compensation, no tool length: the model is about the
 tool tip. A program must not inherit any of these from the one before it."""
 
-FEED_DIGITS = 7
-"""Significant digits of a feed."""
 
-MOST_DECIMALS = 15
-"""No feed and no dwell needs more; a line has an end."""
+_FUNCTION = re.compile(r"S[0-9.]+|M[345789]")
 
 
-class LinuxCNC(Dialect):
+class LinuxCNC(WordDialect):
     """Words of an axis are written where they change, the motion code in every line.
 
     - F under G94 is the speed along X, Y and Z as if A, B and C stood still, which is the feed of the tool tip: it
@@ -41,91 +37,85 @@ class LinuxCNC(Dialect):
     - `G64 P Q0`: LinuxCNC starts with corners rounded as far as the feed needs. P bounds that. Exact path (G61) would
       stop at each of 3600 corners. Q0 keeps LinuxCNC from merging short moves, which it does only while A, B and C
       stand still: nominal and compensated programs would run differently.
+    - G61 and G64 hold for the end of each move that follows, and do not stop the machine themselves: a move under G61
+      that is written in pieces has G64 before the first and G61 before the last.
     - Dwells (G4) end blending: between feed-in and arc the machine stands still at the corner.
     """
 
     name = "linuxcnc"
     extension = ".ngc"
     what = "LinuxCNC (RS274/NGC)"
-
-    def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
-        """Return the program."""
-        # What does not move by the decimals that are written does not move.
-        toolpath = replace(toolpath, poses=rounded(toolpath.poses))
-        lines = [f"; {plain(text)}".rstrip() for text in header]
-        numbers = [f"N{number} " for number in toolpath.numbers] or [""]
-        lines.append(numbers[0] + MODES)
-        if toolpath.corner_mm is not None:
-            lines.append(_path_control(toolpath.corner_mm))
-        lines.extend(_body(toolpath))
-        lines.append(numbers[-1] + "M2")
-        return "\n".join(lines) + "\n"
+    look_ahead = LookAhead(share=0.5)
 
     def read(self, text: str, name: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
         """Return what a program commands."""
         return read_program(text, name, start=start)
 
+    def before_header(self, toolpath: Toolpath) -> Iterable[str]:
+        """The percent sign of a program that ends with one."""
+        return ("%",) if toolpath.ending is Ending.TEXT else ()
 
-def _body(toolpath: Toolpath) -> Iterator[str]:
-    kinds, words = toolpath.kind.tolist(), _changed_words(toolpath)
-    feeds, dwells = toolpath.feed.tolist(), toolpath.dwell_s.tolist()
-    last_feed = math.nan
-    for row, kind in enumerate(kinds):
-        if kind == Step.RAPID:
-            yield f"G0 {words[row]}"
-        elif kind == Step.FEED:
-            feed = "" if feeds[row] == last_feed else f" F{digits(feeds[row])}"
-            last_feed = feeds[row]
-            yield f"G1 {words[row]}{feed}"
-        elif kind == Step.DWELL:
-            yield f"G4 P{digits(dwells[row])}"
-        else:
-            yield from _said(Step(kind), toolpath.text.get(row, ""))
+    def begin(self, toolpath: Toolpath) -> Iterable[str]:  # noqa: ARG002
+        """The modes."""
+        return (MODES,)
+
+    def end(self, toolpath: Toolpath) -> Iterable[str]:
+        """M2, M30 or the percent sign."""
+        return (toolpath.ending.value,)
+
+    def rapid(self, words: str) -> str:
+        """Return G0."""
+        return f"G0 {words}".rstrip()
+
+    def feed(self, words: str, feed: float | None) -> str:
+        """Return G1, F where it changes."""
+        return f"G1 {words}" if feed is None else f"G1 {words} F{digits(feed)}"
+
+    def in_machine(self, move: str) -> str:
+        """Return the move with G53, which holds for its line."""
+        return f"G53 {move}"
+
+    def corner(self, corner_mm: float) -> str:
+        """G61, G64, or G64 with P and Q0."""
+        if corner_mm == 0.0:
+            return "G61"
+        return "G64" if math.isinf(corner_mm) else f"G64 P{digits(corner_mm)} Q0"
+
+    def dwell(self, seconds: float) -> str:
+        """Return G4."""
+        return f"G4 P{digits(seconds)}"
+
+    def pause(self, text: str) -> str:
+        """M0, with a message before it."""
+        return f"({message_before_stop(text)})\nM0" if text else "M0"
+
+    def optional_stop(self) -> str:
+        """Return M1."""
+        return "M1"
+
+    def comment(self, text: str) -> str:
+        """Behind a semicolon, where nothing in it means anything to LinuxCNC."""
+        return f"; {plain(text)}".rstrip()
+
+    def message(self, text: str) -> str:
+        """A comment that LinuxCNC acts on, to the letter."""
+        return f"({text})"
+
+    def function(self, words: str) -> str:
+        """The words as they are, spindle and coolant; a tool has another tip than the model."""
+        if not all(_FUNCTION.fullmatch(word) for word in words.split()):
+            raise self.cannot_say(words)
+        return words
+
+    def system(self, name: str) -> str:
+        """The word as it is."""
+        return name
+
+    def guard(self, systems: Sequence[str]) -> str:
+        """A condition of O-words on LinuxCNC's parameters."""
+        return "\n".join(guard_lines(systems))
 
 
-def _said(kind: Step, text: str) -> Iterator[str]:
-    if kind == Step.FUNCTION:
-        yield text
-    elif kind == Step.COMMENT:
-        yield f"; {plain(text)}".rstrip()
-    else:
-        if text:
-            yield f"(MSG, {plain(text).replace('(', '[').replace(')', ']')})"
-        yield "M0"
-
-
-def _changed_words(toolpath: Toolpath) -> list[str]:
-    """Words of the axes that each move changes, as text; nothing for rows that are no moves.
-
-    Moves that change the same axes are written together, by one form.
-    """
-    texts = [""] * len(toolpath)
-    moves = np.flatnonzero(toolpath.is_move)
-    poses = toolpath.poses[moves]
-    changed = np.ones(poses.shape, dtype=np.bool_)
-    changed[1:] = poses[1:] != poses[:-1]
-    # A move to where the machine stands already is a move: LinuxCNC wants an axis in it.
-    changed[~changed.any(axis=1), 0] = True
-    which = changed @ (1 << np.arange(len(AXES)))
-    for one in np.unique(which):
-        alike = np.flatnonzero(which == one)
-        axes = np.flatnonzero(changed[alike[0]])
-        form = " ".join(f"{AXES[axis]}%.{DECIMALS[axis]}f" for axis in axes)
-        for row, values in zip(moves[alike].tolist(), poses[np.ix_(alike, axes)].tolist(), strict=True):
-            texts[row] = form % tuple(values)
-    return texts
-
-
-def _path_control(corner_mm: float) -> str:
-    if corner_mm == 0.0:
-        return "G61"
-    return "G64" if math.isinf(corner_mm) else f"G64 P{digits(corner_mm)} Q0"
-
-
-def digits(value: float) -> str:
-    """A positive number with seven significant digits and no exponent, which RS274/NGC does not know."""
-    if value == 0.0:
-        return "0"
-    decimals = min(max(0, FEED_DIGITS - 1 - math.floor(math.log10(abs(value)))), MOST_DECIMALS)
-    text = f"{value:.{decimals}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
+def message_before_stop(text: str) -> str:
+    """What a pause's text becomes as a message: on one line, its brackets square."""
+    return f"MSG, {plain(text).replace('(', '[').replace(')', ']')}"

@@ -73,6 +73,11 @@ class Arc:
         """Number of straight moves that keep `CHORD_ERROR_MM`."""
         return max(1, math.ceil(self.swept_rad / math.sqrt(8.0 * CHORD_ERROR_MM / max(self.radii_mm()))))
 
+    @property
+    def chord(self) -> tuple[float, float, float]:
+        """Centre [mm] and angle of each chord [rad], counter-clockwise positive, as `Toolpath.arc` has them."""
+        return *self.centre_mm, (-self.swept_rad if self.clockwise else self.swept_rad) / self.chords
+
     def poses(self) -> NDArray[np.float64]:
         """End points of the chords, shape (k, 6) [mm, deg]."""
         (x, y), (first, last) = self.centre_mm, self.radii_mm()

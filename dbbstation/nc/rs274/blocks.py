@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from dbbstation.errors import Problem
 from dbbstation.nc.rs274 import codes
 from dbbstation.nc.rs274.codes import Group
-from dbbstation.nc.rs274.tokens import BadLine, Place, Word, tokens
+from dbbstation.nc.rs274.guard import guard_at
+from dbbstation.nc.rs274.tokens import BadLine, Comment, Place, Word, tokens
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 BLANKS = " \t\r"
 
 LONGEST_BYTES = 252
 """LinuxCNC's interpreter refuses lines of more bytes, the CR before the line feed counted [measured with rs274 2.9]."""
+
+MOST_GUARD = 1000
+"""A guard has fewer lines, empty ones between them counted."""
+
+_MAY_GUARD = re.compile(r"[ \t]*+(?:[nN][0-9 \t]++)?+[oO]")
 
 _CONTROL = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028\u2029]")
 """All control characters but the tab, and the line separators of Unicode."""
@@ -30,13 +40,17 @@ class Block:
         place: file and line.
         words: those that are no code, by letter.
         codes: G and M codes by their group.
-        comments: texts of its comments.
+        comments: texts of its comments, of which nothing takes notice.
+        message: a comment that LinuxCNC acts on, to the letter; empty where there is none.
+        guard: work systems that a guard names which begins in this line; None where none begins.
     """
 
     place: Place
     words: dict[str, Word] = field(default_factory=dict)
     codes: dict[Group, Word] = field(default_factory=dict)
     comments: list[str] = field(default_factory=list)
+    message: str = ""
+    guard: tuple[str, ...] | None = None
 
     def code(self, group: Group) -> float | None:
         """Number of the code of a group, None where the line has none."""
@@ -44,29 +58,41 @@ class Block:
         return None if word is None else word.value
 
 
-def blocks(text: str, file: str, faults: list[Problem]) -> list[Block]:
-    """Return all lines up to the program's end, with faults added to `faults`; a program without an end is one."""
+def blocks(text: str, file: str, faults: list[Problem]) -> Iterator[Block]:
+    """All lines up to the program's end, one by one, so that a long program is read in little memory.
+
+    Args:
+        text: the program.
+        file: for messages.
+        faults: those of the lines so far; complete once every block was taken. A program without an end is one.
+    """
     lines = text.split("\n")
     percent, first = _opening(lines)
-    found: list[Block] = []
+    behind_guard = first
     for number, line in enumerate(lines[first:], first + 1):
+        if number <= behind_guard:
+            continue
         if percent and _is_percent(line):
-            return found
+            return
         place = Place(file, number)
+        guard = guard_at(lines[number - 1 : number - 1 + MOST_GUARD]) if _MAY_GUARD.match(line) else None
+        if guard is not None:
+            yield Block(place, guard=guard[0])
+            behind_guard = number - 1 + guard[1]
+            continue
         try:
             block = _block(_one_line(line, place), place)
         except BadLine as fault:
             faults.append(fault.problem)
             if len(faults) >= MOST_FAULTS:
-                return found
+                return
             continue
-        found.append(block)
+        yield block
         if block.code(Group.STOP) in {2.0, 30.0}:
             if percent and not any(_is_percent(after) for after in lines[number:]):
                 faults.append(_cut_short(file, lines, "the % that closes it"))
-            return found
+            return
     faults.append(_cut_short(file, lines, "the % that closes it" if percent else "M2 or M30"))
-    return found
 
 
 def _opening(lines: list[str]) -> tuple[bool, int]:
@@ -109,8 +135,8 @@ def _one_line(line: str, place: Place) -> str:
 def _block(line: str, place: Place) -> Block:
     block = Block(place)
     for token in tokens(line, place):
-        if isinstance(token, str):
-            block.comments.append(token)
+        if isinstance(token, Comment):
+            _take_comment(block, token)
         elif token.letter in "GM":
             _take_code(block, token)
         elif token.letter not in codes.LETTERS:
@@ -124,6 +150,29 @@ def _block(line: str, place: Place) -> Block:
         else:
             block.words[token.letter] = token
     return block
+
+
+_ACTIVE = re.compile(
+    r"(?:msg|debug|print|log|logopen|logappend|probeopen|abort),|(?:logclose|probeclose)", re.IGNORECASE
+)
+"""Begins of comments that LinuxCNC acts on."""
+
+_PYTHON = re.compile(r"py,|pyrun,|pyreload", re.IGNORECASE)
+
+
+def _take_comment(block: Block, comment: Comment) -> None:
+    """Add a comment. Of several in brackets LinuxCNC looks at the last one only [measured with rs274 2.9]."""
+    text = comment.text.lstrip(BLANKS)
+    if _PYTHON.match(text):
+        what = "a comment that runs Python in the control, which may move it"
+        raise block.place.fault(comment.column, what, "post the program without it")
+    if comment.bracketed and block.message:
+        block.comments.append(block.message.rstrip(BLANKS))
+        block.message = ""
+    if comment.bracketed and _ACTIVE.match(text):
+        block.message = text
+    else:
+        block.comments.append(text.rstrip(BLANKS))
 
 
 def _take_code(block: Block, word: Word) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+from dbbstation.nc.toolpath import SYSTEMS
+
 
 class Group(StrEnum):
     """Codes of one group exclude each other in a line."""
@@ -37,7 +39,7 @@ G_CODES: dict[float, Group] = {
     40: Group.CUTTER,
     49: Group.TOOL_LENGTH,
     53: Group.ONCE,
-    54: Group.OFFSET,
+    **{float(name[1:]): Group.OFFSET for name in SYSTEMS},
     61: Group.PATH,
     64: Group.PATH,
     80: Group.CYCLE,
@@ -63,12 +65,12 @@ M_CODES: dict[float, Group] = {
 
 LETTERS = frozenset("ABCFGIJMNPQRSXYZ")
 
-_OTHER_COORDINATES = "the model holds in machine coordinates: post the program without offsets"
+_OTHER_COORDINATES = "the model holds in machine coordinates: post the program without commands that set offsets"
 _TOOL = "the model is about one tool tip: post the program for the tool tip, without compensation in the control"
 _REMEDIES: dict[float, str] = {
     **dict.fromkeys((18, 19), "only arcs in the XY plane (G17) are read"),
     **dict.fromkeys((41, 41.1, 42, 42.1, 43, 43.1, 43.2), _TOOL),
-    **dict.fromkeys((10, 52, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3, 92, 92.1, 92.2, 92.3), _OTHER_COORDINATES),
+    **dict.fromkeys((10, 52, 92, 92.1, 92.2, 92.3), _OTHER_COORDINATES),
     **dict.fromkeys((93, 95), "post the program with feed per minute (G94)"),
     **dict.fromkeys((73, 74, 76, 81, 82, 83, 84, 85, 86, 87, 88, 89), "post cycles as single moves"),
     **dict.fromkeys((28, 28.1, 30, 30.1), "name the pose instead"),

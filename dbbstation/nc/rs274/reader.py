@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from dbbstation.errors import InputError, Problem
+from dbbstation.nc.dialect import plain
 from dbbstation.nc.rs274.arcs import Arc, centre_by_radius
 from dbbstation.nc.rs274.blocks import Block, blocks
 from dbbstation.nc.rs274.codes import Group, name
 from dbbstation.nc.rs274.tokens import BadLine
-from dbbstation.nc.toolpath import Step, Toolpath, ToolpathBuilder
+from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, Step, Toolpath, ToolpathBuilder
+from dbbstation.nc.words import number
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +23,8 @@ if TYPE_CHECKING:
 
 AXES = "XYZABC"
 MM_PER_INCH = 25.4
-MESSAGE = "MSG,"
+MESSAGE = "MSG, "
+"""What a message begins with that stands before a stop, as people write it."""
 
 MOST_ROWS = 1_000_000
 """Moves and stops that a program may have once its arcs are chords: 260 full turns of 150 mm, or a path of 50 m in steps
@@ -32,6 +35,7 @@ FARTHEST_MM, FARTHEST_DEG = 100_000.0, 36_000.0
 
 RAPID, LINEAR, CLOCKWISE, COUNTER_CLOCKWISE = 0.0, 1.0, 2.0, 3.0
 DWELL, MACHINE = 4.0, 53.0
+PAUSE, OPTIONAL_STOP = 0.0, 1.0
 
 
 def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = None) -> Toolpath:
@@ -46,17 +50,20 @@ def read_program(text: str, file: str, *, start: NDArray[np.float64] | None = No
         InputError: faults with line and column; all unreadable words at once, or the first block that makes no sense.
     """
     faults: list[Problem] = []
-    program = blocks(text, file, faults)
+    senseless: BadLine | None = None
+    interpreter = _Interpreter(ToolpathBuilder(file, start), start)
+    interpreter.path.ending = Ending.TEXT  # unless a block says otherwise
+    for block in blocks(text, file, faults):
+        if faults or senseless is not None:
+            continue  # the other lines are looked at for what cannot be read
+        try:
+            interpreter.run(block)
+        except BadLine as fault:
+            senseless = fault
     if faults:
         raise InputError(faults)
-    interpreter = _Interpreter(ToolpathBuilder(file, start), start)
-    try:
-        for block in program:
-            interpreter.run(block)
-    except BadLine as fault:
-        raise InputError([fault.problem]) from None
-    numbered = [int(block.words["N"].value) for block in program if "N" in block.words]
-    interpreter.path.numbers = tuple(numbered[:: max(len(numbered) - 1, 1)])
+    if senseless is not None:
+        raise InputError([senseless.problem])
     path = interpreter.path.built()
     if not path.is_move.any():
         raise InputError([Problem(file, 0, 0, "this program moves nothing", "check that it is the file you mean")])
@@ -76,7 +83,6 @@ class _Interpreter:
     def __init__(self, path: ToolpathBuilder, start: NDArray[np.float64] | None) -> None:
         self.path = path
         self._pose = np.full(6, np.nan) if start is None else np.array(start, dtype=np.float64)
-        self._moved = False
         self._motion: float | None = None
         self._speed = Feed(0.0, 0.0)
         self._unit_mm = 1.0
@@ -85,9 +91,10 @@ class _Interpreter:
 
     def run(self, block: Block) -> None:
         """Execute one block in the order that RS274/NGC gives [RS274/NGC 3.8]."""
-        for comment in block.comments:
-            if comment:
-                self.path.say(Step.COMMENT, comment, line=block.place.line)
+        if "N" in block.words:
+            numbered = int(block.words["N"].value)
+            self.path.numbers = (*self.path.numbers[:1], numbered)
+        self._said(block)
         self._units(block)
         self._feed(block)
         self._functions(block)
@@ -96,11 +103,22 @@ class _Interpreter:
             self.path.dwell(self._dwell_s(block), line=block.place.line)
         self._modes(block)
         self._move(block)
-        if block.code(Group.STOP) in {0.0, 1.0}:
-            self._pause(block)
+        self._stop(block)
         self._nothing_left(block)
         if len(self.path) > MOST_ROWS:
             raise _too_long(block)
+
+    def _said(self, block: Block) -> None:
+        if block.guard is not None:
+            if self._motion is not None:
+                what = "a guard against offsets after the first move"
+                raise block.place.fault(1, what, "compensate programs one by one")
+            self.path.guard = block.guard
+        for comment in block.comments:
+            if comment:
+                self.path.say(Step.COMMENT, comment, line=block.place.line)
+        if block.message:
+            self.path.say(Step.MESSAGE, block.message, line=block.place.line)
 
     def _units(self, block: Block) -> None:
         units = block.code(Group.UNITS)
@@ -130,7 +148,7 @@ class _Interpreter:
         if speed is not None and speed.value < 0.0:
             raise block.place.fault(speed.column, f"the spindle's speed is negative (S{speed.value:g})", "use M3 or M4")
         said = [block.words.pop("S", None), block.codes.get(Group.SPINDLE), block.codes.get(Group.COOLANT)]
-        text = " ".join(name(word.letter, word.value) for word in said if word is not None)
+        text = " ".join(f"{word.letter}{number(word.value)}" for word in said if word is not None)
         if text:
             self.path.say(Step.FUNCTION, text, line=block.place.line)
 
@@ -176,6 +194,10 @@ class _Interpreter:
             self._absolute_centres = centres == 90.1  # noqa: PLR2004
         if Group.CYCLE in block.codes:
             self._motion = None
+        if Group.OFFSET in block.codes:
+            system = name("G", block.codes[Group.OFFSET].value)
+            self.path.system = SYSTEMS.index(system) + 1
+            self.path.say(Step.SYSTEM, system, line=block.place.line)
         if Group.PATH in block.codes:
             self._path_control(block)
 
@@ -186,9 +208,6 @@ class _Interpreter:
             allowed, _ = block.words.pop("P", None), block.words.pop("Q", None)
             # LinuxCNC takes P0 for no bound, as if P were not there.
             corner = allowed.value * self._unit_mm if allowed is not None and allowed.value > 0.0 else math.inf
-        if self._moved and corner != self.path.corner_mm:
-            what = f"{name('G', word.value)} changes how corners are rounded on the way"
-            raise block.place.fault(word.column, what, "set path control once, before the first move")
         self.path.corner_mm = corner
 
     def _move(self, block: Block) -> None:
@@ -211,15 +230,21 @@ class _Interpreter:
             word = block.words[named[0]]
             raise block.place.fault(word.column, f"{word.letter} without a motion code", "write G0 or G1 before it")
         target = self._target(block)
+        axes, system = [AXES.index(letter) for letter in named], None if machine is None else MACHINE_SYSTEM
         if self._motion == RAPID:
-            self.path.rapid(target, line=block.place.line)
+            self.path.rapid(target, line=block.place.line, named=axes, system=system)
         else:
             self._check_feed(block, _first_column(block))
-            poses = target[None] if self._motion == LINEAR else self._chords(block, target)
-            self.path.feed(poses, self._speed.mm_min, self._speed.deg_min, line=block.place.line)
+            speed, line = self._speed, block.place.line
+            if self._motion == LINEAR:
+                self.path.feed(target[None], speed.mm_min, speed.deg_min, line=line, named=axes, system=system)
+            else:
+                arc = self._chords(block, target)
+                poses, chord = arc.poses(), arc.chord
+                self.path.feed(poses, speed.mm_min, speed.deg_min, line=line, named=axes, system=system, arc=chord)
         for letter in named:
             del block.words[letter]
-        self._pose, self._moved = target, True
+        self._pose = target
 
     def _check_machine(self, machine: Word, block: Block, named: list[str]) -> None:
         if self._motion not in {RAPID, LINEAR} or not named:
@@ -253,11 +278,11 @@ class _Interpreter:
             raise block.place.fault(_first_column(block), what, "check its numbers, and G91 and G20 before it")
         return np.array(target)
 
-    def _chords(self, block: Block, target: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _chords(self, block: Block, target: NDArray[np.float64]) -> Arc:
         arc = self._arc(block, target)
         if len(self.path) + arc.chords > MOST_ROWS:
             raise _too_long(block)
-        return arc.poses()
+        return arc
 
     def _arc(self, block: Block, target: NDArray[np.float64]) -> Arc:
         clockwise = self._motion == CLOCKWISE
@@ -295,11 +320,20 @@ class _Interpreter:
             raise block.place.fault(word.column, f"P{word.value:g} is no number of turns", "give a whole number from 1")
         return int(word.value)
 
-    def _pause(self, block: Block) -> None:
-        text = ""
-        if self.path.last_text.startswith(MESSAGE):
-            text = self.path.taken_back().removeprefix(MESSAGE).strip()
-        self.path.say(Step.PAUSE, text, line=block.place.line)
+    def _stop(self, block: Block) -> None:
+        stop = block.code(Group.STOP)
+        if stop == PAUSE:
+            self.path.say(Step.PAUSE, self._said_before(), line=block.place.line)
+        elif stop == OPTIONAL_STOP:
+            self.path.say(Step.OPTIONAL_STOP, "", line=block.place.line)
+        elif stop is not None:
+            self.path.ending = Ending(name("M", stop))
+
+    def _said_before(self) -> str:
+        """The message of a stop: the one before it, where it is written as a dialect would write it for the stop."""
+        text = self.path.last_text.removeprefix(MESSAGE)
+        is_own = self.path.last_kind == Step.MESSAGE and self.path.last_text == MESSAGE + text and text == plain(text)
+        return self.path.taken_back().removeprefix(MESSAGE) if is_own else ""
 
     def _nothing_left(self, block: Block) -> None:
         """Refuse words that nothing in the block has used: a control would stop there, or do something else."""

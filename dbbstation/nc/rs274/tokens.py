@@ -54,6 +54,20 @@ class Word(NamedTuple):
     column: int
 
 
+class Comment(NamedTuple):
+    """A comment.
+
+    Attributes:
+        text: between its brackets, or after its semicolon.
+        bracketed: whether it stands in brackets; LinuxCNC acts on those only.
+        column: where it begins, counted from 1.
+    """
+
+    text: str
+    bracketed: bool
+    column: int
+
+
 class BadLine(Exception):  # noqa: N818 - never leaves this package
     """One fault in one line, as a `Problem`."""
 
@@ -74,8 +88,8 @@ class Place:
         return BadLine(Problem(self.file, self.line, column, what, remedy))
 
 
-def tokens(text: str, place: Place) -> Iterator[Word | str]:
-    """Words and comments of a line, in order; comments as plain text.
+def tokens(text: str, place: Place) -> Iterator[Word | Comment]:
+    """Words and comments of a line, in order.
 
     Raises:
         BadLine: something that is neither.
@@ -92,7 +106,7 @@ def tokens(text: str, place: Place) -> Iterator[Word | str]:
         elif kind == "end":
             return
         else:
-            yield match[kind or 0].strip()
+            yield Comment(match[kind or 0], kind == "comment", match.start(kind or 0))
 
 
 def _word(match: re.Match[str], place: Place) -> Word:

@@ -1,0 +1,133 @@
+"""The curve to command so that the tool goes along a toolpath: the machine model inverted at places of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.model.compensation import begun, compensated_on
+from dbbstation.sources.contract import Motion
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.model.compensation import Passed
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.nc.toolpath import Toolpath
+
+LEVER_MM = 100.0
+"""The tilt between points may be off by as much as moves a point this far from the tool tip by the chord error."""
+
+PLACES_AT_ONCE = 4096
+"""Places that are inverted together: enough for arrays to be quick, and few megabytes."""
+
+HOLDING = 3
+"""Rounds in which the wanted tilt is moved until the commanded one is what the program says; each leaves a thousandth."""
+
+
+class Curve:
+    """What to command along a toolpath.
+
+    A place is a number: the row that it lies in and the share of it that is behind it, so that a row ends at the number
+    of the next one.
+
+    Args:
+        toolpath: as the tool should go.
+        model: calibrated model; what belongs to the machine is inverted.
+        started_s: start of the program on the time scale of the model's sessions [s]; None where not known.
+        hold_tilt: command A, B and C as they are programmed, and correct the tool tip alone.
+    """
+
+    def __init__(
+        self, toolpath: Toolpath, model: MachineModel, started_s: float | None, *, hold_tilt: bool = False
+    ) -> None:
+        self.toolpath = toolpath
+        self._model = model
+        self._started_s = started_s
+        self._hold_tilt = hold_tilt
+        self._known = ~np.isnan(toolpath.before[:, 0])
+        self.leads_on = self._known & ((toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0))
+        has_history = any(fitted.source.has_history for fitted in model.of_the_machine().sources)
+        self._waits = self._known & ~self.leads_on & (toolpath.duration_s > 0.0) & has_history
+        self.tilt_left_mm = 0.0
+        """Largest correction of the tilt that was left out so far, as felt at `LEVER_MM` [mm]."""
+
+    def at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Poses to command at places in the order in which the program comes to them, shape (k, 6) [mm, deg].
+
+        Rows that do not move take over the pose before them; NaN before the machine's place is known. Where the model has a
+        history, the end of those that last a while is inverted as well, and what is commanded for it is commanded for the
+        move before: what acts in time comes to rest there.
+
+        Raises:
+            KinematicsError: a pose that the machine cannot take.
+            ModelError: a source needs what a program does not give.
+        """
+        path = self.toolpath
+        row, share = row_and_share(places)
+        # In time order: where the machine stands first.
+        first = int(np.argmax(self._known))
+        moves = self.leads_on[row] & (places > first)
+        taken = moves | (self._waits[row] & (share == 1.0))
+        if not moves.any():
+            return np.where(self._known[row][:, None], path.poses[row], np.nan)
+        poses = np.vstack([path.before[first], path.between(row[taken], share[taken])])
+        time_s = None
+        if self._started_s is not None:
+            begin_s = path.end_s - path.duration_s
+            there_s = begin_s[row[taken]] + share[taken] * path.duration_s[row[taken]]
+            time_s = self._started_s + np.concatenate([begin_s[first][None], there_s])
+        inverse = self._inverted(Motion(poses=poses, is_path=True, time_s=time_s))
+        behind = np.cumsum(taken)
+        # Until the next place that leads somewhere the machine stands where it comes to rest.
+        rests = np.append(~moves[1:], False)
+        resting = np.flatnonzero(~rests)
+        at_rest = behind[resting[np.searchsorted(resting, np.arange(len(row)))]]
+        return np.where(self._known[row][:, None], inverse[at_rest], np.nan)
+
+    def _inverted(self, wanted: Motion) -> NDArray[np.float64]:
+        """Invert stretch by stretch: what a source with a history remembers goes from each to the next."""
+        passed: Passed | None = None
+        parts = []
+        for start in range(0, len(wanted), PLACES_AT_ONCE):
+            stretch = wanted.stretch(slice(start, start + PLACES_AT_ONCE))
+            part, passed = self._stretch(passed or begun(self._model, stretch), stretch)
+            parts.append(part)
+        return np.concatenate(parts)
+
+    def _stretch(self, passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64], Passed]:
+        command, behind = compensated_on(passed, wanted)
+        if not self._hold_tilt:
+            return command, behind
+        programmed = wanted.poses[:, 3:]
+        left = np.hstack([np.zeros((len(command), 3)), command[:, 3:] - programmed])
+        self.tilt_left_mm = max(self.tilt_left_mm, float(felt_mm(left).max(initial=0.0)))
+        held = wanted.poses.copy()
+        for _ in range(HOLDING):
+            held[:, 3:] += programmed - command[:, 3:]
+            command, behind = compensated_on(passed, replace(wanted, poses=held))
+        return np.hstack([command[:, :3], programmed]), behind
+
+
+def row_and_share(places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Rows and the shares of them that are behind, shapes (k,); the end of a row belongs to it, its begin does not."""
+    row = np.maximum(np.ceil(places).astype(np.int64) - 1, 0)
+    return row, places - row
+
+
+def felt_mm(off: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What differences of poses, shape (k, 6), are at the tip or, where more, by their tilt at the lever, (k,) [mm].
+
+    Zero where a place is not known.
+    """
+    lengths = in_mm(off)
+    moved, tilted = np.linalg.norm(lengths[:, :3], axis=1), np.linalg.norm(lengths[:, 3:], axis=1)
+    felt: NDArray[np.float64] = np.nan_to_num(np.maximum(moved, tilted))
+    return felt
+
+
+def in_mm(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Poses, shape (k, 6), with angles as the way of a point at the lever [mm]."""
+    return poses * np.repeat([1.0, np.radians(LEVER_MM)], 3)

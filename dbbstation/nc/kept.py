@@ -1,0 +1,89 @@
+"""Whether a compensated program keeps the chord error and the feed that were asked for, and what it costs to give one up."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import StationError
+from dbbstation.nc.compensate import Prefer
+
+if TYPE_CHECKING:
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.nc.compensate import Compensation, Slow
+
+CHOICES = "--prefer accuracy (slower), feed (less accurate) or position-only (A, B and C as they are)"
+
+LEVER = "100 mm from the tip"
+
+
+def check_chord(
+    name: str, done: Compensation, asked_um: float, accepted_um: float | None, prefer: Prefer | None
+) -> None:
+    """Refuse a program that leaves the path by more than was asked for, unless a larger number was accepted.
+
+    Raises:
+        StationError: names the line and what is reached.
+    """
+    if prefer is Prefer.FEED or done.chord_um <= max(asked_um, accepted_um or 0.0):
+        return
+    raise StationError(
+        f"the path is kept within {up(done.chord_um)} µm here, not within {asked_um:g} µm: the correction has a step, or bends "
+        "more than the shortest pieces follow",
+        where=where(name, done.chord_line),
+        remedy=f"accept it with --accept-chord-um {up(done.chord_um)}, or give a --chord-um that can be kept",
+    )
+
+
+def check_feed(name: str, done: Compensation, asked_um: float, machine: Machine, prefer: Prefer | None) -> None:
+    """Refuse a program that the control runs slower than the one that it was made from, unless that was preferred.
+
+    Raises:
+        StationError: names the line and the feed that can be reached.
+    """
+    if done.slow is not None and prefer is not Prefer.ACCURACY:
+        raise too_slow(name, done.slow, asked_um, machine, prefer)
+
+
+def too_slow(name: str, slow: Slow, asked_um: float, machine: Machine, prefer: Prefer | None) -> StationError:
+    """Return the refusal of a feed that cannot be kept."""
+    within = f" within {asked_um:g} µm" if prefer is None else f" with --prefer {prefer.value} either"
+    ways = [f"give F{math.floor(slow.reached_mm_min)} or less"]
+    if prefer is None and not math.isnan(slow.chord_um) and slow.chord_um > asked_um:
+        ways.append(f"--chord-um {up(slow.chord_um / 0.95)}")
+    ways.append(CHOICES if prefer is None else f"--prefer {Prefer.ACCURACY.value}")
+    return StationError(
+        f"F{slow.asked_mm_min:g} cannot be kept{within}: the control reaches F{math.floor(slow.reached_mm_min)} here, with "
+        f"{said_acceleration(machine)}",
+        where=where(name, slow.line),
+        remedy=", or ".join(ways),
+    )
+
+
+def said_acceleration(machine: Machine) -> str:
+    """Return the acceleration that was reckoned with, and whether the machine file says it."""
+    known = "" if machine.acceleration_mm_s2 is not None else " (the machine file has no `acceleration_mm_s2`)"
+    return f"{machine.planned_acceleration_mm_s2 / 1e3:g} m/s²{known}"
+
+
+def cost(done: Compensation, asked_um: float, prefer: Prefer) -> str:
+    """Return what a preference costs, in µm and seconds."""
+    slower = f"{max(done.seconds - done.nominal_seconds, 0.0):.1f} s more than {done.nominal_seconds:.1f} s at feed"
+    if prefer is Prefer.ACCURACY:
+        return f"--prefer accuracy costs {slower}"
+    if prefer is Prefer.FEED:
+        return f"--prefer feed costs a chord error of {up(done.chord_um)} µm in place of {asked_um:g} µm, and {slower}"
+    return f"--prefer position-only leaves a tilt that is felt as {up(done.tilt_um)} µm {LEVER}, and costs {slower}"
+
+
+def where(name: str, line: int) -> str:
+    """Return the place of a line in a program."""
+    return f"{name}:{line}" if line else name
+
+
+def up(value: float) -> str:
+    """A number with two digits, rounded up."""
+    if value <= 0.0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.ceil(value / unit - 1e-9) * unit:.4g}"

@@ -1,0 +1,165 @@
+"""The mark of a compensated program in its own geometry: the last decimals of its poses.
+
+Each pose of a compensated program is moved by the last decimal of its angles, or of X, Y and Z where the angles stand still,
+until a hash of its six written numbers begins with zero bits (`BITS`), as few poses of any other program do by chance. The mark is in every pose, so it survives what texts do not: comments and line numbers taken out or changed, numbers
+spelt otherwise, feeds changed, lines added, moved or deleted. It does not survive other geometry: fewer decimals, another place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import bdtrc
+
+from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.toolpath import Toolpath
+
+BITS = {2: 16, 3: 11, 4: 7}
+"""Bits of the hash that are zero, by the number of poses that can carry the mark, 4 for four and more. One pose in 2 to this power has
+as many by chance. More bits move poses farther."""
+
+BY_CHANCE = 5e-9
+"""Probability with which a program that is not compensated is taken for one, for each number of bits: in all about as rare as its own
+checksum of eight digits. Two poses with the mark are enough."""
+
+LEAST_WAY_MM, LEAST_TURN_DEG, LEAST_ONLY_TURN_DEG = 1e-3, 1e-6, 1e-3
+"""An axis is moved by the mark only where it moves itself by more than this, before and after the pose: what stands still must go
+on standing still (an axis that a rapid leaves in another coordinate system, too), and F, which counts along the way, must go on taking its time within half a percent."""
+
+FARTHEST_PLACE, FARTHEST_ANGLE, FARTHEST_ANGLE_OF_FEW = 1, 3, 9
+"""Greatest steps of the last decimals of X, Y, Z and of A, B, C: a nanometre; half a nanometre, or three, at a point 100 mm from the
+tip. Where A, B and C stand still one pose in five has the mark; thirty poses are enough then."""
+
+_SCALE = np.repeat([10.0**DECIMALS_MM, 10.0**DECIMALS_DEG], 3)
+_FELT_NM = np.array([1.0, 1.0, 1.0, 0.17, 0.17, 0.17])
+"""What the last decimal is worth, of an angle at a point 100 mm from the tip [nm]."""
+
+_ODD = np.array(
+    [
+        0x9E3779B97F4A7C15,
+        0xC2B2AE3D27D4EB4F,
+        0x165667B19E3779F9,
+        0xD6E8FEB86659FD93,
+        0xA0761D6478BD642F,
+        0xE7037ED1A0B428DB,
+    ],
+    dtype=np.uint64,
+)
+"""Odd numbers of 64 bits with about as many ones as zeros, one for each axis. They are part of what compensated programs are
+known by: never change them."""
+
+
+def marked(toolpath: Toolpath) -> Toolpath:
+    """Return a compensated toolpath with the mark in its poses, which are rounded as they will be written."""
+    moves = np.flatnonzero(toolpath.is_move)
+    if not len(moves):
+        return toolpath
+    numbers = _numbers(toolpath.poses[moves])
+    free = _free(toolpath, moves)
+    can = np.flatnonzero(free.any(axis=1))
+    bits = BITS[min(max(len(np.unique(_sums(numbers[can]))), 2), 4)]  # a pose that comes again counts once
+    if bits == BITS[4]:
+        _mark_many(numbers, free, can)
+    else:
+        _mark_few(numbers, free, can, bits)
+    poses = toolpath.poses.copy()
+    poses[moves] = numbers / _SCALE
+    # Rows between moves stand where the move before them ended.
+    before = np.searchsorted(moves, np.arange(len(poses)), side="right") - 1
+    stands = ~toolpath.is_move & (before >= 0)
+    poses[stands] = poses[moves[before[stands]]]
+    return replace(toolpath, poses=poses)
+
+
+def is_marked(toolpath: Toolpath) -> bool:
+    """Whether more poses of a toolpath have the mark than chance gives."""
+    sums = np.unique(_sums(_numbers(toolpath.poses[toolpath.is_move])))
+    for bits in BITS.values():
+        hits = int(np.count_nonzero(_has_mark(sums, bits)))
+        if hits > 0 and float(bdtrc(hits - 1, len(sums), 0.5**bits)) < BY_CHANCE:
+            return True
+    return False
+
+
+def _mark_many(numbers: NDArray[np.int64], free: NDArray[np.bool_], missing: NDArray[np.int64]) -> None:
+    """Move these rows of six by the steps that are felt least, step by step; those that no step gives the mark stay."""
+    sums = _sums(numbers)
+    missing = missing[~_has_mark(sums[missing], BITS[4])]
+    for steps in _steps(FARTHEST_ANGLE, 1):
+        if not len(missing):
+            break
+        may = free[missing][:, steps != 0].all(axis=1)
+        found = may & _has_mark(sums[missing] + _sums(steps), BITS[4])
+        numbers[missing[found]] += steps
+        missing = missing[~found]
+
+
+def _mark_few(numbers: NDArray[np.int64], free: NDArray[np.bool_], rows: NDArray[np.int64], bits: int) -> None:
+    """The same for a few rows, each with more bits, for which there are more steps."""
+    steps = _steps(FARTHEST_ANGLE_OF_FEW, FARTHEST_ANGLE_OF_FEW)
+    sums = _sums(steps)
+    for row in rows:
+        allowed = ~(steps[:, ~free[row]] != 0).any(axis=1)
+        found = np.flatnonzero(allowed & _has_mark(_sums(numbers[row]) + sums, bits))
+        if len(found):
+            numbers[row] += steps[found[0]]
+
+
+def _numbers(poses: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Poses in units of their last decimals."""
+    numbers: NDArray[np.int64] = np.rint(poses * _SCALE).astype(np.int64)
+    return numbers
+
+
+def _sums(numbers: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Weighted sum of each row of six; that of a row that is moved by some steps is the sum of both."""
+    with np.errstate(over="ignore"):
+        weighted: NDArray[np.uint64] = (numbers.astype(np.uint64) * _ODD).sum(axis=-1, dtype=np.uint64)
+    return weighted
+
+
+def _has_mark(sums: NDArray[np.uint64], bits: int) -> NDArray[np.bool_]:
+    """Whether a sum, spread evenly over 64 bits, begins with so many zeros. [finaliser of SplitMix64, Steele et al. 2014]."""
+    with np.errstate(over="ignore"):
+        mixed = (sums ^ (sums >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    marked_ones: NDArray[np.bool_] = (mixed ^ (mixed >> np.uint64(31))) >> np.uint64(64 - bits) == 0
+    return marked_ones
+
+
+def _free(toolpath: Toolpath, moves: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Axes that each move may have moved by a few last decimals, shape (m, 6)."""
+    poses = toolpath.poses[moves]
+    way = np.abs(np.diff(poses, axis=0))
+    tips = way[:, :3].max(axis=1) > 0.0
+    least = np.where(tips[:, None], [LEAST_WAY_MM] * 3 + [LEAST_TURN_DEG] * 3, [np.inf] * 3 + [LEAST_ONLY_TURN_DEG] * 3)
+    moving: NDArray[np.bool_] = way > least
+    free = np.ones(poses.shape, dtype=np.bool_)
+    free[:-1] &= moving
+    free[1:] &= moving
+    free[0] &= toolpath.start is None
+    return free
+
+
+@cache
+def _steps(angle: int, angle_and_place: int) -> NDArray[np.int64]:
+    """Steps of the six last decimals, shape (k, 6), the least felt first; none at the beginning.
+
+    Args:
+        angle: greatest step of angles where X, Y and Z stay.
+        angle_and_place: greatest step of angles where X, Y and Z move too.
+    """
+    alone, beside = np.arange(-angle, angle + 1), np.arange(-angle_and_place, angle_and_place + 1)
+    place = np.arange(-FARTHEST_PLACE, FARTHEST_PLACE + 1)
+    both = np.stack(np.meshgrid(*[place] * 3, *[beside] * 3, indexing="ij"), axis=-1).reshape(-1, 6)
+    turned = np.stack(np.meshgrid(*[[0]] * 3, *[alone] * 3, indexing="ij"), axis=-1).reshape(-1, 6)
+    tried = np.unique(np.vstack([both, turned]), axis=0).astype(np.int64)
+    ordered: NDArray[np.int64] = tried[np.argsort(np.linalg.norm(_FELT_NM * tried, axis=1), kind="stable")]
+    return ordered

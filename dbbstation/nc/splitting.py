@@ -1,0 +1,307 @@
+"""Moves in pieces: the curve to command is looked at closely, and the pieces that follow it are chosen among its places."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.errors import StationError
+from dbbstation.nc.curve import felt_mm, in_mm, row_and_share
+from dbbstation.nc.pieces import longest, truest
+from dbbstation.nc.toolpath import Step, in_pieces
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.model.machine_model import MachineModel
+    from dbbstation.nc.curve import Curve
+    from dbbstation.nc.toolpath import Toolpath
+
+FIRST_CELL_MM, FIRST_CELL_DEG = 50.0, 5.0
+"""Moves are looked at in cells of at most this size before any is halved."""
+
+OF_A_PERIOD = 0.25
+"""Before any is halved, cells are at most this share of the shortest period in the model: start, middle and end of a longer
+one can all lie on the zeros of a wave. On 150 lines with drawn screw errors the worst place was 2.0 µm off without this,
+0.11 µm with the whole period or half of it, 0.10 µm with a quarter or a tenth [docs/nc.md]."""
+
+LOOKED_AT = np.array([0.19, 0.5, 0.73, 1.0])
+"""Shares of a cell at which the curve is taken: not evenly spaced, so that no wave is met at its zeros each time."""
+
+FINER = 16.0
+"""Cells are halved until the curve leaves their chord by less than this part of the tolerance: pieces then begin and end
+within a fraction of their length of where they best would, and what lies between two places can be neglected."""
+
+OF_THE_TOLERANCE = 0.95
+"""Share of the tolerance that pieces may take at the places: between them the curve goes a little farther."""
+
+SHORTEST_MM, SHORTEST_DEG = 0.05, 0.01
+"""Cells are not halved below this: a step of the correction (backlash at a strut's reversal) has no chord that fits,
+and is placed within this distance."""
+
+SHORTEST_OF_NEEDED = 8.0
+"""Where the feed decides, cells are not halved below this part of the length that it needs."""
+
+HISTORY_MM, HISTORY_DEG = 5.0, 1.0
+"""Steps in which rapids are followed for the sake of backlash and friction; they are written as one move all the same,
+since nothing is cut on the way."""
+
+ALMOST = 0.999
+"""Moves that are shorter than needed by less are long enough."""
+
+COSINE = 0.97
+"""Of the greatest angle at which a curve in short lines goes on, 14 degrees."""
+
+MOST_CELLS = 1_000_000
+"""As many as `rs274.reader.MOST_ROWS`: the path itself is held in memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Places where pieces begin and end, as `Curve` counts them, shapes (k,)."""
+
+    begin: NDArray[np.float64]
+    end: NDArray[np.float64]
+
+    @property
+    def row(self) -> NDArray[np.int64]:
+        """The row that each ends in, shape (k,)."""
+        return row_and_share(self.end)[0]
+
+    def places(self, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Places at shares of each piece, in order, shape (k, len(shares)); a share of 1 is its end to the last bit."""
+        inside = self.begin[:, None] + (self.end - self.begin)[:, None] * shares
+        return np.where(shares == 1.0, self.end[:, None], inside)
+
+
+def rows_as_pieces(toolpath: Toolpath) -> Pieces:
+    """Return one piece for each row, rapids in steps for the sake of sources with a history."""
+    history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
+    return _in(toolpath, np.where(toolpath.kind == Step.RAPID, history, 1.0))
+
+
+def moves_of(toolpath: Toolpath) -> NDArray[np.int64]:
+    """Number of the written move that each row belongs to, shape (n,): all chords of an arc belong to one."""
+    goes_on = np.zeros(len(toolpath), dtype=np.bool_)
+    if toolpath.arc is not None and len(toolpath) > 1:
+        same = (toolpath.arc[1:] == toolpath.arc[:-1]).all(axis=1) & (toolpath.arc[1:, 2] != 0.0)
+        goes_on[1:] = same & (toolpath.line[1:] == toolpath.line[:-1]) & (toolpath.kind[1:] == toolpath.kind[:-1])
+    moves: NDArray[np.int64] = np.cumsum(~goes_on) - 1
+    return moves
+
+
+def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Number of the run that each row belongs to, shape (n,): a written move, or several that are shorter than their feed needs.
+
+    Such moves follow each other at one F, in one work system, with corners that may be rounded, and go on in nearly the same
+    direction: a curve in short lines, whose pieces may join any of its points.
+
+    Args:
+        toolpath: in rows.
+        needed_mm: length of a piece that keeps the feed of each row, shape (n,).
+    """
+    moves = moves_of(toolpath)
+    if len(toolpath) < 2:  # noqa: PLR2004 - a pair
+        return moves
+    cuts = (toolpath.kind == Step.FEED) & (toolpath.tip_mm > 0.0)
+    short = cuts & (np.bincount(moves, weights=toolpath.tip_mm)[moves] < ALMOST * needed_mm)
+    way = toolpath.poses[:, :3] - toolpath.before[:, :3]
+    along = np.einsum("ni,ni->n", way[1:], way[:-1]) >= COSINE * toolpath.tip_mm[1:] * toolpath.tip_mm[:-1]
+    alike = (toolpath.feed[1:] == toolpath.feed[:-1]) & (toolpath.system[1:] == toolpath.system[:-1])
+    joined = (short[1:] | short[:-1]) & cuts[1:] & cuts[:-1] & along & alike & (toolpath.corners_mm[:-1] != 0.0)
+    joined |= moves[1:] == moves[:-1]
+    runs: NDArray[np.int64] = np.concatenate([[0], np.cumsum(~joined)])
+    return runs
+
+
+def split(
+    curve: Curve,
+    model: MachineModel,
+    tolerance_mm: float,
+    needed_mm: NDArray[np.float64],
+    runs: NDArray[np.int64],
+    *,
+    for_feed: bool,
+    whole: NDArray[np.bool_],
+) -> tuple[Pieces, dict[int, float]]:
+    """Return the pieces in which a toolpath is written.
+
+    Args:
+        curve: to follow.
+        model: whose shortest period says how closely to look.
+        tolerance_mm: greatest distance of a piece from the curve.
+        needed_mm: length of a piece that keeps the feed, for each row; 0 where any does, shape (n,).
+        runs: number of the run that each row belongs to, within which pieces may end anywhere, shape (n,).
+        for_feed: where the two cannot both be had, keep the feed.
+        whole: rows that are one piece each, shape (n,).
+
+    Returns:
+        The pieces, and for each run whose longest pieces are shorter than needed: its number, and how near to the curve
+        pieces of the needed length are [mm].
+
+    Raises:
+        StationError: the path has too many cells.
+    """
+    cells, at = _cells(curve, model, tolerance_mm, needed_mm / SHORTEST_OF_NEEDED if for_feed else None, whole)
+    off_mm = cell_off_mm(at)
+    toolpath, row = curve.toolpath, cells.row
+    # What needs no choice: what is no move at feed, and moves that are one cell near the curve.
+    number = runs[row]
+    chosen = (toolpath.kind[row] == Step.FEED) & curve.leads_on[row] & ~whole[row]
+    alone = np.bincount(number)[number] == 1
+    chosen &= ~alone | (off_mm > OF_THE_TOLERANCE * tolerance_mm)
+    begins, ends = [cells.begin[~chosen]], [cells.end[~chosen]]
+    short: dict[int, float] = {}
+    places = cells.places(LOOKED_AT)
+    for of in _runs(number, chosen):
+        nodes = _Nodes(
+            curve, cells.begin[of[0]], places[of], at[of], (off_mm[of] > tolerance_mm) & np.logical_not(for_feed)
+        )
+        least = float(needed_mm[row[of]].max())
+        ended = longest(nodes.way, nodes.at, nodes.may_end, OF_THE_TOLERANCE * tolerance_mm)
+        if nodes.shortest(ended) < least:
+            kept = truest(nodes.way, nodes.at, nodes.may_end, least)
+            short[int(number[of[0]])] = nodes.distance_mm(kept)
+            ended = kept if for_feed else ended
+        begins.append(nodes.places[np.concatenate([[0], ended[:-1]])])
+        ends.append(nodes.places[ended])
+    end = np.concatenate(ends)
+    order = np.argsort(end, kind="stable")
+    return Pieces(np.concatenate(begins)[order], end[order]), short
+
+
+class _Nodes:
+    """Places of one move between which its pieces are chosen."""
+
+    def __init__(
+        self,
+        curve: Curve,
+        begin: float,
+        places: NDArray[np.float64],
+        at: NDArray[np.float64],
+        steps: NDArray[np.bool_],
+    ) -> None:
+        toolpath = curve.toolpath
+        self.places = np.concatenate([[begin], places.reshape(-1)])
+        self.at = in_mm(np.vstack([at[0, :1], at[:, 1:].reshape(-1, 6)]))
+        # A cell with a step in it is not cut again.
+        inner = np.ones(places.shape, dtype=np.bool_)
+        inner[steps, :-1] = False
+        self.may_end = np.concatenate([[True], inner.reshape(-1)])
+        row, share = row_and_share(self.places[1:])
+        length = toolpath.tip_mm if toolpath.tip_mm[row].any() else toolpath.turn_deg
+        behind = np.concatenate([[0.0], np.cumsum(length[row[0] : row[-1] + 1])])
+        way = behind[row - row[0]] + share * length[row]
+        first = (begin - row[0]) * length[row[0]]
+        self.way = np.concatenate([[first], way])
+
+    def shortest(self, ended: NDArray[np.int64]) -> float:
+        """Length of the shortest piece."""
+        return float(np.diff(self.way[np.concatenate([[0], ended])]).min())
+
+    def distance_mm(self, ended: NDArray[np.int64]) -> float:
+        """Greatest distance of a place from its piece [mm]."""
+        nodes = np.concatenate([[0], ended])
+        on = np.column_stack([np.interp(self.way, self.way[nodes], self.at[nodes, axis]) for axis in range(6)])
+        off = self.at - on
+        return float(np.maximum(np.linalg.norm(off[:, :3], axis=1), np.linalg.norm(off[:, 3:], axis=1)).max())
+
+
+def cell_off_mm(at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far the curve leaves the chord of each cell at the places that are looked at, shape (k,) [mm].
+
+    Args:
+        at: poses at the begin of each cell and at `LOOKED_AT`, shape (k, 1 + len(LOOKED_AT), 6).
+    """
+    begin, end = at[:, 0], at[:, -1]
+    off = [felt_mm(at[:, 1 + k] - (begin + share * (end - begin))) for k, share in enumerate(LOOKED_AT[:-1])]
+    worst: NDArray[np.float64] = np.max(off, axis=0)
+    return worst
+
+
+def with_begins(at_places: NDArray[np.float64], start: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Poses at places of each piece, shape (k, m, 6), with that at its begin before them, shape (k, 1 + m, 6).
+
+    Args:
+        at_places: the last place of each piece is its end.
+        start: pose before the first piece, shape (6,).
+    """
+    begins = np.vstack([start, at_places[:-1, -1]])
+    # Where nobody knows where the machine stands, a piece begins where it ends.
+    begins = np.where(np.isnan(begins), at_places[:, -1], begins)
+    return np.concatenate([begins[:, None], at_places], axis=1)
+
+
+def looked_at(curve: Curve, pieces: Pieces, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Poses of the curve at the begin and at shares of each piece, the last of them 1, shape (k, 1 + len(shares), 6)."""
+    first = curve.toolpath.before[:1]
+    places = np.concatenate([[0.0], pieces.places(shares).reshape(-1)])
+    at = curve.at(places)
+    start = at[0] if len(first) else np.full(6, np.nan)
+    return with_begins(at[1:].reshape(len(pieces.end), len(shares), 6), start)
+
+
+def _cells(
+    curve: Curve,
+    model: MachineModel,
+    tolerance_mm: float,
+    shortest_mm: NDArray[np.float64] | None,
+    whole: NDArray[np.bool_],
+) -> tuple[Pieces, NDArray[np.float64]]:
+    toolpath = curve.toolpath
+    history = np.maximum(toolpath.tip_mm / HISTORY_MM, toolpath.turn_deg / HISTORY_DEG)
+    cutting = np.maximum(toolpath.tip_mm / FIRST_CELL_MM, toolpath.turn_deg / FIRST_CELL_DEG)
+    cutting = np.maximum(cutting, _way_mm(toolpath, model.machine) / (OF_A_PERIOD * model.shortest_period_mm))
+    cells = _in(toolpath, np.where(whole, 1.0, np.where(toolpath.kind == Step.RAPID, history, cutting)))
+    while True:
+        at = looked_at(curve, cells, LOOKED_AT)
+        row, share = cells.row, cells.end - cells.begin
+        way_mm, turn_deg = share * toolpath.tip_mm[row], share * toolpath.turn_deg[row]
+        can = (way_mm > SHORTEST_MM) | (turn_deg > SHORTEST_DEG)
+        if shortest_mm is not None:
+            can &= (way_mm > shortest_mm[row]) | (toolpath.tip_mm[row] == 0.0)
+        at_feed = (toolpath.kind[row] == Step.FEED) & curve.leads_on[row] & ~whole[row]
+        bent = at_feed & can & (cell_off_mm(at) > tolerance_mm / FINER)
+        if not bent.any():
+            return cells, at
+        _check_number(toolpath, len(row) + int(bent.sum()))
+        again = 1 + bent.astype(np.int64)
+        part, within = in_pieces(again)
+        width = (cells.end - cells.begin)[part]
+        begin = cells.begin[part] + width * (within - 1.0 / again[part])
+        cells = Pieces(begin, np.where(within == 1.0, cells.end[part], cells.begin[part] + width * within))
+
+
+def _in(toolpath: Toolpath, number: NDArray[np.float64]) -> Pieces:
+    number = np.maximum(np.ceil(np.nan_to_num(number)), 1.0)
+    _check_number(toolpath, number.sum())
+    row, end = in_pieces(number.astype(np.int64))
+    return Pieces(row + (end - 1.0 / number[row]), row + end)
+
+
+def _way_mm(toolpath: Toolpath, machine: Machine) -> NDArray[np.float64]:
+    """Bound of the way of the tool tip and of every platform joint in each row, which bounds a strut's, shape (n,) [mm].
+
+    The platform turns by the three angles one after the other: by their sum at most, √3 times the root of their squares.
+    """
+    reach_mm = float(np.linalg.norm(machine.hexapod.platform_joints_mm, axis=1).max())
+    return toolpath.tip_mm + math.sqrt(3.0) * reach_mm * np.radians(toolpath.turn_deg)
+
+
+def _check_number(toolpath: Toolpath, cells: float) -> None:
+    if cells > MOST_CELLS:
+        what = f"the path is too long to be compensated at once: {cells:.0f} pieces, at most {MOST_CELLS}"
+        raise StationError(what, where=toolpath.name, remedy="compensate it in parts, or allow a larger chord error")
+
+
+def _runs(number: NDArray[np.int64], chosen: NDArray[np.bool_]) -> Iterator[NDArray[np.int64]]:
+    """Numbers of the chosen cells of each move."""
+    which = np.flatnonzero(chosen)
+    if len(which):
+        yield from np.split(which, np.flatnonzero(np.diff(number[which])) + 1)

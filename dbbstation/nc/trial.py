@@ -1,0 +1,211 @@
+"""The trial of a dialect: whether it reads what it wrote, row by row, or says that it has no words for it.
+
+Everything that a toolpath can hold is written and read back, each thing by itself and then all that the dialect has words for
+in one program, in order. What a dialect drops, changes or moves elsewhere is a fault; what it refuses by an error is none.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from dbbstation.errors import StationError
+from dbbstation.nc.toolpath import MACHINE_SYSTEM, SYSTEMS, Ending, Step, ToolpathBuilder
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.dialect import Dialect
+    from dbbstation.nc.toolpath import Toolpath
+
+FIRST = np.array([10.0, -20.0, -1000.0, 1.0, -2.0, 3.0])
+SECOND = np.array([10.5, -20.0, -1000.0, 1.0, -2.0, 3.5])
+
+POSE_WITHIN = 1e-3
+"""How far a pose may be read from where it was written: decimals are the dialect's own affair [mm, deg]."""
+
+SHARE_WITHIN = 1e-4
+"""The same for feeds and dwells, as a share."""
+
+
+def faults_of(dialect: Dialect) -> list[str]:
+    """What a dialect reads otherwise than it wrote it, a sentence each; empty where it may be used.
+
+    Raises:
+        Exception: whatever the dialect raises while it writes moves, or reads what it wrote.
+    """
+    moves = _built([_moves])
+    read = _read(dialect, moves)
+    places = read.poses[read.is_move]
+    if places.shape != (2, 6) or not np.allclose(places, [FIRST, SECOND], atol=POSE_WITHIN):
+        return ["it does not read the two moves that it wrote"]
+    faults = _differences(moves, read, "two moves")
+    has_words: list[Callable[[ToolpathBuilder], None]] = [_moves]
+    for what, add in THINGS.items():
+        wrote = _built([_moves, add])
+        try:
+            text = dialect.write(wrote)
+        except StationError:
+            continue  # it has no words for this, and says so
+        has_words.append(add)
+        try:
+            read = dialect.read(text, "trial" + dialect.extension)
+        except StationError as error:
+            faults.append(f"it does not read what it wrote of {what}: {str(error).splitlines()[0]}")
+        else:
+            faults += _differences(wrote, read, what)
+    if not faults:
+        wrote = _built(has_words)
+        faults = _differences(wrote, _read(dialect, wrote), "all in one program")
+    return faults
+
+
+def _from_first(by: list[float]) -> NDArray[np.float64]:
+    """The first pose, moved by as much [mm, deg]."""
+    return FIRST + np.array(by)
+
+
+def _moves(path: ToolpathBuilder) -> None:
+    path.rapid(FIRST)
+    path.feed(SECOND[None], 600.0)
+
+
+def _feeds(path: ToolpathBuilder) -> None:
+    path.feed(FIRST[None], 1234.5)
+    path.feed(_from_first([0, 0, 0, 2, 0, 0])[None], 90.0)
+    path.feed(SECOND[None], 0.25)
+
+
+def _dwell(path: ToolpathBuilder) -> None:
+    path.dwell(0.5)
+    path.dwell(12.25)
+
+
+def _said(kind: Step, *texts: str) -> Callable[[ToolpathBuilder], None]:
+    def add(path: ToolpathBuilder) -> None:
+        for number, text in enumerate(texts):
+            path.say(kind, text)
+            path.feed(_from_first([number, 1, 0, 0, 0, 0])[None], 500.0)
+
+    return add
+
+
+def _systems(path: ToolpathBuilder) -> None:
+    path.say(Step.SYSTEM, "G55")
+    path.system = SYSTEMS.index("G55") + 1
+    path.rapid(FIRST)
+
+
+def _machine(path: ToolpathBuilder) -> None:
+    path.rapid(_from_first([0, 0, 50, 0, 0, 0]), system=MACHINE_SYSTEM)
+    path.rapid(FIRST)
+
+
+def _corners(path: ToolpathBuilder) -> None:
+    for number, corner_mm in enumerate((0.0, 0.02, np.inf)):
+        path.corner_mm = corner_mm
+        path.feed(_from_first([0, 1 + number, 0, 0, 0, 0])[None], 500.0)
+
+
+def _guard(path: ToolpathBuilder) -> None:
+    path.guard = ()
+
+
+def _ends(ending: Ending) -> Callable[[ToolpathBuilder], None]:
+    def add(path: ToolpathBuilder) -> None:
+        path.ending = ending
+
+    return add
+
+
+THINGS: dict[str, Callable[[ToolpathBuilder], None]] = {
+    "feeds": _feeds,
+    "dwells": _dwell,
+    "stops": _said(Step.PAUSE, "", "turn the part"),
+    "an optional stop": _said(Step.OPTIONAL_STOP, ""),
+    "the spindle": _said(Step.FUNCTION, "S1200 M3", "M5", "S800.5 M4"),
+    "a slow spindle": _said(Step.FUNCTION, "S0.00001 M3"),
+    "coolant": _said(Step.FUNCTION, "M8", "M7", "M9"),
+    "a tool": _said(Step.FUNCTION, "T2 M6"),
+    "a message": _said(Step.MESSAGE, "MSG, hello"),
+    "a work system": _systems,
+    "machine coordinates": _machine,
+    "path control": _corners,
+    "a guard against offsets": _guard,
+    "an end without M2": _ends(Ending.TEXT),
+    "M30": _ends(Ending.REWIND),
+}
+"""What a program may hold beside two moves."""
+
+
+class _Row(NamedTuple):
+    """One row as a sentence needs it: what it is, and the numbers that rounding may change."""
+
+    what: str
+    numbers: tuple[float, ...] = ()
+    within: tuple[float, ...] = ()
+
+    def is_like(self, other: _Row) -> bool:
+        return self.what == other.what and bool(
+            np.allclose(self.numbers, other.numbers, rtol=0.0, atol=self.within, equal_nan=True)
+        )
+
+    def __str__(self) -> str:
+        return " ".join([self.what, *(f"{number:g}" for number in self.numbers)])
+
+
+def _built(things: list[Callable[[ToolpathBuilder], None]]) -> Toolpath:
+    path = ToolpathBuilder("trial")
+    for add in things:
+        add(path)
+    return path.built()
+
+
+def _read(dialect: Dialect, wrote: Toolpath) -> Toolpath:
+    return dialect.read(dialect.write(wrote), "trial" + dialect.extension)
+
+
+def _differences(wrote: Toolpath, read: Toolpath, tried: str) -> list[str]:
+    """The first row that was read otherwise."""
+    one, other = list(_rows(wrote)), list(_rows(read))
+    for row, (mine, yours) in enumerate(zip(one, other, strict=False)):
+        if not mine.is_like(yours):
+            # Where as many rows are missing in all as lie before the next one like this, they are lost.
+            missing = len(one) - len(other)
+            if missing > 0 and row + missing < len(one) and one[row + missing].is_like(yours):
+                return [f"it loses `{mine}` ({tried})"]
+            return [f"it wrote `{mine}` and reads `{yours}` ({tried})"]
+    if len(other) < len(one):
+        return [f"it loses `{one[len(other)]}` ({tried})"]
+    if len(other) > len(one):
+        return [f"it reads `{other[len(one)]}`, which it did not write ({tried})"]
+    return []
+
+
+def _rows(path: Toolpath) -> Iterator[_Row]:
+    """Rows that mean something to a machine, with what holds where it changes."""
+    if path.guard is not None:
+        yield _Row(" ".join(["a guard against offsets", *path.guard]))
+    feeds, corner = path.feed, np.nan
+    for row, kind in enumerate(path.kind.tolist()):
+        text = path.text.get(row, "")
+        if kind in {Step.RAPID, Step.FEED}:
+            if not np.array_equal(path.corners_mm[row], corner, equal_nan=True):
+                corner = float(path.corners_mm[row])
+                yield _Row("corners within", (corner,), (SHARE_WITHIN * abs(np.nan_to_num(corner)),))
+            system = " in machine coordinates" if path.system[row] == MACHINE_SYSTEM else ""
+            pose = tuple(path.poses[row].tolist())
+            yield _Row(f"{'rapid' if kind == Step.RAPID else 'feed'}{system} to", pose, (POSE_WITHIN,) * 6)
+            if kind == Step.FEED:
+                unit = "deg/min" if path.only_turns[row] else "mm/min"
+                yield _Row(f"feed in {unit}", (feeds[row],), (SHARE_WITHIN * feeds[row],))
+        elif kind == Step.DWELL:
+            yield _Row("dwell in s", (path.dwell_s[row],), (SHARE_WITHIN * path.dwell_s[row],))
+        elif kind == Step.FUNCTION:
+            yield from (_Row(word) for word in text.split())
+        elif kind != Step.COMMENT:
+            yield _Row(f"{Step(kind).name.lower().replace('_', ' ')} {text}".strip())
+    yield _Row(f"end by {path.ending.value}")

@@ -1,0 +1,264 @@
+"""Writing a toolpath as lines of words: numbers without exponents, axes where they change, a method for each kind of row.
+
+A dialect of one's own derives from `WordDialect`, says how its words look, and leaves out what its control cannot do: a row
+that it has no method for is refused by name and line, never left out.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from dbbstation.errors import StationError
+from dbbstation.nc.dialect import Dialect
+from dbbstation.nc.toolpath import DECIMALS_DEG, DECIMALS_MM, MACHINE_SYSTEM, Ending, Step, rounded
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.nc.toolpath import Toolpath
+
+SIGNIFICANT_DIGITS = 7
+"""Of a feed and a dwell: a ten-millionth."""
+
+MOST_DECIMALS = 15
+"""No feed and no dwell needs more; a line has an end."""
+
+AT_ONCE = 20_000
+"""Rows whose words are made together: a long program is written in little memory."""
+
+
+def digits(value: float) -> str:
+    """A number with seven significant digits and no exponent, which NC languages do not know."""
+    if value == 0.0:
+        return "0"
+    decimals = min(max(0, SIGNIFICANT_DIGITS - 1 - math.floor(math.log10(abs(value)))), MOST_DECIMALS)
+    text = f"{value:.{decimals}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def number(value: float) -> str:
+    """A number with all its digits and no exponent: the shortest that reads back as the same."""
+    return str(np.format_float_positional(value, trim="-"))
+
+
+class CannotSayError(StationError):
+    """A dialect has no words for something that a program does."""
+
+    def __init__(self, dialect: str, what: str, *, where: str = "") -> None:
+        self.dialect, self.asked = dialect, what
+        remedy = "remove it from the program, or write the program in a dialect that has it"
+        super().__init__(f"the dialect {dialect} has no words for {what}", where=where, remedy=remedy)
+
+
+class WordDialect(Dialect):
+    """A dialect of lines of words: an axis where it changes, F where it changes, the motion code in every line.
+
+    Each method returns the text of one line, or raises `CannotSayError` where it is not overridden. `begin` and `end`
+    give the lines around the program, which may be none.
+    """
+
+    axis_forms: ClassVar[Sequence[str]] = tuple(
+        f"{axis}%.{decimals}f"
+        for axis, decimals in zip("XYZABC", (DECIMALS_MM,) * 3 + (DECIMALS_DEG,) * 3, strict=True)
+    )
+    """How a number is written for each axis, X, Y, Z [mm], A, B, C [deg], as for the operator `%`."""
+
+    def write(self, toolpath: Toolpath, header: Sequence[str] = ()) -> str:
+        """Return the program.
+
+        Raises:
+            CannotSayError: the dialect has no words for something in it.
+        """
+        return "\n".join(self.lines(toolpath, header)) + "\n"
+
+    def lines(self, toolpath: Toolpath, header: Sequence[str] = ()) -> Iterator[str]:
+        """Lines of the program in order, made some thousand at a time.
+
+        Raises:
+            CannotSayError: the dialect has no words for something in it.
+        """
+        # What does not move by the decimals that are written does not move.
+        toolpath = replace(toolpath, poses=rounded(toolpath.poses))
+        yield from self.before_header(toolpath)
+        for text in header:
+            yield self.comment(text)
+        if toolpath.guard is not None:
+            yield self.guard(toolpath.guard)
+        corner_mm = toolpath.corner_mm
+        around = [*self.begin(toolpath), *([] if corner_mm is None else [self.corner(corner_mm)])]
+        if toolpath.numbers and around:
+            around[0] = f"{self.line_number(toolpath.numbers[0])}{around[0]}"
+        yield from around
+        yield from self._body(toolpath)
+        around = list(self.end(toolpath))
+        if toolpath.numbers and around and toolpath.ending is not Ending.TEXT:
+            around[-1] = f"{self.line_number(toolpath.numbers[-1])}{around[-1]}"
+        yield from around
+
+    def before_header(self, toolpath: Toolpath) -> Iterable[str]:  # noqa: ARG002
+        """Lines before the header's comments."""
+        return ()
+
+    def begin(self, toolpath: Toolpath) -> Iterable[str]:  # noqa: ARG002
+        """Lines that set what a program must not inherit from the one before it."""
+        return ()
+
+    def end(self, toolpath: Toolpath) -> Iterable[str]:
+        """Lines that end the program as `toolpath.ending` says."""
+        raise self.cannot_say(f"the end of a program by {toolpath.ending.value}")
+
+    def line_number(self, line: int) -> str:
+        """What stands before a line to number it."""
+        return f"N{line} "
+
+    def rapid(self, words: str) -> str:  # noqa: ARG002
+        """Move as fast as the machine can, to the words of the axes that change."""
+        raise self.cannot_say("a rapid")
+
+    def feed(self, words: str, feed: float | None) -> str:  # noqa: ARG002
+        """Move at a feed [mm/min; deg/min where only angles move]; None where it is that of the move before."""
+        raise self.cannot_say("a move at feed")
+
+    def in_machine(self, move: str) -> str:  # noqa: ARG002
+        """The line of a move, with its numbers in machine coordinates."""
+        raise self.cannot_say("a move in machine coordinates (G53)")
+
+    def corner(self, corner_mm: float) -> str:  # noqa: ARG002
+        """How far corners may be rounded from here on [mm]: 0 for exact, infinite for as much as the feed needs."""
+        raise self.cannot_say("how far corners may be rounded")
+
+    def dwell(self, seconds: float) -> str:  # noqa: ARG002
+        """Stop for some seconds."""
+        raise self.cannot_say("a dwell")
+
+    def pause(self, text: str) -> str:  # noqa: ARG002
+        """Stop until the operator goes on, with a message where there is a text."""
+        raise self.cannot_say("a stop")
+
+    def optional_stop(self) -> str:
+        """Stop that the operator has switched on or off."""
+        raise self.cannot_say("an optional stop (M1)")
+
+    def comment(self, text: str) -> str:  # noqa: ARG002
+        """A comment, which nothing reacts to."""
+        raise self.cannot_say("a comment")
+
+    def message(self, text: str) -> str:  # noqa: ARG002
+        """What the control shows or logs: keyword, comma, text, as in `MSG, hello`."""
+        raise self.cannot_say("a message without a stop")
+
+    def function(self, words: str) -> str:
+        """Spindle and coolant, as words that mean the same to every control: `S800 M3`."""
+        raise self.cannot_say(words)
+
+    def system(self, name: str) -> str:
+        """The work coordinate system from here on, `G54` to `G59.3`."""
+        raise self.cannot_say(f"the work system {name}")
+
+    def guard(self, systems: Sequence[str]) -> str:  # noqa: ARG002
+        """Lines that stop, say why and end where offsets are not zero: of the work system in force, and of those named."""
+        raise self.cannot_say("a stop where offsets are not zero")
+
+    def cannot_say(self, what: str) -> CannotSayError:
+        """Return the error for something that this dialect has no words for."""
+        return CannotSayError(self.name, what)
+
+    def _body(self, toolpath: Toolpath) -> Iterator[str]:
+        changed = changed_axes(toolpath)
+        state = _Modal(math.nan, math.nan if toolpath.corner_mm is None else toolpath.corner_mm)
+        for begin in range(0, len(toolpath), AT_ONCE):
+            rows = slice(begin, min(begin + AT_ONCE, len(toolpath)))
+            words = self._words(toolpath, changed, rows)
+            kinds, feeds = toolpath.kind[rows].tolist(), toolpath.feed[rows].tolist()
+            corners, systems = toolpath.corners_mm[rows].tolist(), toolpath.system[rows].tolist()
+            for place, kind in enumerate(kinds):
+                try:
+                    if kind not in _MOVES:
+                        yield self._row(Step(kind), toolpath, begin + place)
+                        continue
+                    if corners[place] != state.corner_mm and not math.isnan(corners[place]):
+                        state.corner_mm = corners[place]
+                        yield self.corner(corners[place])
+                    line = self._move(kind, words[place], feeds[place], state)
+                    yield self.in_machine(line) if systems[place] == MACHINE_SYSTEM else line
+                except CannotSayError as error:
+                    source = int(toolpath.line[begin + place])
+                    where = f"{toolpath.name}:{source}" if source else toolpath.name
+                    raise CannotSayError(error.dialect, error.asked, where=where) from None
+
+    def _move(self, kind: int, words: str, feed: float, state: _Modal) -> str:
+        if kind == Step.RAPID:
+            return self.rapid(words)
+        changed = None if feed == state.feed else feed
+        state.feed = feed
+        return self.feed(words, changed)
+
+    def _row(self, kind: Step, toolpath: Toolpath, row: int) -> str:
+        text = toolpath.text.get(row, "")
+        if kind == Step.DWELL:
+            return self.dwell(float(toolpath.dwell_s[row]))
+        if kind == Step.OPTIONAL_STOP:
+            return self.optional_stop()
+        said = {
+            Step.PAUSE: self.pause,
+            Step.COMMENT: self.comment,
+            Step.FUNCTION: self.function,
+            Step.MESSAGE: self.message,
+            Step.SYSTEM: self.system,
+        }
+        return said[kind](text)
+
+    def _words(self, toolpath: Toolpath, changed: NDArray[np.bool_], rows: slice) -> list[str]:
+        """Words of the axes that each of these rows moves; nothing for rows that are no moves.
+
+        Moves that change the same axes are written together, by one form.
+        """
+        poses, changed = toolpath.poses[rows], changed[rows]
+        texts = [""] * len(poses)
+        which = changed @ (1 << np.arange(6))
+        for one in np.unique(which):
+            if one == 0:
+                continue
+            alike = np.flatnonzero(which == one)
+            axes = np.flatnonzero(changed[alike[0]])
+            form = " ".join(self.axis_forms[axis] for axis in axes.tolist())
+            for row, values in zip(alike.tolist(), poses[np.ix_(alike, axes)].tolist(), strict=True):
+                texts[row] = form % tuple(values)
+        return texts
+
+
+class _Modal:
+    """What holds until it is changed."""
+
+    def __init__(self, feed: float, corner_mm: float) -> None:
+        self.feed, self.corner_mm = feed, corner_mm
+
+
+_MOVES = frozenset((int(Step.RAPID), int(Step.FEED)))
+
+
+def changed_axes(toolpath: Toolpath) -> NDArray[np.bool_]:
+    """Axes that each row must name, shape (n, 6); none in rows that are no moves.
+
+    Those whose number changes, and those that were last named in another coordinate system. The first move names all,
+    except those that stand where the program found them.
+    """
+    moves = np.flatnonzero(toolpath.is_move)
+    poses, frame = toolpath.poses[moves], toolpath.frame[moves]
+    home = frame == toolpath.system[moves][:, None]
+    must = np.ones(poses.shape, dtype=np.bool_)
+    must[1:] = (poses[1:] != poses[:-1]) | (home[1:] & (frame[1:] != frame[:-1]))
+    if toolpath.start is not None and len(moves):
+        must[0] = home[0] | (poses[0] != toolpath.start)
+    # A move to where the machine stands already is a move: most controls want an axis in it.
+    stays = ~must.any(axis=1)
+    must[stays] = home[stays] & (np.cumsum(home[stays], axis=1) == 1)
+    named = np.zeros((len(toolpath), 6), dtype=np.bool_)
+    named[moves] = must
+    return named

@@ -1,0 +1,154 @@
+"""Generated programs before and after compensation, both through LinuxCNC's interpreter.
+
+`DBBSTATION_FUZZ=5000` runs as many programs as that; `DBBSTATION_FUZZ_FROM` is the first seed. `-m nightly` runs 50,000.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+
+import numpy as np
+import pytest
+
+from dbbstation.model.machine_model import MachineModel
+from dbbstation.nc.export import Inverse, compensated_program
+from dbbstation.sources.contract import Fitted
+from dbbstation.sources.registry import known_sources
+from tests.nc.grammar import part
+from tests.nc.interpreter import events, needs_rs274
+from tests.nc.through_rs274 import MOVES, DiffersError, compare, compare_elsewhere
+
+pytestmark = needs_rs274
+
+COUNT = int(os.environ.get("DBBSTATION_FUZZ", "500"))
+FIRST = int(os.environ.get("DBBSTATION_FUZZ_FROM", "0"))
+SHARES = 10
+
+NIGHTLY, NIGHTLY_FIRST, NIGHTLY_SHARES = 50_000, 1000, 100
+
+OFFSETS = {5220: 2, 5221: 10.0, 5222: -3.0, 5223: 1.0, 5224: 2.0, 5241: -7.0, 5242: 4.0, 5243: 2.0, 5246: 3.0}
+"""G55 in force, G54 and G55 both off zero: 254 mm in X and more [in, deg]."""
+
+
+@pytest.fixture(scope="module")
+def bent(reference):
+    """Joint errors of 20 µm and strut errors of 10 µm."""
+    drawn = np.random.default_rng(27)
+    sources = known_sources()
+    struts = Fitted(sources["strut-reference-length"], drawn.normal(0.0, 0.01, 6))
+    joints = Fitted(sources["base-joints"], drawn.normal(0.0, 0.02, 18))
+    return MachineModel(reference, (struts, joints))
+
+
+@pytest.fixture
+def does_the_same(linuxcnc, bent, tmp_path):
+    """Check one generated program, without offsets and with."""
+
+    def check(seed: int) -> None:
+        text = part(seed)
+        wanted = events(text, tmp_path)
+        assert wanted is not None, f"seed {seed}: LinuxCNC refuses\n{text}"
+        written = compensated_program(linuxcnc.read(text, "part.ngc"), linuxcnc, Inverse(bent)).text
+        done = events(written, tmp_path)
+        assert done is not None, f"seed {seed}: LinuxCNC refuses what was written\n{text}\n{written}"
+        try:
+            groups = compare(wanted, done, bent)
+            if "G5" not in text.upper() and seed % 8:
+                return
+            away = events(written, tmp_path, OFFSETS)
+            if "o100" in written:
+                assert [event.kind for event in away if event.kind != "SAID"] == ["PAUSE"]
+            else:
+                compare_elsewhere(groups, events(text, tmp_path, OFFSETS), away)
+        except DiffersError as error:
+            raise AssertionError(f"seed {seed}: {error}\n{text}\n{written}") from None
+
+    return check
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", range(SHARES))
+def test_a_compensated_program_does_what_the_nominal_one_does(share, does_the_same):
+    for seed in range(FIRST + share, FIRST + COUNT, SHARES):
+        does_the_same(seed)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("share", range(NIGHTLY_SHARES))
+def test_so_do_fifty_thousand(share, does_the_same):
+    for seed in range(NIGHTLY_FIRST + share, NIGHTLY_FIRST + NIGHTLY, NIGHTLY_SHARES):
+        does_the_same(seed)
+
+
+# The comparison itself: what was wrong once, done to a program that is right.
+
+PART = """\
+G21 G90 G54
+G0 X0 Y0 Z-1000 A0 B0 C0
+S0.5 M3
+G61
+G1 X50 F500
+G4 P0.5
+G1 Y20 F300
+(MSG, turn it)
+M1
+G3 I5 F200
+G55 G0 X5 Y5 Z-1000 A0 B0 C0
+G1 X6
+M8
+G1 X20
+M30
+"""
+
+FAULTS = {
+    "a feed": lambda text: text.replace("F300", "F303", 1),
+    "a dwell": lambda text: text.replace("G4 P0.5\n", ""),
+    "a longer dwell": lambda text: text.replace("G4 P0.5", "G4 P0.51"),
+    "M1": lambda text: text.replace("M1\n", "M0\n"),
+    "M30": lambda text: text.replace("M30", "M2"),
+    "a message": lambda text: text.replace("(MSG, turn it)", "; MSG, turn it"),
+    "the spindle": lambda text: text.replace("S0.5 M3", "S0.6 M3"),
+    "coolant": lambda text: text.replace("M8\n", ""),
+    "the place of coolant": lambda text: re.sub(r"M8\n(.*\n)", r"\1M8\n", text),
+    "a work system": lambda text: text.replace("G55\n", ""),
+    "exact stops on the way": lambda text: text.replace("G64 P0.0001 Q0\n", ""),
+    "no exact stop": lambda text: text.replace("G61\n", ""),
+    "a micrometre": lambda text: re.sub(
+        r"(?m)^(G1 X\S+ Y)(\S+)", lambda m: f"{m[1]}{float(m[2]) + 1e-3:.6f}", text, count=1
+    ),
+    "pieces of an arc": lambda text: re.sub(r"(?m)(F200\n)(?:G1.*\n){5}", r"\1", text),
+    "a rapid": lambda text: re.sub(r"(?m)(^G55\n)G0.*\n", r"\1", text),
+}
+
+
+@pytest.fixture(scope="module")
+def wavy(bent):
+    """With errors large enough that a line takes pieces."""
+    drawn = np.random.default_rng(28)
+    return MachineModel(bent.machine, (Fitted(known_sources()["base-joints"], drawn.normal(0.0, 0.2, 18)),))
+
+
+def test_a_right_program_passes(linuxcnc, wavy, tmp_path):
+    written = compensated_program(linuxcnc.read(PART, "part.ngc"), linuxcnc, Inverse(wavy)).text
+    groups = compare(events(PART, tmp_path), events(written, tmp_path), wavy)
+    compare_elsewhere(groups, events(PART, tmp_path, OFFSETS), events(written, tmp_path, OFFSETS))
+    assert sum(event.kind in MOVES for event in events(PART, tmp_path)) == len(groups)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_the_comparison_finds(fault, linuxcnc, wavy, tmp_path):
+    written = compensated_program(linuxcnc.read(PART, "part.ngc"), linuxcnc, Inverse(wavy)).text
+    wrong = FAULTS[fault](written)
+    assert wrong != written
+    with pytest.raises(DiffersError):
+        compare(events(PART, tmp_path), events(wrong, tmp_path), wavy)
+
+
+@pytest.mark.parametrize("word", ["G54", "G55"])
+def test_with_offsets_the_comparison_finds_a_work_system_that_is_missing(word, linuxcnc, wavy, tmp_path):
+    written = compensated_program(linuxcnc.read(PART, "part.ngc"), linuxcnc, Inverse(wavy)).text
+    groups = compare(events(PART, tmp_path), events(written, tmp_path), wavy)
+    wrong = written.replace(f"{word}\n", "")
+    with pytest.raises(DiffersError, match="ends at"):
+        compare_elsewhere(groups, events(PART, tmp_path, OFFSETS), events(wrong, tmp_path, OFFSETS))

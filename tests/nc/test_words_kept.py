@@ -1,0 +1,219 @@
+"""What a program says beside its moves is written as it was: each of these was lost or changed once."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+import numpy as np
+import pytest
+
+from dbbstation.errors import InputError
+from dbbstation.nc.circle_program import circle_toolpath
+from dbbstation.nc.export import Inverse, circle_programs, compensated_program
+from dbbstation.nc.rs274.guard import guard_lines
+from dbbstation.nc.rs274.reader import read_program
+from dbbstation.nc.toolpath import PIECE_CORNER_MM, Ending
+from tests.nc.interpreter import events, needs_rs274, printed
+
+FIRST = "G21 G90\nG0 X0 Y0 Z-1000 A0 B0 C0\n"
+
+
+def written(linuxcnc, text: str) -> list[str]:
+    """The lines of a program that was read and written, after its modes."""
+    return linuxcnc.write(linuxcnc.read(text, "part.ngc")).splitlines()[1:]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "S0.00001 M3",
+        "S12345.678",
+        "M1",
+        "(MSG, look)",
+        "(DEBUG, system #5220)",
+        "(PRINT, here)",
+        "(LOG, begun)",
+        "(msg,small)",
+        "(LOGOPEN, part.log)",
+        "(LOGCLOSE)",
+        "(MSG,  two blanks and a µ )",
+        "G54",
+        "G59.3",
+        "M7",
+        "M30",
+    ],
+)
+def test_a_word_is_written_as_it_was(linuxcnc, line):
+    assert line in written(linuxcnc, f"{FIRST}{line}\nG1 X1 F100\nM2\n")
+
+
+@pytest.mark.parametrize(
+    ("line", "comment"),
+    [
+        ("; (MSG, x)", "; (MSG, x)"),
+        (";MSG, x", "; MSG, x"),
+        ("( MSG , x)", "; MSG , x"),
+        ("(MSG, x) (y)", "; MSG, x"),
+    ],
+)
+def test_what_linuxcnc_takes_for_a_comment_stays_one(linuxcnc, line, comment):
+    """Of several comments in brackets it acts on the last; behind a semicolon on none."""
+    assert comment in written(linuxcnc, f"{FIRST}{line}\nM2\n")
+
+
+@pytest.mark.parametrize("line", ["(PY, x=1)", ";py,x", "(pyrun, move)"])
+def test_python_in_a_comment_is_refused(line):
+    with pytest.raises(InputError, match=r"part\.ngc:3:.*runs Python"):
+        read_program(f"{FIRST}{line}\nM2\n", "part.ngc")
+
+
+def test_a_message_before_a_stop_is_written_as_it_was(linuxcnc):
+    path = linuxcnc.read(FIRST + "(MSG, turn it)\nM0\n(msg,turn it)\nM0\nM2\n", "part.ngc")
+    assert [path.text.get(row, "") for row in range(1, len(path))] == ["turn it", "msg,turn it", ""]
+    assert linuxcnc.write(path).splitlines()[-5:] == ["(MSG, turn it)", "M0", "(msg,turn it)", "M0", "M2"]
+
+
+@pytest.mark.parametrize(("end", "ending"), [("M2", Ending.STOP), ("M30", Ending.REWIND)])
+def test_a_program_ends_as_it_did(linuxcnc, end, ending):
+    path = linuxcnc.read(f"{FIRST}{end}\n", "part.ngc")
+    assert path.ending is ending
+    assert linuxcnc.write(path).splitlines()[-1] == end
+
+
+def test_a_program_that_ends_with_its_text_is_not_given_an_m2(linuxcnc, crooked):
+    """M2 stops spindle and coolant; the percent sign does not."""
+    path = linuxcnc.read(f"%\n{FIRST}S100 M3\nG1 X1 F100\n%\n", "part.ngc")
+    lines = linuxcnc.write(path).splitlines()
+    assert (lines[0], lines[-1]) == ("%", "%")
+    assert "M2" not in lines
+    again = compensated_program(path, linuxcnc, Inverse(crooked)).text
+    assert linuxcnc.read(again, "again.ngc").ending is Ending.TEXT
+
+
+# Coordinate systems.
+
+
+def test_moves_in_machine_coordinates_stay_so(linuxcnc):
+    lines = written(linuxcnc, FIRST + "G53 G0 Z-950\nG0 X5\nG55 G0 X5\nG53 G1 X6 F100\nM2\n")
+    assert lines[1:-1] == [
+        "G53 G0 Z-950.000000",
+        "G0 X5.000000",
+        "G55",
+        "G0 X5.000000",  # the same number in another system is another place
+        "G53 G1 X6.000000 F100",
+    ]
+
+
+def test_a_retract_in_machine_coordinates_stays_one_whatever_the_offsets(linuxcnc, crooked):
+    """Up in machine coordinates, over in those of the part, down: no line may name an axis in the other system."""
+    text = FIRST + "G1 X5 F100\nG53 G0 Z-950\nG0 X50 Y20 A1 B1 C1\nG0 Z-1000\nG1 X60\nM2\n"
+    done = compensated_program(linuxcnc.read(text, "part.ngc"), linuxcnc, Inverse(crooked)).text
+    assert "o100" not in done
+    lines = done.splitlines()
+    (up,) = [line for line in lines if line.startswith("G53")]
+    assert up.split()[:2] == ["G53", "G0"]
+    assert [word[0] for word in up.split()[2:]] == ["Z"]
+    over = lines[lines.index(up) + 1]
+    assert "Z" not in over
+    assert "Z" in lines[lines.index(up) + 2]
+
+
+def test_a_feed_that_mixes_systems_is_guarded(linuxcnc, crooked):
+    """All six axes are corrected at feed, which is right in one system only."""
+    text = FIRST + "G54\nG53 G1 Z-990 F100\nG1 X5\nM2\n"
+    done = compensated_program(linuxcnc.read(text, "part.ngc"), linuxcnc, Inverse(crooked)).text
+    assert "\n".join(guard_lines(["G54"])) in done
+    assert linuxcnc.read(done, "done.ngc").guard == ("G54",)
+
+
+# The guard.
+
+
+@pytest.mark.parametrize("systems", [(), ("G55",), ("G54", "G59.3")])
+@pytest.mark.parametrize("change", [str, str.lower, lambda line: f"N5 {line}", lambda line: line.replace(" ", "\t")])
+def test_a_guard_is_known_however_it_is_spelt(systems, change):
+    lines = "\n".join(change(line) for line in guard_lines(systems))
+    assert read_program(f"; part\n{lines}\n{FIRST}M2\n", "part.ngc").guard == systems
+
+
+def test_another_condition_is_no_guard():
+    lines = "\n".join(guard_lines()).replace("NE 0", "NE 1", 1)
+    with pytest.raises(InputError, match="letter O"):
+        read_program(f"{lines}\n{FIRST}M2\n", "part.ngc")
+
+
+def test_a_guard_behind_a_move_is_refused():
+    lines = "\n".join(guard_lines())
+    with pytest.raises(InputError, match="a guard against offsets after the first move"):
+        read_program(f"{FIRST}{lines}\nM2\n", "part.ngc")
+
+
+OFFSETS = {
+    "none": ({}, ""),
+    "another system's": ({5220: 2, 5221: 10.0, 5230: 3.0}, ""),
+    "x": ({5221: 10.0}, "work system in force"),
+    "w": ({5229: 1.0}, "work system in force"),
+    "rotation": ({5230: 0.5}, "work system in force"),
+    "of G55 in force": ({5220: 2, 5243: 1.0}, "work system in force"),
+    "rotation of G59.3": ({5220: 9, 5390: 1.0}, "work system in force"),
+    "G92": ({5210: 1, 5211: 1.0}, "G92"),
+    "G92 put aside": ({5210: 0, 5219: 1.0}, "G92"),
+}
+
+
+@needs_rs274
+@pytest.mark.parametrize("which", OFFSETS)
+@pytest.mark.parametrize("model", [None, "crooked"])
+def test_a_ball_bar_program_stops_where_an_offset_is_not_zero(linuxcnc, table2, crooked, tmp_path, which, model):
+    inverse = None if model is None else Inverse(crooked)
+    (program, _) = circle_programs(table2, crooked.machine, linuxcnc, inverse=inverse, tests=["a"], approach=None)
+    parameters, message = OFFSETS[which]
+    made = printed(program.text, tmp_path, parameters)
+    names = [name for name, _ in made]
+    if not message:
+        assert "PROGRAM_STOP" not in names
+        assert names.count("STRAIGHT_FEED") > 70
+        return
+    assert not any(name.startswith("STRAIGHT") for name in names)
+    assert [name for name in names if name.startswith("PROGRAM")] == ["PROGRAM_STOP", "PROGRAM_END"]
+    (said,) = [arguments for name, arguments in made if name == "MESSAGE"]
+    assert message in said
+
+
+@needs_rs274
+@pytest.mark.parametrize(("before", "stops"), [("G43.1 Z1", True), ("G43.1 Z1\nG49", False), ("T1 M6", False)])
+def test_a_ball_bar_program_stops_where_a_tool_length_is_in_force(linuxcnc, table2, tmp_path, before, stops):
+    text = linuxcnc.write(circle_toolpath(table2.tests["a"].circle, "a", step_deg=5.0, approach=None))
+    made = printed(f"{before}\n{text}", tmp_path)
+    assert any(name == "STRAIGHT_FEED" for name, _ in made) is not stops
+    assert any(name == "MESSAGE" and "tool length" in said for name, said in made) is stops
+
+
+# Path control.
+
+
+def test_an_exact_stop_belongs_to_the_ends_of_the_written_move(linuxcnc, crooked):
+    text = FIRST + "G61\nG1 X100 Y3 F500\nG64 P0.02\nX0\nG3 I20\nG61\nG3 I20\nM2\n"
+    path = linuxcnc.read(compensated_program(linuxcnc.read(text, "x.ngc"), linuxcnc, Inverse(crooked)).text, "y.ngc")
+    corners = path.corners_mm[path.is_move]
+    assert np.isnan(corners[0])
+    assert [corner for corner, _ in groupby(corners[1:])] == [PIECE_CORNER_MM, 0.0, 0.02, PIECE_CORNER_MM, 0.0]
+    line, circle = np.flatnonzero(path.corners_mm == 0.0)
+    np.testing.assert_allclose(path.poses[line, :2], [100.0, 3.0], atol=1.0)
+    np.testing.assert_allclose(path.poses[circle, :2], [0.0, 3.0], atol=1.0)
+
+
+@needs_rs274
+def test_linuxcnc_sees_one_exact_end_for_each_exact_move(linuxcnc, crooked, tmp_path):
+    text = FIRST + "G61\nG1 X100 Y3 F500\nG3 I20\nG1 X5\nM2\n"
+    done = compensated_program(linuxcnc.read(text, "x.ngc"), linuxcnc, Inverse(crooked)).text
+    corners = [event.corner for event in events(done, tmp_path) if event.kind == "FEED"]
+    assert corners.count("CANON_EXACT_PATH") == 3
+    assert len(corners) > 100
+    assert set(corners) == {"CANON_EXACT_PATH", "CANON_CONTINUOUS 0.0001"}
+
+
+def test_moves_that_were_written_one_by_one_stop_one_by_one(linuxcnc):
+    path = linuxcnc.read(FIRST + "G61\nG1 X1 F100\nX2\nX3\nM2\n", "x.ngc")
+    assert (path.corners_mm[1:] == 0.0).all()
+    assert np.isnan(path.corners_mm[0])

@@ -21,9 +21,9 @@ def reached(model: MachineModel, poses: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def compensated(linuxcnc, table2, reference, crooked) -> dict[str, Toolpath]:
+def compensated(linuxcnc, table2, crooked) -> dict[str, Toolpath]:
     """Read back from the text: what the control will really be told."""
-    programs = circle_programs(table2, reference, linuxcnc, inverse=Inverse(crooked))
+    programs = circle_programs(table2, crooked.machine, linuxcnc, inverse=Inverse(crooked))
     return {program.name: linuxcnc.read(program.text, program.name) for program in programs}
 
 

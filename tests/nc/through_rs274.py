@@ -170,7 +170,9 @@ class _Walk:
             if minutes is None:
                 return
             took_done += minutes
-            rounded += 4.0 * PRINTED / self.done[piece].feed[0] + 1e-6 * minutes
+            # Places and the feed are printed with four decimals: a feed of 0.0002 mm/min has one digit.
+            feed = self.done[piece].feed[0]
+            rounded += 4.0 * PRINTED / feed + (1e-6 + PRINTED / feed) * minutes
         if abs(took - took_done) > SHARE_OF_TIME * took + rounded:
             raise DiffersError(f"move {index} takes {60 * took_done} s in place of {60 * took} s")
 

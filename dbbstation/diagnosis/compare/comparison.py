@@ -192,7 +192,7 @@ def compare(
     matching = match(a, b)
     progress("candidates")
     sides = Sides.of(machine, matching.pairs)
-    settled = settle(channel_of(sides, sources), in_time=False, progress=progress)
+    settled = settle(channel_of(sides, sources), in_time=False, rivals=False, progress=progress)
     progress("verdicts")
     return Comparison(
         matching=matching,

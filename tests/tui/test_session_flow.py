@@ -383,6 +383,9 @@ def test_an_error_of_the_virtual_machine_stays_on_the_screen(front: Front, monke
 def test_compensated_programs_are_written_and_command_the_session(front: Front) -> None:
     small = shipped_folder("fixtures") / "sessions" / "small"
     shutil.copy(shipped_folder("fixtures") / "models" / "small.yaml", front.under / "model.yaml")
+    # A control that plans 1 m/s² cannot keep the plan's 6000 mm/min in compensated pieces: such programs are refused.
+    plan = front.under / "plan.yaml"
+    plan.write_text(plan.read_text("utf-8").replace("feed_mm_min: 6000", "feed_mm_min: 1000"), "utf-8")
 
     async def keys(pilot: Pilot[None], app: StationApp) -> None:
         await press(app, "v")

@@ -68,7 +68,7 @@ def test_what_counts_nothing_is_no_count(text):
 def test_line_ends_of_windows_are_read_everywhere(tmp_path):
     machine = (shipped_folder("fixtures") / "machines" / "reference.yaml").read_bytes()
     files = {
-        "run.csv": b"t_s,length_mm\n0.0,150\n0.1,150\n",
+        "run.csv": b"t_s,length_mm\n" + b"".join(b"0.%d,150\n" % k for k in range(9)),
         "drive.csv": b"t_s,position_mm,force_n\n0.0,0,1\n0.004,0.1,2\n",
         "machine.yaml": machine,
     }

@@ -53,7 +53,7 @@ def test_predict_and_compensate_use_it_and_say_so(kept, run, tmp_path):
     assert "unexplained-wave, an error whose cause is unknown" in predicted.err
     program = tmp_path / "part.ngc"
     program.write_text("G21 G90\nG0 X0 Y0 Z-1008 A0 B0 C0\nG1 X20 F1000\nM2\n", encoding="utf-8")
-    done = run("compensate", program, "--model", model, "--out", tmp_path / "true.ngc")
+    done = run("compensate", program, "--model", model, "--prefer", "accuracy", "--out", tmp_path / "true.ngc")
     assert done.code == 0, done.err
     assert "unexplained-wave, an error whose cause is unknown" in done.err
     assert "cause unknown 1: unexplained-wave" in (tmp_path / "true.ngc").read_text(encoding="utf-8")

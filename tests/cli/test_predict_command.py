@@ -86,7 +86,9 @@ def test_the_header_of_a_compensated_program_says_what_is_not_known(predicted, r
     model, *_ = predicted["unknown"]
     program = tmp_path / "part.ngc"
     program.write_text("G21 G90\nG0 X0 Y0 Z-1008 A0 B0 C0\nG1 X20 F1000\nM2\n", encoding="utf-8")
-    done = run("compensate", program, "--model", model, "--out", tmp_path / "true.ngc", "--json")
+    done = run(
+        "compensate", program, "--model", model, "--prefer", "accuracy", "--out", tmp_path / "true.ngc", "--json"
+    )
     assert done.code == DONE, done.err
     header = (tmp_path / "true.ngc").read_text(encoding="utf-8")
     assert "Z not known" in header

@@ -75,6 +75,8 @@ def test_a_program_names_program_command_and_inputs_once(run, tmp_path):
         "a",
         "--step-deg",
         "1",
+        "--accept-chord-um",
+        "10",
         "--out",
         tmp_path / "o",
     )

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import StationError
-from dbbstation.machine.kinematics import inverse
-from dbbstation.machine.rotation import Frames
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.compensate import Prefer, compensate_toolpath
 from dbbstation.nc.curve import felt_mm
@@ -19,6 +17,7 @@ from dbbstation.nc.pieces import longest, truest
 from dbbstation.nc.planner import LookAhead, Planner
 from dbbstation.nc.toolpath import Step
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
+from tests.nc.test_compensate_any import Wound
 
 SLOW = Planner(1000.0, LookAhead(0.5))
 
@@ -118,27 +117,9 @@ def test_what_is_reported_is_looked_for_at_many_places(linuxcnc, reference):
     assert done.chord_um == pytest.approx(off_um, rel=0.05)
 
 
-class Late(LinearSource):
-    """A strut is late by a fixed amount after its reversal: its correction has a step."""
-
-    name = "late"
-    belongs_to = Owner.MACHINE
-    needs = frozenset({Need.PATH})
-    texts = Texts("", "", "", "", "", "")
-
-    def parameters(self, machine):  # noqa: ARG002
-        return (Parameter("amount_mm", "mm", 0.01, ""),)
-
-    def derivative(self, motion, machine, values):  # noqa: ARG002
-        frames = Frames.from_poses(motion.poses, machine.hexapod.rotation)
-        way = np.sign(np.diff(inverse(machine.hexapod, frames).length_mm, axis=0, prepend=np.nan))
-        way[0] = 0.0
-        return Effect(strut_mm=-way[:, :, None])
-
-
 def test_a_tolerance_that_is_missed_is_refused_unless_a_number_accepts_it(linuxcnc, reference):
     machine = replace(reference, acceleration_mm_s2=50_000.0)
-    model = MachineModel(machine, (Fitted(Late(), np.array([0.03])),))
+    model = MachineModel(machine, (Fitted(Wound(), np.array([0.03])),))
     path = linuxcnc.read("G21 G90\nG0 X-100 Y10 Z-1000 A0 B0 C0\nG1 X100 F100\nM2\n", "line.ngc")
     with pytest.raises(StationError, match=r"line\.ngc:3: the path is kept within \d+ µm here, not within 0\.1 µm"):
         compensated_program(path, linuxcnc, Inverse(model))

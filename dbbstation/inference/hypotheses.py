@@ -100,7 +100,8 @@ class Posterior:
     def probability_of(self, holds: Callable[[frozenset[str]], bool]) -> float:
         """Probability of all sets of causes for which something holds."""
         inside = [weight for key, weight in self.weights.items() if holds(key)]
-        return float(np.exp(logsumexp(inside) - self._total)) if inside else 0.0
+        # A part of a sum can round to more than the whole.
+        return min(1.0, float(np.exp(logsumexp(inside) - self._total))) if inside else 0.0
 
     @cached_property
     def _total(self) -> float:

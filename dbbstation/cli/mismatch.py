@@ -163,8 +163,9 @@ def _print(summary: Mapping[str, Any]) -> None:
     held_out = summary["held_out_rms"]
     if held_out:
         echo(
-            f"\nheld-out error: {held_out['before']:.3g} -> {held_out['after']:.3g} {unit} rms, over "
-            f"{len(held_out['folds'])} parts, everything chosen anew without each of them"
+            f"\nheld-out error: {held_out['as_simulated']:.3g} as simulated, {held_out['before']:.3g} refitted, "
+            f"{held_out['after']:.3g} {unit} rms corrected; over {len(held_out['folds'])} parts, everything chosen anew "
+            "without each of them"
         )
     echo()
     _print_left(summary)
@@ -196,6 +197,10 @@ def _print_whether(summary: Mapping[str, Any]) -> None:
         else "; fitted jointly, since nothing says in which order the rows were measured"
     )
     alike = f", {noise['rows_as_one']:.3g} rows count as one" if noise["rows_as_one"] > 1.0 else ""
+    if noise["degrees_of_freedom"]:
+        alike += f", long tails (Student's t, {noise['degrees_of_freedom']:g} degrees of freedom)"
+    if noise["grows_with"]:
+        alike += f", its variance grows with {noise['grows_with']}"
     echo(f"noise of one row: {noise['sigma']:.3g} {unit}{alike}{fitted}")
     if summary["led_by"]:
         led = ", ".join(

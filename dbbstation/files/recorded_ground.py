@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import OutputError
-from dbbstation.files.gateway import head_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -44,6 +43,7 @@ def _is_session(folder: Path) -> bool:
             return False
         if (folder / "runs").is_dir():
             return True
-        return _MARK in head_of(file, _WITHIN)
+        with file.open("rb") as text:
+            return _MARK in text.read(_WITHIN)
     except OSError:
         return False

@@ -129,6 +129,8 @@ class Channel:
             sec. 6.4.9.4]; None: its estimate is taken, for which half of that is as good.
         grows: size of what a part of the noise may be in proportion to, beside a constant part, shape (n,); None: noise is the same
             in all rows.
+        noise_follows: by name, sizes of what a part of the noise may be in proportion to, of which it follows one at the most, each of
+            shape (n,).
         known_noise: standard deviation of noise that a row is known to have beyond that of the others, in the unit of the residual,
             shape (n,); None: no row is known to have more.
         clock: of all rows, where some were left out or where they show a step by and by; None: they show it at once.
@@ -151,6 +153,7 @@ class Channel:
     least_noise: float = 0.0
     surely: float | None = None
     grows: NDArray[np.float64] | None = None
+    noise_follows: tuple[tuple[str, NDArray[np.float64]], ...] = ()
     known_noise: NDArray[np.float64] | None = None
     clock: Clock | None = None
     direction: NDArray[np.float64] | None = None
@@ -205,6 +208,10 @@ class Channel:
     def fitted(self, target: NDArray[np.float64], noise: float) -> Solution:
         """Fit the base alone to kept rows of a target, at a noise of one row."""
         return solve([self._block(target)], self.known, noise, self.held)
+
+    def refitted(self) -> NDArray[np.float64]:
+        """Values of the base alone by ordinary least squares, shape (k,): what a person would refit without knowing any noise."""
+        return self.fitted(self.target, self._about).x
 
     @property
     def kept_blocks(self) -> list[slice]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from dbbstation.inference.model_comparison import Cause, Member
     from dbbstation.inference.patterns import Family
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
 
 OUT = 5.0
 """Standard deviations by which the norm of an effect must be out to be said to be there, or would have to be to be ruled out."""
@@ -142,7 +142,7 @@ class _Judge:
         pattern = self._settled.bank.patterns.get(cause.name)
         member = self._members.get(cause.name)
         equal = self._classes.get(cause.name, (cause.name,))
-        probability = self._alternatives.probability(equal)
+        probability = self._settled.averaged(self._alternatives.probability(equal), equal)
         gain, shown = self._beside[cause.name] if member is None else (self._best.log_factor(cause.name), member)
         if member is None:
             # The prior must not say how much could hide.
@@ -186,9 +186,8 @@ class _Judge:
         self, cause: Cause, member: Member | None, probability: float, sigmas: float
     ) -> tuple[Verdict, tuple[str, ...], str]:
         """Verdict, with whom it is ambiguous, and why."""
-        if member is not None and probability >= SURE:
-            faint = f"Its effect is only {sigmas:.2g} standard deviations out."
-            return (Verdict.IDENTIFIED, (), "") if sigmas >= OUT else (Verdict.AMBIGUOUS, (), faint)
+        if member is not None and self._alternatives.probability(self._classes[cause.name]) >= SURE:
+            return self._certain(probability, sigmas)
         if member is None and (why := self._impossible_in_place(cause)):
             return Verdict.RULED_OUT, (), why
         if alike := [name for name, equal in self._classes.items() if cause.name in equal and name != cause.name]:
@@ -200,6 +199,14 @@ class _Judge:
         if unsure := [name for name, others in self._alternatives.ambiguities.items() if cause.name in others]:
             return Verdict.AMBIGUOUS, (unsure[0],), f"These rows cannot tell it from {unsure[0]}."
         return self._absent(cause, probability)
+
+    def _certain(self, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
+        """Verdict of what is there for sure beside the most probable noise."""
+        if probability < SURE:
+            return Verdict.AMBIGUOUS, (), "Noise whose neighbours resemble each other explains it as well."
+        if sigmas < OUT:
+            return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
+        return Verdict.IDENTIFIED, (), ""
 
     def _impossible_in_place(self, cause: Cause) -> str:
         """Why a law cannot stand in the place of what nothing measured tells from it; empty where it can."""

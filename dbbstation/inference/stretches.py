@@ -240,6 +240,9 @@ class _Look:
         first, last = (int(edge) for edge in self._windows[int(self._worth(along, self._own).argmax())])
         for _ in range(ENDS_MOVED):
             low, high = self._within(first, last)
+            if high - low < SHORTEST:
+                return None
+            first = min(first, high - SHORTEST)
             ends = np.arange(first + SHORTEST, high + 1)
             last = int(ends[int(self._worth_of(np.full(len(ends), first), ends).argmax())])
             starts = np.arange(low, last - SHORTEST + 1)
@@ -269,8 +272,9 @@ class _Look:
         ends = float(0.5 * (self._at[last - 1] + self._at[last])) if last < len(self._at) else np.inf
         for finer in FINER:
             moves = np.arange(-4.0, 5.0) * finer
-            begins, _ = self._best_edges(begins + moves, np.full(len(moves), ends))
-            _, ends = self._best_edges(np.full(len(moves), begins), ends + moves)
+            # Edges between rows must leave the rows that a stretch has at the least.
+            begins, _ = self._best_edges(np.minimum(begins + moves, ends - SHORTEST), np.full(len(moves), ends))
+            _, ends = self._best_edges(np.full(len(moves), begins), np.maximum(ends + moves, begins + SHORTEST))
         column = self._whitened(np.array([begins]), np.array([ends]))[:, 0]
         beside = column - self._axes @ (self._axes.T @ column)
         # Of what it explains its prior leaves a little; then all of it is as if it had been fitted with the rest [Woodbury].

@@ -11,7 +11,7 @@ from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -84,6 +84,7 @@ class Table:
             time=time,
             time_unit=self.clock.unit if self.clock is not None and self.clock.unit else "row",
             simulated=simulated,
+            noise_follows=tuple(_sizes_of_noise(follows, time, self.blocks)),
         )
 
     def _law(self, source: TableSource) -> Law:
@@ -111,6 +112,17 @@ class Table:
             form_uncertainty=source.form_uncertainty,
             follows=follows,
         )
+
+
+def _sizes_of_noise(
+    variables: Sequence[Variable], time: NDArray[np.float64] | None, blocks: Sequence[slice]
+) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """What a part of the noise may be in proportion to: how far a variable is from either end of its range, and its speed."""
+    for variable in variables:
+        yield f"{variable.name} less its least value", variable.values - variable.low
+        yield f"its largest value less {variable.name}", variable.high - variable.values
+        if time is not None and variable.kind is not Kind.TIME and variable.is_path(blocks):
+            yield f"speed of {variable.name}", np.abs(variable.rates(time, blocks))
 
 
 def _is_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,9 +11,11 @@ import numpy as np
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.noise import noise_of
 from dbbstation.inference.patterns import Family, covers_turns, turn
 from dbbstation.inference.read_off import OUT, read_off
 from dbbstation.inference.settle import settle, static_patterns
+from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import compress, solve, with_random
 from dbbstation.inference.verdict import Value, Verdict
 
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.read_off import Finding
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
     from dbbstation.texts import Texts
 
 FOLD_ROWS = 3000
@@ -41,7 +44,7 @@ class Fitted:
 
     Attributes:
         name: `offset`, or of the parameter.
-        before: with the base alone.
+        before: with the base alone, by ordinary least squares; its uncertainty allows for neighbours that resemble each other.
         after: with what was found beside it.
         confounded: share of what the parameter does that this can do as well, R².
     """
@@ -155,8 +158,9 @@ def find_mismatch(
         CalibrationError: the difference is so much larger than its noise that rounding hides what it follows.
     """
     try:
-        return _found(table, sources, lacking or {}, progress, hold_out=hold_out)
-    except np.linalg.LinAlgError as error:
+        with np.errstate(over="raise"):
+            return _found(table, sources, lacking or {}, progress, hold_out=hold_out)
+    except (np.linalg.LinAlgError, FloatingPointError) as error:
         what = "the difference is so much larger than its noise that rounding hides what it follows"
         remedy = "check that measured and simulated values are of one quantity in one unit"
         raise CalibrationError(
@@ -176,7 +180,8 @@ def _found(
     channel = replace(channel, static=static_patterns(channel))
     settled = settle(channel, progress=progress)
     findings = read_off(settled)
-    held_out = held_out_error(channel, choose_without, progress) if hold_out else None
+    chosen = partial(choose_without, beginning=settled.beginning)
+    held_out = held_out_error(channel, chosen, progress) if hold_out else None
     return Mismatch(
         table=table,
         settled=settled,
@@ -192,12 +197,15 @@ def _found(
     )
 
 
-def choose_without(channel: Channel, rows: NDArray[np.bool_]) -> Settled:
-    """Repeat the whole selection without some rows, shape (n,).
+def choose_without(
+    channel: Channel, rows: NDArray[np.bool_], *, beginning: Beginning = Beginning.EVERYTHING
+) -> Settled:
+    """Repeat the whole selection without some rows, shape (n,), from one beginning of the noise.
 
     It is searched less widely than all rows are, from one beginning, which can only make the error of its predictions larger.
     """
-    return settle(channel.without(rows).thinned(FOLD_ROWS), most_expanded=0, thorough=False)
+    kept = channel.without(rows).thinned(FOLD_ROWS)
+    return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,))
 
 
 def _second_start(settled: Settled, findings: Sequence[Finding]) -> float:
@@ -261,8 +269,8 @@ def _fitted(settled: Settled) -> tuple[Fitted, ...]:
     """Base parameters with the base alone, and beside everything that was found."""
     channel, bank, members = settled.channel, settled.bank, settled.best.members
     noise, known, size = settled.noise.innovation, channel.known, channel.base.samples.shape[1]
-    alone = solve([compress(np.arange(size), bank.base, bank.target)], known, noise, channel.held)
-    beside = alone
+    alone = channel.fitted(channel.target, _noise_alone(channel))
+    beside = solve([compress(np.arange(size), bank.base, bank.target)], known, noise, channel.held)
     if members:
         columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
         both = with_random(known, np.concatenate([member.sd for member in members]))
@@ -280,6 +288,14 @@ def _fitted(settled: Settled) -> tuple[Fitted, ...]:
         )
         for k, name in enumerate(channel.base.names)
     )
+
+
+def _noise_alone(channel: Channel) -> float:
+    """Standard deviation of white noise that leaves values of the base alone as uncertain as what it leaves does."""
+    left = channel.target - channel.base.samples[channel.kept] @ channel.refitted()
+    runs = [left[rows] for rows in channel.stretches] if channel.time is not None else [left]
+    found = noise_of(runs, channel.base.samples.shape[1])
+    return max(found.effective if channel.time is not None else found.sigma, channel.least_noise, 1e-300)
 
 
 def _rms(values: NDArray[np.float64]) -> float:

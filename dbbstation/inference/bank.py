@@ -365,7 +365,7 @@ class Bank:
         width = exact.shape[1]
         sd = np.concatenate([spacings, np.full(slack.shape[1] - len(tangents), law.form_uncertainty)])
         used = amplitudes != 0.0
-        at = max(float(np.sqrt(np.mean(np.square(amplitudes[used] / law.plausible[used])))), 1e-12)
+        at = max(float(np.sqrt(np.mean(np.square(amplitudes[used] / law.plausible_at(nonlinear)[used])))), 1e-12)
         points = float(np.prod([len(grid) for grid in law.grids]))
         # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
         weight = -float(np.log(max(points / 2.5 ** len(law.grids), 1.0)))
@@ -429,12 +429,13 @@ class Bank:
 
 def _forms(law: Law, columns: NDArray[np.int64], nonlinear: tuple[float, ...], log_weight: float) -> list[Variant]:
     """Forms of a law at one point: its choices where it has them, else all its amplitudes, whose columns these are."""
+    plausible = law.plausible_at(nonlinear)
     if not law.choices:
-        return [Variant(columns, law.plausible, nonlinear, log_weight=log_weight, positive=law.positive)]
+        return [Variant(columns, plausible, nonlinear, log_weight=log_weight, positive=law.positive)]
     return [
         Variant(
             columns[list(part)],
-            law.plausible[list(part)],
+            plausible[list(part)],
             nonlinear,
             label=label,
             whole=columns,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.curves import Clock
-    from dbbstation.inference.patterns import Pattern
+    from dbbstation.inference.patterns import Family, Pattern
     from dbbstation.inference.square_root import Solution
     from dbbstation.inference.variables import Variable
 
@@ -87,6 +87,9 @@ class Law:
             exactly; None where the effect is proportional to the amplitudes.
         choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
             from the others. None may be combined with `positive`.
+        sizes: usual size of each amplitude at values of the nonlinear parameters, shape (p,); None: `plausible` at all of them.
+        family: of patterns that it belongs to; None for physics of a client.
+        variables: that it follows, where it belongs to a family.
     """
 
     name: str
@@ -102,6 +105,13 @@ class Law:
     log_odds: float = NAMED_ODDS
     at: Callable[[tuple[float, ...], NDArray[np.float64]], NDArray[np.float64]] | None = None
     choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
+    sizes: Callable[[tuple[float, ...]], NDArray[np.float64]] | None = None
+    family: Family | None = None
+    variables: tuple[Variable, ...] = ()
+
+    def plausible_at(self, point: tuple[float, ...]) -> NDArray[np.float64]:
+        """Usual size of each amplitude at values of the nonlinear parameters, shape (p,)."""
+        return self.plausible if self.sizes is None else self.sizes(point)
 
 
 @dataclass(frozen=True, eq=False)

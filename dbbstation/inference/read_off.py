@@ -156,14 +156,15 @@ class _Judge:
         effect = self._settled.bank.samples(shown.columns) @ values
         whole, rms, confounded = self._concealed(effect)
         verdict, others, text = self._verdict(cause, member, probability, sigmas)
-        variables = pattern.variables if pattern else ()
+        law = self._settled.bank.laws.get(cause.name)
+        variables = pattern.variables if pattern else law.variables if law else ()
         there = verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS} and member is not None
         largest = _at_half(effect) if there else np.zeros(0, dtype=bool)
         channel = self._settled.channel
         return Finding(
             name=cause.name,
             verdict=verdict,
-            family=pattern.family if pattern else None,
+            family=pattern.family if pattern else law.family if law else None,
             label=shown.variant.label,
             variables=tuple(v.name for v in variables),
             probability=probability,

@@ -167,13 +167,15 @@ def _settled(
     looked: set[frozenset[str]] = set()
     compared: Settled | None = None  # after the last look
     most_probable, times_placed = -np.inf, 0
+    # Members to begin with come from a comparison that had been looked about for.
+    blank = not best
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
     looking = look and not channel.laws
     for number in range(MOST_ROUNDS):
         bank.measure(best)
         starts: list[tuple[Member, ...]] = []
         if looking:
-            best, starts = _looked_about(bank, best, refused, progress, options, first=compared is None)
+            best, starts = _looked_about(bank, best, refused, progress, options, first=blank and compared is None)
             if compared is not None and _would_be_the_same(compared, bank, best, refused):
                 return compared
         progress(f"sets of causes, round {number + 1}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.memory import memory_laws
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
@@ -73,16 +74,23 @@ class Table:
         follows = self.variables
         if np.ptp(self.simulated) > 0.0 and not any(_is_same(v.values, self.simulated) for v in follows):
             follows = (*follows, simulated)
+        residual, time_unit = (
+            self.measured - self.simulated,
+            self.clock.unit if self.clock is not None and self.clock.unit else "row",
+        )
+        laws = [self._law(source) for source in sources]
+        if time is not None and (size := float(np.std(residual))) > 0.0:
+            laws += memory_laws(follows, time, time_unit, self.blocks, size, self.unit)
         return Channel(
-            residual=self.measured - self.simulated,
+            residual=residual,
             unit=self.unit,
             blocks=self.blocks,
             names=self.names,
             variables=follows,
             base=Base.flat((OFFSET, *self.derivatives), samples),
-            laws=tuple(self._law(source) for source in sources),
+            laws=tuple(laws),
             time=time,
-            time_unit=self.clock.unit if self.clock is not None and self.clock.unit else "row",
+            time_unit=time_unit,
             simulated=simulated,
             noise_follows=tuple(_sizes_of_noise(follows, time, self.blocks)),
         )

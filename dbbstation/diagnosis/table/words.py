@@ -19,6 +19,8 @@ MEANINGS: dict[Family, str] = {
     Family.HYSTERESIS: "It turns its sign with the direction of travel: play or friction.",
     Family.SPEED: "It grows with the speed: viscous friction, or a delay of this variable.",
     Family.LAG: "The measured value runs after the simulated one (negative: ahead of it).",
+    Family.MEMORY: "It follows this variable late: a body warms up, a material creeps, a sensor or a filter lags.",
+    Family.DEAD_TIME: "It follows this variable after a dead time: transport, a network, or a clock that is off.",
     Family.DRIFT: "It grows with time: warming, wear, or a clock that runs at another rate.",
     Family.PRODUCT: "It depends on both together: no curve over one of them alone shows it.",
     Family.CURVE: "It follows this variable smoothly.",

@@ -220,8 +220,10 @@ class Channel:
         return solve([self._block(target)], self.known, noise, self.held)
 
     def refitted(self) -> NDArray[np.float64]:
-        """Values of the base alone by ordinary least squares, shape (k,): what a person would refit without knowing any noise."""
-        return self.fitted(self.target, self._about).x
+        """Values of the base alone by ordinary least squares, shape (k,): what a person would refit who knows neither noise nor priors."""
+        rows = self.base.samples[self.kept]
+        scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+        return np.asarray(np.linalg.lstsq(rows / scale, self.target, rcond=None)[0] / scale)
 
     @property
     def kept_blocks(self) -> list[slice]:

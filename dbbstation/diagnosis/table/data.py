@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.table.contract import TableSource
+
+REFITTED = 2.0
+"""What refitting a parameter changes the simulated value by, one standard deviation, over what that was off by as simulated [rms].
+One to three give the same names; see docs/mismatch.md."""
 
 OFFSET = "offset"
 """Name of the base column that is the same for all rows."""
@@ -38,6 +42,9 @@ class Table:
         names: of the blocks.
         clock: variable that orders the rows; None where nothing does.
         in_row_order: rows stand in the order in which they were measured, though no column says when.
+        known: standard uncertainty to which parameters were known before, by name, in their own units.
+        free: parameters of which nothing is known, such as initial states.
+        has_offset: whether measured and simulated values may differ by a constant that is of no interest.
     """
 
     measured: NDArray[np.float64]
@@ -51,6 +58,9 @@ class Table:
     names: tuple[str, ...]
     clock: Variable | None
     in_row_order: bool = False
+    known: Mapping[str, float] = field(default_factory=dict)
+    free: frozenset[str] = frozenset()
+    has_offset: bool = True
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -60,13 +70,25 @@ class Table:
         """Whether rows follow one another in time."""
         return self.clock is not None or self.in_row_order
 
+    def spread_of(self, name: str) -> float:
+        """Standard deviation of what a parameter may be off by, before the recording is looked at; infinite where it is free."""
+        if name == OFFSET or name in self.free:
+            return np.inf
+        if name in self.known:
+            return self.known[name]
+        # What changes the simulated value by much more than it was off by is no correction of a parameter.
+        moves = float(np.sqrt(np.mean(np.square(self.derivatives[name]))))
+        off = float(np.std(self.measured - self.simulated))
+        return REFITTED * off / moves if moves > 0.0 and off > 0.0 else np.inf
+
     def channel(self, sources: Sequence[TableSource] = ()) -> Channel:
         """Channel of measured less simulated.
 
         Args:
             sources: physics of the user's own; those that lack a column are left out by the caller.
         """
-        samples = np.column_stack([np.ones(len(self)), *self.derivatives.values()])
+        columns = {OFFSET: np.ones(len(self)), **self.derivatives} if self.has_offset else dict(self.derivatives)
+        samples = np.column_stack([np.zeros((len(self), 0)), *columns.values()])
         simulated = Variable(self.simulated_name, self.unit, Kind.ANY, self.simulated)
         time = None if self.clock is None else self.clock.values
         if time is None and self.in_row_order:
@@ -87,7 +109,9 @@ class Table:
             blocks=self.blocks,
             names=self.names,
             variables=follows,
-            base=Base.flat((OFFSET, *self.derivatives), samples),
+            base=Base(
+                tuple(columns), samples, np.array([*map(self.spread_of, columns)]), np.zeros(len(columns), dtype=bool)
+            ),
             laws=tuple(laws),
             time=time,
             time_unit=time_unit,

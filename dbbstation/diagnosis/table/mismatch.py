@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.left_over import left_over
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
     from dbbstation.inference.settled import Settled
     from dbbstation.texts import Texts
 
+FAR_STATED = 3.0
+"""Standard uncertainties by which a parameter is off what was stated of it from which on this is said: one in 400 by chance."""
+
 FOLD_ROWS = 3000
 """Rows that a selection for a held-out part is made from, at the most, evenly spaced: fewer rows can only make its error larger."""
 
@@ -47,12 +51,21 @@ class Fitted:
         before: with the base alone, by ordinary least squares; its uncertainty allows for neighbours that resemble each other.
         after: with what was found beside it.
         confounded: share of what the parameter does that this can do as well, R².
+        known: standard uncertainty to which it was known before; None where it was free.
+        stated: whether the user gave that; else it is what moves the simulated value twice as far as that was off.
     """
 
     name: str
     before: Value
     after: Value
     confounded: float
+    known: float | None = None
+    stated: bool = False
+
+    @property
+    def is_far(self) -> bool:
+        """Whether it moved so far that its derivative, or what was known of it, must be asked again."""
+        return self.known is not None and abs(self.after.value) > (FAR_STATED if self.stated else 1.0) * self.known
 
 
 @dataclass(frozen=True)
@@ -115,10 +128,19 @@ class Mismatch:
         return bool(self.settled.best.members) or not self.left.is_noise
 
     @property
+    def offset(self) -> Value | None:
+        """Constant that lies between measured and simulated values; None where there may be none."""
+        return next((one.before for one in self.fitted if one.name == OFFSET), None)
+
+    @property
     def offset_is_there(self) -> bool:
         """Whether a constant lies between them that is none of chance."""
-        offset = self.fitted[0].before
-        return abs(offset.value) >= OUT * offset.uncertainty
+        return self.offset is not None and abs(self.offset.value) >= OUT * self.offset.uncertainty
+
+    @property
+    def parameters(self) -> tuple[Fitted, ...]:
+        """Parameters of the simulation."""
+        return tuple(one for one in self.fitted if one.name != OFFSET)
 
     @property
     def explained(self) -> NDArray[np.float64]:
@@ -188,7 +210,7 @@ def _found(
         findings=findings,
         shares=_shares(settled),
         resembles=_resembles(settled),
-        fitted=_fitted(settled),
+        fitted=_fitted(settled, table),
         left=left_over(settled),
         held_out=held_out,
         lacking=lacking,
@@ -265,7 +287,7 @@ def _followed(effect: NDArray[np.float64], columns: NDArray[np.float64]) -> floa
     return 1.0 - float(np.sum((effect - both @ values) ** 2)) / whole if whole > 0.0 else 0.0
 
 
-def _fitted(settled: Settled) -> tuple[Fitted, ...]:
+def _fitted(settled: Settled, table: Table) -> tuple[Fitted, ...]:
     """Base parameters with the base alone, and beside everything that was found."""
     channel, bank, members = settled.channel, settled.bank, settled.best.members
     noise, known, size = settled.noise.innovation, channel.known, channel.base.samples.shape[1]
@@ -277,14 +299,15 @@ def _fitted(settled: Settled) -> tuple[Fitted, ...]:
         block = compress(np.arange(columns.shape[1]), columns, bank.target)
         beside = solve([block], both, noise, channel.held)
     before, after = np.diag(alone.covariance), np.diag(beside.covariance)[:size]
-    units = ["" if k == 0 else "in its own unit" for k in range(size)]
-    units[0] = channel.unit
+    units = [channel.unit if name == OFFSET else "in its own unit" for name in channel.base.names]
     return tuple(
         Fitted(
             name,
             Value(float(alone.x[k]), float(np.sqrt(max(before[k], 0.0))), units[k]),
             Value(float(beside.x[k]), float(np.sqrt(max(after[k], 0.0))), units[k]),
             float(np.clip(1.0 - before[k] / after[k], 0.0, 1.0)) if after[k] > 0.0 else 1.0,
+            float(channel.base.prior[k]) if np.isfinite(channel.base.prior[k]) else None,
+            name in table.known,
         )
         for k, name in enumerate(channel.base.names)
     )

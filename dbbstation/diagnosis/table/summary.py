@@ -34,7 +34,7 @@ def mismatch_summary(found: Mismatch) -> dict[str, Any]:
             for v in table.variables
         ],
         "mismatch": found.is_there,
-        "offset": {**_value(found.fitted[0].before), "significant": found.offset_is_there},
+        "offset": None if found.offset is None else {**_value(found.offset), "significant": found.offset_is_there},
         "noise": {
             "sigma": noise.sigma,
             "rows_as_one": noise.correlation_samples,
@@ -81,6 +81,9 @@ def mismatch_summary(found: Mismatch) -> dict[str, Any]:
                 "after": _value(p.after),
                 "shift": p.after.value - p.before.value,
                 "confounded": p.confounded,
+                "known": p.known,
+                "stated": p.stated,
+                "far": p.is_far,
             }
             for p in found.fitted
         ],

@@ -116,6 +116,7 @@ class Table:
             time=time,
             time_unit=time_unit,
             simulated=simulated,
+            least_noise=float(np.hypot(_rounding(self.measured), _rounding(self.simulated))),
             noise_follows=tuple(_sizes_of_noise(follows, time, self.blocks)),
         )
 
@@ -155,6 +156,17 @@ def _sizes_of_noise(
         yield f"its largest value less {variable.name}", variable.high - variable.values
         if time is not None and variable.kind is not Kind.TIME and variable.is_path(blocks):
             yield f"speed of {variable.name}", np.abs(variable.rates(time, blocks))
+
+
+def _rounding(values: NDArray[np.float64]) -> float:
+    """Standard deviation of what was rounded off values that are multiples of a step [JCGM 100:2008, sec. F.2.2.1]."""
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > EQUAL * np.ptp(values)]
+    return float(steps.min()) / float(np.sqrt(12.0)) if len(steps) else 0.0
+
+
+EQUAL = 1e-9
+"""Share of a range by which values differ that are equal."""
 
 
 def _is_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:

@@ -230,7 +230,7 @@ class Bank:
         seen = seen[seen > RANK * seen[:1]]
         uneven = 0.0 if self.whitening is None else float(np.log(self.whitening.diagonal()).sum())
         squares = 0.5 * float(rest @ rest) / innovation**2
-        parameters = self.noise.order + (1 if np.isfinite(self.tails) else 0)
+        parameters = self.noise.parameters + (1 if np.isfinite(self.tails) else 0)
         cost = akaike_cost(parameters, len(target)) + (float(np.log(len(target))) if self.grows_with else 0.0)
         return -len(target) * float(np.log(innovation)) + uneven - squares - float(np.log(seen).sum()) - cost
 
@@ -453,7 +453,10 @@ def amplitudes_of(variant: Variant) -> NDArray[np.int64]:
 
 
 def alike(one: Coloured, other: Coloured) -> bool:
-    """Whether two noises are the same for anything that is compared: their spectra are."""
+    """Whether two noises are the same for anything that is compared: their spectra are, and what is slow and what is new in them."""
+    pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
+    if any(abs(a - b) >= SETTLED * max(a, b) for a, b in pairs):
+        return False
     frequency = np.linspace(0.0, 0.5, ALIKE_AT)
     return float(np.abs(one.log_power(frequency) - other.log_power(frequency)).mean()) < 2.0 * SETTLED
 

@@ -7,7 +7,7 @@ need be. So a wave, a step or a pulse is held against the noise that there is at
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -68,10 +68,12 @@ class Coloured:
     Attributes:
         sigma: standard deviation of one row, in the unit of the residual.
         partial: partial autocorrelations from lag 1 on; none for white noise.
+        of_first_order: whether it is white noise on top of a first-order process, which two numbers say.
     """
 
     sigma: float
     partial: tuple[float, ...] = ()
+    of_first_order: bool = False
 
     @classmethod
     def first_order(cls, sigma: float, share: float, decay: float) -> Coloured:
@@ -83,7 +85,7 @@ class Coloured:
             decay: correlation of that from one row to the next.
         """
         lags = np.arange(LONGEST + 1)
-        return cls(sigma, partial_autocorrelations(np.where(lags == 0, 1.0, share * decay**lags)))
+        return cls(sigma, partial_autocorrelations(np.where(lags == 0, 1.0, share * decay**lags)), of_first_order=True)
 
     @property
     def is_white(self) -> bool:
@@ -94,6 +96,11 @@ class Coloured:
     def order(self) -> int:
         """Rows that a prediction looks back over."""
         return len(self.partial)
+
+    @property
+    def parameters(self) -> int:
+        """Numbers that say how neighbours resemble each other."""
+        return min(self.order, 2) if self.of_first_order else self.order
 
     @property
     def correlation_samples(self) -> float:
@@ -112,7 +119,7 @@ class Coloured:
 
     def with_innovation(self, innovation: float) -> Coloured:
         """The same at a level where so much is new in a row."""
-        return Coloured(innovation / float(np.sqrt(self._predictors[1][-1])), self.partial)
+        return replace(self, sigma=innovation / float(np.sqrt(self._predictors[1][-1])))
 
     @cached_property
     def _predictors(self) -> tuple[list[NDArray[np.float64]], list[float]]:

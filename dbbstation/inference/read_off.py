@@ -11,6 +11,7 @@ from scipy.special import expit
 from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.settle import impossible, moved
 from dbbstation.inference.verdict import Value, Verdict
 
@@ -142,7 +143,8 @@ class _Judge:
         pattern = self._settled.bank.patterns.get(cause.name)
         member = self._members.get(cause.name)
         equal = self._classes.get(cause.name, (cause.name,))
-        probability = self._settled.averaged(self._alternatives.probability(equal), equal)
+        pooled = self._pooled(cause.name)
+        probability = self._settled.averaged(self._alternatives.probability(pooled), pooled)
         gain, shown = self._beside[cause.name] if member is None else (self._best.log_factor(cause.name), member)
         if member is None:
             # The prior must not say how much could hide.
@@ -183,11 +185,20 @@ class _Judge:
             text=text,
         )
 
+    def _pooled(self, name: str) -> tuple[str, ...]:
+        """A cause and its class; of members that are stretches of time also other choices of stretches, which begin or end elsewhere."""
+        equal = self._classes.get(name, (name,))
+        patterns = self._settled.bank.patterns
+        if name not in self._members or name not in patterns or patterns[name].family not in IN_TIME:
+            return equal
+        others = [c.name for c in self._settled.causes if c.name in patterns and c.name not in self._members]
+        return (*equal, *(n for n in others if patterns[n].family is patterns[name].family and n not in equal))
+
     def _verdict(
         self, cause: Cause, member: Member | None, probability: float, sigmas: float
     ) -> tuple[Verdict, tuple[str, ...], str]:
         """Verdict, with whom it is ambiguous, and why."""
-        if member is not None and self._alternatives.probability(self._classes[cause.name]) >= SURE:
+        if member is not None and self._alternatives.probability(self._pooled(cause.name)) >= SURE:
             return self._certain(probability, sigmas)
         if member is None and (why := self._impossible_in_place(cause)):
             return Verdict.RULED_OUT, (), why

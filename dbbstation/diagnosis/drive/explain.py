@@ -9,7 +9,6 @@ from dbbstation.diagnosis.drive.channel import MASS, VISCOUS, drive_channel
 from dbbstation.diagnosis.drive.fit import DriveFit, fit, log_possible, with_method
 from dbbstation.inference.hypotheses import LIKELY, Posterior
 from dbbstation.inference.settle import settle
-from dbbstation.inference.settled import Beginning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -28,9 +27,6 @@ by the challenge of the most probable hypothesis too."""
 
 MOST_LOOKS = 2
 """Looks for pulses in each round, at the most; each takes dozens. Where more are left, it is the law that is wrong."""
-
-BEGINNINGS = (Beginning.EVERYTHING, Beginning.EVERYTHING_LONG_TAILS)
-"""Of the noise: the laws of a drive are known, and its force is a hundred times its noise. Beside nothing, that force is the noise."""
 
 LOOKED_AT = 60
 """Hypotheses, most probable first, that are asked whether they can be."""
@@ -68,7 +64,7 @@ def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Ca
             drive.channel,
             most_expanded=MOST_EXPANDED,
             most_looks=MOST_LOOKS,
-            beginnings=BEGINNINGS,
+            rivals=False,
             progress=progress,
         )
         settled = _possible_first(drive, settled)

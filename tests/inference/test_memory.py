@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.inference.memory import lagging, memory_laws
-from dbbstation.inference.verdict import Verdict
 from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.verdict import Verdict
 from tests.diagnosis.table.nulls import moving, table_of
 
 NOISE_MM = 0.02
@@ -32,7 +32,7 @@ def test_a_lag_is_that_of_its_differential_equation(rng, constant):
     assert late == pytest.approx(solved.y[0], abs=1e-5)
 
 
-def test_each_block_begins_by_itself(rng):
+def test_each_block_begins_by_itself():
     time = np.tile(np.arange(50.0), 2)
     values = np.concatenate([np.sin(time[:50] / 9.0), 5.0 + np.sin(time[50:] / 9.0)])
     blocks = (slice(0, 50), slice(50, 100))

@@ -62,15 +62,19 @@ class Coverage:
             name: {"inside": float(share), "sigma_um": float(sigma)}
             for name, share, sigma in zip(self.names, inside.mean(axis=0), self.sigma_um, strict=True)
         }
-        positions = (np.abs(self.positions) < WITHIN).mean(axis=1)
+        # Where a coordinate has no stated uncertainty there is nothing to hold against the truth.
+        inside_there = (np.abs(self.positions) < WITHIN).sum(axis=(0, 1))
+        stated = np.isfinite(self.positions).sum(axis=(0, 1))
         return {
             "machines": len(self.parameters),
             "parameters_pooled": float(inside.mean()),
             "parameters_least": float(inside.mean(axis=0).min()),
             "parameters_most": float(inside.mean(axis=0).max()),
             "chance_of_one_parameter": wilson(LEVEL, len(inside)),
-            "positions_pooled": float(positions.mean()),
-            "positions_by_axis": dict(zip("xyz", positions.mean(axis=0).tolist(), strict=True)),
+            "positions_pooled": float(inside_there.sum() / max(int(stated.sum()), 1)),
+            "positions_by_axis": {
+                axis: float(inside_there[k] / stated[k]) for k, axis in enumerate("xyz") if stated[k]
+            },
             "parameters": per_parameter,
         }
 

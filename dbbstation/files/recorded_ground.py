@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import OutputError
+from dbbstation.files.gateway import head_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,7 +44,6 @@ def _is_session(folder: Path) -> bool:
             return False
         if (folder / "runs").is_dir():
             return True
-        with file.open("rb") as text:
-            return _MARK in text.read(_WITHIN)
+        return _MARK in head_of(file, _WITHIN)
     except OSError:
         return False

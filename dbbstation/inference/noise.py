@@ -45,7 +45,7 @@ def noise_of(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> N
     count = sum(len(residual) for residual in residuals)
     square = sum(float(residual @ residual) for residual in residuals)
     sigma = float(np.sqrt(square / max(count - freedom_used, 1.0)))
-    covariance = sum(_autocovariance(residual) for residual in residuals if len(residual) >= _FEWEST)
+    covariance = sum(_autocovariance(residual) for residual in residuals if len(residual) >= _LAGS)
     if np.ndim(covariance) == 0 or not square > 0.0:
         return Noise(sigma, 1.0)
     correlation = np.asarray(covariance) / np.asarray(covariance)[0]
@@ -59,14 +59,8 @@ _LAGS = 201
 """Lags looked at, in samples; longer correlations are structure that a model should name, not noise."""
 
 
-_FEWEST = 20
-"""Samples of a run whose neighbours are compared, at the least; beyond its length a run has no products of neighbours."""
-
-
 def _autocovariance(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     """Sums of products at lags 0 to 200."""
-    size = next_fast_len(
-        max(len(residual), _LAGS) + _LAGS, real=True
-    )  # room for the lags: nothing wraps round into them
+    size = next_fast_len(len(residual) + _LAGS, real=True)  # room for the lags: nothing wraps round into them
     spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
     return np.fft.irfft(spectrum, size)[:_LAGS]

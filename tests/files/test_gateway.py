@@ -32,6 +32,7 @@ ROUND_IT = {
     "cli/__init__.py": "opens the null device",
     "cli/settings.py": "reads a file of the package",
     "report/html.py": "reads a file of the package",
+    "files/recordings/event_log.py": "appends to the log, and cuts what could not be noted",
     "report/pdf.py": "reads what the browser has just printed",
 }
 """Files that open files themselves, each with its reason."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.patterns import Family
+from dbbstation.inference.seen import IN_TIME
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.table.mismatch import Mismatch
@@ -39,6 +40,9 @@ def sentence_of(found: Mismatch, finding: Finding) -> str:
     parts = [_where(found, finding)]
     if finding.family is not None:
         parts.append(MEANINGS[finding.family])
+        clock = found.table.clock
+        if finding.family in IN_TIME or (clock is not None and clock.name in finding.variables):
+            parts.append(HAPPENED)
     if finding.name in found.texts:
         texts = found.texts[finding.name]
         parts += [texts.what, texts.confirm]
@@ -57,6 +61,8 @@ def sentence_of(found: Mismatch, finding: Finding) -> str:
     parts.append(finding.text)
     return " ".join(part for part in parts if part)
 
+
+HAPPENED = "It is something that happened in these rows: no law says whether it comes again."
 
 HALF = 0.5
 """Share of a curve that a named form must follow to be said to be most of it."""

@@ -34,6 +34,10 @@ LONGEST_SHARE = 1.0 / 3.0
 LONGEST_DELAY_SHARE = 0.1
 """Share of the longest block that the longest dead time is: the rows before it say nothing about it."""
 
+LATE = 0.1
+"""Probability that an effect that follows a variable does so late enough to be seen, by either of both ways: a linear effect over what
+changes slowly is as late as one likes, and is called linear."""
+
 AT_ONCE = 0.5
 """Probability that the simulation has the effect, but at once: then the memory shows as what comes late less what comes at once."""
 
@@ -85,7 +89,7 @@ def memory_laws(
                         time_unit,
                     ),
                     grids=(grid,),
-                    log_odds=log_odds(len(usable)),
+                    log_odds=log_odds(len(usable)) + float(np.log(LATE / len(kinds))),
                     choices=_choices(2 + starts),
                     sizes=partial(_sizes, partial(columns, variable, time, blocks), size),
                     family=family,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.special import expit
 from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.settle import impossible, moved
 from dbbstation.inference.verdict import Value, Verdict
@@ -19,7 +21,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.model_comparison import Cause, Member
-    from dbbstation.inference.patterns import Family
     from dbbstation.inference.settled import Settled
 
 OUT = 5.0
@@ -27,6 +28,9 @@ OUT = 5.0
 
 ABSENT = 0.01
 """Probability up to which something that would have been seen is ruled out, or its prior probability if that is less."""
+
+LATE = (Family.MEMORY, Family.DEAD_TIME)
+"""Families of what follows a variable late."""
 
 HALF = 0.5
 """Share of its largest value from which on an effect counts as being there, for the spans over which it is."""
@@ -186,20 +190,43 @@ class _Judge:
         )
 
     def _pooled(self, name: str) -> tuple[str, ...]:
-        """A cause and its class; of members that are stretches of time also other choices of stretches, which begin or end elsewhere."""
+        """A cause and its class, and what would be the same to its user.
+
+        Of stretches of time that are other choices of stretches, which begin or end elsewhere; of what is in proportion to a variable,
+        the same with a delay too short to be seen.
+        """
         equal = self._classes.get(name, (name,))
-        patterns = self._settled.bank.patterns
-        if name not in self._members or name not in patterns or patterns[name].family not in IN_TIME:
+        kind = self._kinds.get(name)
+        if name not in self._members or kind is None:
             return equal
-        others = [c.name for c in self._settled.causes if c.name in patterns and c.name not in self._members]
-        return (*equal, *(n for n in others if patterns[n].family is patterns[name].family and n not in equal))
+        if kind[0] in IN_TIME:
+            same = [n for n, other in self._kinds.items() if other[0] is kind[0]]
+        elif kind[0] is Family.LINEAR:
+            same = [n for n, other in self._kinds.items() if other[0] in LATE and other[1] == kind[1]]
+        else:
+            return equal
+        return (*equal, *(n for n in same if n not in equal and n not in self._members))
+
+    @cached_property
+    def _kinds(self) -> dict[str, tuple[Family, tuple[str, ...]]]:
+        """Family and variables of each cause that has a family."""
+        bank = self._settled.bank
+        of_patterns = {name: (one.family, one.variables) for name, one in bank.patterns.items()}
+        of_laws = {n: (one.family, one.variables) for n, one in bank.laws.items() if one.family is not None}
+        there = {cause.name for cause in self._settled.causes}
+        return {
+            name: (family, tuple(v.name for v in variables))
+            for name, (family, variables) in (of_patterns | of_laws).items()
+            if name in there
+        }
 
     def _verdict(
         self, cause: Cause, member: Member | None, probability: float, sigmas: float
     ) -> tuple[Verdict, tuple[str, ...], str]:
         """Verdict, with whom it is ambiguous, and why."""
         if member is not None and self._alternatives.probability(self._pooled(cause.name)) >= SURE:
-            return self._certain(probability, sigmas)
+            verdict, others, text = self._certain(probability, sigmas)
+            return verdict, others, text or self._unless_late(cause.name)
         if member is None and (why := self._impossible_in_place(cause)):
             return Verdict.RULED_OUT, (), why
         if alike := [name for name, equal in self._classes.items() if cause.name in equal and name != cause.name]:
@@ -211,6 +238,15 @@ class _Judge:
         if unsure := [name for name, others in self._alternatives.ambiguities.items() if cause.name in others]:
             return Verdict.AMBIGUOUS, (unsure[0],), f"These rows cannot tell it from {unsure[0]}."
         return self._absent(cause, probability)
+
+    def _unless_late(self, name: str) -> str:
+        """That these rows do not tell whether something linear comes late, where they do not."""
+        late = [
+            n for n in self._pooled(name) if n not in self._classes.get(name, (name,)) and self._kinds[n][0] in LATE
+        ]
+        if not late or self._alternatives.probability(late) < 1.0 - SURE:
+            return ""
+        return "These rows do not tell whether it comes late."
 
     def _certain(self, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
         """Verdict of what is there for sure beside the most probable noise."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -52,6 +52,9 @@ class Asked:
         run: column that tells runs apart; None where there is none.
         time: column that says when, `ROWS` for the order of the rows; None: it is guessed.
         numbers: how numbers are written; None: a dot in them, and the separator that the header has most of.
+        known: standard uncertainty to which parameters were known before, by name.
+        free: parameters of which nothing is known.
+        has_offset: whether measured and simulated values may differ by a constant that is of no interest.
     """
 
     measured: str
@@ -60,6 +63,9 @@ class Asked:
     run: str | None = None
     time: str | None = None
     numbers: NumberLanguage | None = None
+    known: Mapping[str, float] = field(default_factory=dict)
+    free: tuple[str, ...] = ()
+    has_offset: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +102,27 @@ def stated_variables(text: str) -> dict[str, Meaning | None]:
                 Problem("--variables", 0, 0, f"`{part}` is not understood", f"write NAME or NAME=UNIT, {remedy}")
             )
         found[name] = meaning
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def stated_uncertainties(text: str) -> dict[str, float]:
+    """Standard uncertainties as the option gives them: `mass=0.2,stiffness=300`.
+
+    Raises:
+        InputError: one that is no positive number.
+    """
+    found, faults = {}, []
+    for part in (part.strip() for part in text.split(",")):
+        name, _, number = (piece.strip() for piece in part.partition("="))
+        try:
+            found[name] = float(number)
+        except ValueError:
+            found[name] = np.nan
+        if not name or not 0.0 < found[name] < np.inf:
+            remedy = "write NAME=U, U a positive number in the unit of the parameter"
+            faults.append(Problem("--known", 0, 0, f"`{part}` is not understood", remedy))
     if faults:
         raise InputError(faults)
     return found
@@ -230,9 +257,28 @@ class _Reader:
             names=names,
             clock=at,
             in_row_order=asked.time == ROWS,
+            known=asked.known,
+            free=frozenset(asked.free),
+            has_offset=asked.has_offset,
         )
+        self._refuse_unknown(table)
         texts = {name: tuple(column[k] for k in rows.tolist()) for name, column in cells.items()}
         return Tabulated(table, tuple(self._names), texts, tuple(self._notes))
+
+    def _refuse_unknown(self, table: Table) -> None:
+        """Refuse statements about parameters that the table has no derivative of."""
+        there = ", ".join(table.derivatives) or "none"
+        remedy = f"name parameters of columns {DERIVATIVE}NAME, here: {there}"
+        stated = [("--known", name) for name in self._asked.known] + [("--free", name) for name in self._asked.free]
+        faults = [
+            Problem(option, 0, 0, f"`{name}` is no parameter of this table", remedy)
+            for option, name in stated
+            if name not in table.derivatives
+        ]
+        both = sorted(set(self._asked.known) & set(self._asked.free))
+        faults += [Problem("--free", 0, 0, f"`{name}` is stated with --known, too", "give it once") for name in both]
+        if faults:
+            raise InputError(faults)
 
     def _derivatives(self, values: Mapping[str, NDArray[np.float64]]) -> list[str]:
         found = [name for name in self._names if name.startswith(DERIVATIVE) and len(name) > len(DERIVATIVE)]

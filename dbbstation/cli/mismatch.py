@@ -41,6 +41,14 @@ if TYPE_CHECKING:
     metavar="FILE.py",
     help="Python file with physics of your own. It is executed. May be given more than once.",
 )
+@click.option(
+    "--known",
+    metavar="NAME=U,...",
+    help="Standard uncertainty to which parameters of columns d_NAME were known [default: what moves the simulated value twice as "
+    "far as it is off].",
+)
+@click.option("--free", metavar="NAME,...", help="Parameters of which nothing is known, such as initial states.")
+@click.option("--no-offset", is_flag=True, help="Let no constant lie between measured and simulated values.")
 @click.option("--no-held-out", is_flag=True, help="Leave out the held-out test, which takes most of the time.")
 @click.option(
     "--out",
@@ -60,6 +68,9 @@ def mismatch(
     run: str | None,
     time: str | None,
     source_files: tuple[Path, ...],
+    known: str | None,
+    free: str | None,
+    no_offset: bool,
     no_held_out: bool,
     decimal: str | None,
     separator: str | None,
@@ -80,6 +91,7 @@ def mismatch(
       dbbstation mismatch day1.csv day2.csv --measured y_um --simulated y_sim_um --figure where.svg
       dbbstation mismatch excel.csv --measured y_um --simulated y_sim_um --decimal ,
       dbbstation mismatch arm.csv --measured z_mm --simulated fk_mm --variables q1=deg,q2=deg,temperature --json
+      dbbstation mismatch tank.csv --measured level_m --simulated level_sim_m --known valve=0.02 --free level_at_start
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import stage_bar
@@ -88,14 +100,24 @@ def mismatch(
     from dbbstation.diagnosis.table.summary import mismatch_summary
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.provenance import refuse_existing_table, write_table
-    from dbbstation.tabulated import Asked, load_sources, load_tables, stated_variables
+    from dbbstation.tabulated import Asked, load_sources, load_tables, stated_uncertainties, stated_variables
 
     if out is not None:
         refuse_existing_table(out, force=force)
     if figure is not None:
         refuse_existing(figure, force=force)
     numbers = number_language(decimal, separator) if decimal or separator else None
-    asked = Asked(measured, simulated, stated_variables(variables) if variables else None, run, time, numbers)
+    asked = Asked(
+        measured,
+        simulated,
+        stated_variables(variables) if variables else None,
+        run,
+        time,
+        numbers,
+        known=stated_uncertainties(known) if known else {},
+        free=tuple(name.strip() for name in free.split(",")) if free else (),
+        has_offset=not no_offset,
+    )
     tabulated = load_tables(data, asked)
     for note in tabulated.notes:
         say(f"note: {note}")
@@ -163,8 +185,9 @@ def _print(summary: Mapping[str, Any]) -> None:
     held_out = summary["held_out_rms"]
     if held_out:
         echo(
-            f"\nheld-out error: {held_out['before']:.3g} -> {held_out['after']:.3g} {unit} rms, over "
-            f"{len(held_out['folds'])} parts, everything chosen anew without each of them"
+            f"\nheld-out error: {held_out['as_simulated']:.3g} as simulated, {held_out['before']:.3g} refitted, "
+            f"{held_out['after']:.3g} {unit} rms corrected; over {len(held_out['folds'])} parts, everything chosen anew "
+            "without each of them"
         )
     echo()
     _print_left(summary)
@@ -182,7 +205,7 @@ def _print_whether(summary: Mapping[str, Any]) -> None:
     """Is there a mismatch, how large, beside which noise, led by which variable."""
     unit, noise, rms = summary["unit"], summary["noise"], summary["residual_rms"]
     offset = summary["offset"]
-    if offset["significant"]:
+    if offset and offset["significant"]:
         echo(f"Measured less simulated is {_number(offset)} on average; this is fitted and is not counted below.")
     if not summary["mismatch"]:
         echo(f"No mismatch: what differs, {rms['before']:.3g} {unit} rms, is noise.".replace("  ", " "))
@@ -196,6 +219,10 @@ def _print_whether(summary: Mapping[str, Any]) -> None:
         else "; fitted jointly, since nothing says in which order the rows were measured"
     )
     alike = f", {noise['rows_as_one']:.3g} rows count as one" if noise["rows_as_one"] > 1.0 else ""
+    if noise["degrees_of_freedom"]:
+        alike += f", long tails (Student's t, {noise['degrees_of_freedom']:g} degrees of freedom)"
+    if noise["grows_with"]:
+        alike += f", its variance grows with {noise['grows_with']}"
     echo(f"noise of one row: {noise['sigma']:.3g} {unit}{alike}{fitted}")
     if summary["led_by"]:
         led = ", ".join(
@@ -245,13 +272,24 @@ MOST_VALUES = 6
 
 
 def _print_parameters(summary: Mapping[str, Any]) -> None:
-    parameters = summary["parameters"][1:]
+    parameters = summary["parameters"][0 if summary["offset"] is None else 1 :]
     if not parameters:
         return
     echo("\nparameters of the simulation, fitted anew:")
     for p in parameters:
         before, after = _number(p["before"]), _number(p["after"])
         echo(f"  {p['name']}: {before} alone, {after} beside what was found; R² {p['confounded']:.2f} with it")
+        if p["far"]:
+            echo(f"    {TOO_FAR_STATED if p['stated'] else TOO_FAR}")
+
+
+TOO_FAR = (
+    "It moves the simulated value more than twice as far as that was off: simulate anew with the new value, since the derivative "
+    "may not hold so far."
+)
+TOO_FAR_STATED = (
+    "It is more than three of its stated standard uncertainties away: check what was stated, and simulate anew."
+)
 
 
 def _print_left(summary: Mapping[str, Any]) -> None:

@@ -14,12 +14,21 @@ import numpy as np
 from scipy.sparse import diags_array
 from scipy.stats import chi2
 
-from dbbstation.inference.coloured import Bands, Coloured, bands_of, coloured_noise
+from dbbstation.inference.coloured import (
+    Bands,
+    Coloured,
+    akaike_cost,
+    autoregressive,
+    bands_of,
+    first_order,
+    with_put_back,
+)
 from dbbstation.inference.model_comparison import Cause, ModelComparison, Variant
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import NAMED, Family, log_odds
 from dbbstation.inference.projection import BesideBase, CauseColumns
 from dbbstation.inference.square_root import compress, solve
+from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable, Sequence
@@ -28,6 +37,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
     from dbbstation.inference.channel import Channel, Law
+    from dbbstation.inference.model_comparison import Member
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.pieces import Left
 
@@ -60,15 +70,23 @@ class Bank:
         noise: that columns are whitened for.
         whitening: that does it, over the kept rows; None where the noise is white and the same in all rows.
         spread: of the noise in each kept row, over that of all, shape (m,).
+        trust: root of the weight that what is new in each kept row has, shape (m,); ones unless the noise has long tails.
+        tails: degrees of freedom of Student's t that what is new follows; infinite where it is Gaussian.
+        measures_beside_members: whether `measure` asks what a hypothesis leaves, not what everything does.
+        long_tails: whether what is new in a row may follow Student's t.
+        grows_with: what the variance grows with; empty where it is the same in all rows.
     """
 
     def __init__(self, channel: Channel) -> None:
         self.channel = channel
+        self.measures_beside_members, self.long_tails = False, False
         self.patterns: dict[str, Pattern] = {}
         self.laws: dict[str, Law] = {law.name: law for law in channel.laws}
         self.noise = Coloured(channel.size)
         self.whitening: csr_array | None = None
         self.spread = np.ones(len(channel.target))
+        self.trust = np.ones(len(channel.target))
+        self.tails, self.grows_with = np.inf, ""
         self._columns = CauseColumns(channel.base.samples[channel.kept])
         self._everywhere: list[NDArray[np.float64]] = []
         self._of_patterns: dict[str, Cause] = {}
@@ -106,6 +124,13 @@ class Bank:
     def looked_for(self) -> set[str]:
         """Names of patterns that were picked by a look."""
         return {name for name, pattern in self.patterns.items() if pattern.family in LOOKED_FOR}
+
+    def kind_of(self, name: str) -> tuple[str, ...]:
+        """What tells a cause from those that are no other place or period of the same."""
+        pattern = self.patterns.get(name)
+        if pattern is None or pattern.family not in LOOKED_FOR:
+            return (name,)
+        return (pattern.family, *(variable.name for variable in pattern.variables))
 
     def drop(self, names: Iterable[str]) -> None:
         """Leave out patterns that were looked for and are of no use; their columns stay where they are."""
@@ -147,14 +172,18 @@ class Bank:
             self._of_patterns[name] = replace(cause, log_prior_odds=self._odds(pattern))
         return [p.name for p in fresh]
 
-    def measure_noise(self, *, white: bool = False) -> Coloured:
-        """Noise from what base, laws and patterns together leave; columns are whitened for it from then on.
+    def measure(self, members: Sequence[Member]) -> Coloured:
+        """Noise beside members, or beside everything, as this bank measures it."""
+        return self.measure_noise(members if self.measures_beside_members else None)
 
-        What was looked for in the residual takes part only where it is worth its odds: the largest of many chance peaks takes
-        more from noise than a column may. What all columns take out of noise of this kind is put back, by frequency: it is seen
-        by what they take out of draws.
+    def measure_noise(self, members: Sequence[Member] | None = None, *, white: bool = False) -> Coloured:
+        """Noise from what base and members leave; columns are whitened for it from then on.
+
+        What columns take out of noise of this kind is put back, by frequency: it is seen by what they take out of draws.
 
         Args:
+            members: that it is measured beside; None: all laws and patterns together. What was looked for in the residual takes
+                part then only where it is worth its odds: the largest of many chance peaks takes more from noise than a column may.
             white: take it for white, whatever it is.
         """
         least = max(QUIETEST * self.channel.size, self.channel.least_noise)
@@ -164,72 +193,106 @@ class Bank:
             target = self.target
             rng = np.random.default_rng(len(target))
             draws = rng.standard_normal((len(target), DRAWS))
-            left = beside.left(np.column_stack([target, draws]), self._taking_part(beside))
+            sd = self._taking_part(beside) if members is None else self._sizes(members)
+            left = beside.left(np.column_stack([target, draws]), sd)
             used = len(target) - float(np.mean(np.sum(left[:, 1:] ** 2, axis=0)))
             free = max(len(target) - used, 1.0)
             # What few rows are left to measure it by may be small by chance, and then lets in what makes it smaller still.
             possible = free if self.channel.surely is None else float(chi2.ppf(1.0 - self.channel.surely, free))
             innovation = float(np.sqrt(np.sum(left[:, 0] ** 2) / possible))
             before, found = self.noise, self.noise.with_innovation(max(innovation, least))
-            spread = self._spread_of(left[:, 0])
-            uneven = float(np.abs(spread / self.spread - 1.0).max(initial=0.0)) > SETTLED
+            spread, grows_with = self._spread_of(left[:, 0])
+            trust, tails = self.trust, np.inf
+            if self.long_tails:
+                trust, tails = most_probable_tails(left[:, 0] / self.trust / self.noise.innovation)
+            uneven = max(float(np.abs(new / old - 1.0).max(initial=0.0)) for new, old in self._changes(spread, trust))
             if self.channel.time is not None and not white and innovation > least:
                 found = self._colour_of(left, draws, stretches, found)
-            self._take(found, spread)
-            if alike(found, before) and not uneven:
+            self._take(found, spread, trust)
+            self.tails, self.grows_with = tails, grows_with
+            if alike(found, before) and uneven < SETTLED:
                 break
         return self.noise
 
+    def _changes(
+        self, spread: NDArray[np.float64], trust: NDArray[np.float64]
+    ) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...]:
+        return (spread, self.spread), (trust, self.trust)
+
     def log_likelihood(self) -> float:
-        """Log likelihood of the kept rows under the base and this noise alone, but for what is the same for every noise."""
+        """Log likelihood of the kept rows under the base and this noise alone, but for what is the same for every noise.
+
+        What the parameters of the noise cost is part of it [Akaike's criterion for few rows].
+        """
         target, innovation = self.target, self.noise.innovation
         rest = target - self.base @ self.base_values(np.zeros(len(self.channel.residual)))
         seen = np.linalg.svd(self.base / innovation, compute_uv=False)
         seen = seen[seen > RANK * seen[:1]]
-        uneven = float(np.log(self.spread).sum())
+        uneven = 0.0 if self.whitening is None else float(np.log(self.whitening.diagonal()).sum())
         squares = 0.5 * float(rest @ rest) / innovation**2
-        return -len(target) * float(np.log(innovation)) - uneven - squares - float(np.log(seen).sum())
+        parameters = self.noise.parameters + (1 if np.isfinite(self.tails) else 0)
+        cost = akaike_cost(parameters, len(target)) + (float(np.log(len(target))) if self.grows_with else 0.0)
+        return -len(target) * float(np.log(innovation)) + uneven - squares - float(np.log(seen).sum()) - cost
 
-    def _spread_of(self, left: NDArray[np.float64]) -> NDArray[np.float64]:
+    def tails_beyond(self, members: Sequence[Member]) -> float:
+        """Log likelihood of what is new in the rows under Student's t, over that of the weighted Gaussian that stands for it."""
+        if not np.isfinite(self.tails):
+            return 0.0
+        left = self.beside().left(self.target[:, None], self._sizes(members))[:, 0] / self.noise.innovation
+        student = log_student(left / self.trust, self.tails)
+        return float(np.sum(student - np.log(self.trust) + 0.5 * left**2))
+
+    def _spread_of(self, left: NDArray[np.float64]) -> tuple[NDArray[np.float64], str]:
         """Spread of each kept row that makes whitened rows most probable: a constant part, those known, and those that grow."""
-        grows, known = self.channel.grows, self.channel.known_noise
-        if grows is None and known is None:
-            return self.spread
+        grows, known, follows = self.channel.grows, self.channel.known_noise, self.channel.noise_follows
+        if grows is None and known is None and not follows:
+            return self.spread, ""
         kept = self.channel.kept
-        squares = np.zeros((len(left), 0)) if grows is None else np.square(grows[kept].reshape(len(left), -1))
-        squares = squares / np.maximum(np.mean(squares, axis=0), 1e-300)
         even = 1.0 + (
-            0.0 if known is None else np.square(known[kept] / (self.noise.innovation * float(self.spread.min())))
+            np.zeros(len(left))
+            if known is None
+            else np.square(known[kept] / (self.noise.innovation * float(self.spread.min())))
         )
         powers = np.square(left * self.spread)
-        every = np.array(list(product(GROWN, repeat=squares.shape[1])))
-        costs = []
-        for parts in every:
-            tried = even + squares @ np.square(parts)
-            costs.append(0.5 * np.sum(np.log(tried)) + 0.5 * len(left) * np.log(np.mean(powers / tried)))
-        parameters = np.count_nonzero(every, axis=1)  # [Schwarz 1978]
-        best = even + squares @ np.square(every[int(np.argmin(costs + 0.5 * np.log(len(left)) * parameters))])
-        return np.asarray(np.sqrt(best / np.mean(best)))
+        surely = np.zeros((len(left), 0)) if grows is None else np.square(grows[kept].reshape(len(left), -1))
+        cost, best = most_probable_variance(powers, even, surely, 0.0)
+        name = ""
+        for candidate, size in follows:
+            odds = float(np.log(len(follows)))
+            tried, spread = most_probable_variance(powers, even, np.column_stack([surely, np.square(size[kept])]), odds)
+            if tried < cost:
+                cost, best, name = tried, spread, candidate
+        return np.asarray(np.sqrt(best / np.mean(best))), name
 
     def _colour_of(
         self, left: NDArray[np.float64], draws: NDArray[np.float64], stretches: Sequence[slice], level: Coloured
     ) -> Coloured:
-        """Noise whose spectrum is that of whitened rows, what columns take out of draws put back; at a level if alike."""
+        """Noise of what is left, as it was before it was whitened, what columns take out of draws put back; at a level if alike."""
+        pairs = [(bands_of(draws[:, k], stretches), bands_of(left[:, 1 + k], stretches)) for k in range(draws.shape[1])]
+        taken = [r.log_power - w.log_power for w, r in pairs if w is not None and r is not None]
         bands = bands_of(left[:, 0], stretches)
-        if bands is None:
+        if bands is None or not taken:
             return level
-        taken = np.zeros(len(bands.count))
-        for k in range(draws.shape[1]):
-            whole, rest = bands_of(draws[:, k], stretches), bands_of(left[:, 1 + k], stretches)
-            if whole is not None and rest is not None:
-                taken += (rest.log_power - whole.log_power) / draws.shape[1]
-        seen = taken > np.log(LEAST_LEFT)
+        share = np.mean(taken, axis=0)
+        seen = share > np.log(LEAST_LEFT)
         if not seen.any():
             return level
-        power = bands.log_power - taken - np.log(self.noise.gain(bands.frequency))
-        found = coloured_noise(Bands(bands.frequency[seen], power[seen], bands.count[seen]))
+        if self.measures_beside_members:
+            found = autoregressive(self.noise.unwhitened(left[:, 0], stretches), stretches)
+            if share.min() < np.log(HARDLY_TAKEN):
+                found = with_put_back(found, bands.frequency[seen], share[seen], len(left))
+        else:
+            raw = bands.log_power - share + self.noise.log_power(bands.frequency) - 2.0 * np.log(self.noise.innovation)
+            found = first_order(Bands(bands.frequency[seen], raw[seen], bands.count[seen]))
         # Squares say the level best once the colour is right.
         return level if alike(found.with_innovation(level.innovation), level) else found
+
+    def _sizes(self, members: Sequence[Member]) -> NDArray[np.float64]:
+        """Prior standard deviations of all columns, zero for those that are of no member."""
+        sd = np.zeros(self._columns.count)
+        for member in members:
+            sd[member.columns] = member.sd
+        return sd
 
     def _taking_part(self, beside: BesideBase) -> NDArray[np.float64]:
         """Prior standard deviations of all columns that noise is measured beside, zero for the others."""
@@ -243,18 +306,18 @@ class Bank:
                 sd[variant.columns] = np.maximum(sd[variant.columns], variant.plausible)
         return sd
 
-    def _take(self, noise: Coloured, spread: NDArray[np.float64]) -> None:
+    def _take(self, noise: Coloured, spread: NDArray[np.float64], trust: NDArray[np.float64]) -> None:
         """Whiten all columns for a noise."""
-        same = (noise.share, noise.decay) == (self.noise.share, self.noise.decay) and np.array_equal(
-            spread, self.spread
-        )
-        self.noise, self.spread = noise, spread
+        same = noise.partial == self.noise.partial and np.array_equal(spread, self.spread)
+        same = same and np.array_equal(trust, self.trust)
+        self.noise, self.spread, self.trust = noise, spread, trust
         if same:
             return
         self.whitening = noise.whitening(self.channel.stretches)
-        if np.ptp(spread) > 0.0:
+        if np.ptp(spread) > 0.0 or np.ptp(trust) > 0.0:
             even = diags_array(1.0 / spread).tocsr()
             self.whitening = even if self.whitening is None else self.whitening @ even
+            self.whitening = diags_array(trust).tocsr() @ self.whitening
         self._columns = CauseColumns(self.whitened(self.channel.base.samples))
         if self._everywhere:
             self._columns.add(self.whitened(np.hstack(self._everywhere)))
@@ -302,7 +365,7 @@ class Bank:
         width = exact.shape[1]
         sd = np.concatenate([spacings, np.full(slack.shape[1] - len(tangents), law.form_uncertainty)])
         used = amplitudes != 0.0
-        at = max(float(np.sqrt(np.mean(np.square(amplitudes[used] / law.plausible[used])))), 1e-12)
+        at = max(float(np.sqrt(np.mean(np.square(amplitudes[used] / law.plausible_at(nonlinear)[used])))), 1e-12)
         points = float(np.prod([len(grid) for grid in law.grids]))
         # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
         weight = -float(np.log(max(points / 2.5 ** len(law.grids), 1.0)))
@@ -366,12 +429,13 @@ class Bank:
 
 def _forms(law: Law, columns: NDArray[np.int64], nonlinear: tuple[float, ...], log_weight: float) -> list[Variant]:
     """Forms of a law at one point: its choices where it has them, else all its amplitudes, whose columns these are."""
+    plausible = law.plausible_at(nonlinear)
     if not law.choices:
-        return [Variant(columns, law.plausible, nonlinear, log_weight=log_weight, positive=law.positive)]
+        return [Variant(columns, plausible, nonlinear, log_weight=log_weight, positive=law.positive)]
     return [
         Variant(
             columns[list(part)],
-            law.plausible[list(part)],
+            plausible[list(part)],
             nonlinear,
             label=label,
             whole=columns,
@@ -389,13 +453,19 @@ def amplitudes_of(variant: Variant) -> NDArray[np.int64]:
 
 
 def alike(one: Coloured, other: Coloured) -> bool:
-    """Whether two noises are the same for anything that is compared."""
+    """Whether two noises are the same for anything that is compared: their spectra are, and what is slow and what is new in them."""
     pairs = ((one.innovation, other.innovation), (one.effective, other.effective))
-    return all(abs(a - b) < SETTLED * max(a, b) for a, b in pairs)
+    if any(abs(a - b) >= SETTLED * max(a, b) for a, b in pairs):
+        return False
+    frequency = np.linspace(0.0, 0.5, ALIKE_AT)
+    return float(np.abs(one.log_power(frequency) - other.log_power(frequency)).mean()) < 2.0 * SETTLED
 
 
-GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
-"""Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
+HARDLY_TAKEN = 0.95
+"""Share of the noise that columns leave of each frequency from which on nothing is put back."""
+
+ALIKE_AT = 65
+"""Frequencies at which spectra are compared."""
 
 NOISE_ROUNDS = 8
 """Times that the noise is measured, each time beside what the last level lets in."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.curves import Clock
-    from dbbstation.inference.patterns import Pattern
+    from dbbstation.inference.patterns import Family, Pattern
     from dbbstation.inference.square_root import Solution
     from dbbstation.inference.variables import Variable
 
@@ -87,6 +87,9 @@ class Law:
             exactly; None where the effect is proportional to the amplitudes.
         choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
             from the others. None may be combined with `positive`.
+        sizes: usual size of each amplitude at values of the nonlinear parameters, shape (p,); None: `plausible` at all of them.
+        family: of patterns that it belongs to; None for physics of a client.
+        variables: that it follows, where it belongs to a family.
     """
 
     name: str
@@ -102,6 +105,13 @@ class Law:
     log_odds: float = NAMED_ODDS
     at: Callable[[tuple[float, ...], NDArray[np.float64]], NDArray[np.float64]] | None = None
     choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
+    sizes: Callable[[tuple[float, ...]], NDArray[np.float64]] | None = None
+    family: Family | None = None
+    variables: tuple[Variable, ...] = ()
+
+    def plausible_at(self, point: tuple[float, ...]) -> NDArray[np.float64]:
+        """Usual size of each amplitude at values of the nonlinear parameters, shape (p,)."""
+        return self.plausible if self.sizes is None else self.sizes(point)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +139,8 @@ class Channel:
             sec. 6.4.9.4]; None: its estimate is taken, for which half of that is as good.
         grows: size of what a part of the noise may be in proportion to, beside a constant part, shape (n,); None: noise is the same
             in all rows.
+        noise_follows: by name, sizes of what a part of the noise may be in proportion to, of which it follows one at the most, each of
+            shape (n,).
         known_noise: standard deviation of noise that a row is known to have beyond that of the others, in the unit of the residual,
             shape (n,); None: no row is known to have more.
         clock: of all rows, where some were left out or where they show a step by and by; None: they show it at once.
@@ -151,6 +163,7 @@ class Channel:
     least_noise: float = 0.0
     surely: float | None = None
     grows: NDArray[np.float64] | None = None
+    noise_follows: tuple[tuple[str, NDArray[np.float64]], ...] = ()
     known_noise: NDArray[np.float64] | None = None
     clock: Clock | None = None
     direction: NDArray[np.float64] | None = None
@@ -205,6 +218,12 @@ class Channel:
     def fitted(self, target: NDArray[np.float64], noise: float) -> Solution:
         """Fit the base alone to kept rows of a target, at a noise of one row."""
         return solve([self._block(target)], self.known, noise, self.held)
+
+    def refitted(self) -> NDArray[np.float64]:
+        """Values of the base alone by ordinary least squares, shape (k,): what a person would refit who knows neither noise nor priors."""
+        rows = self.base.samples[self.kept]
+        scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+        return np.asarray(np.linalg.lstsq(rows / scale, self.target, rcond=None)[0] / scale)
 
     @property
     def kept_blocks(self) -> list[slice]:

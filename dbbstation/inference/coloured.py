@@ -1,18 +1,18 @@
-"""Noise whose neighbours resemble each other: white noise on top of a first-order process, and the filter that makes it white.
+"""Noise whose neighbours resemble each other: an autoregressive process, and the filter that makes it white.
 
-Its autocovariance is a for lag 0 and b phi^|k| on top of it for every lag; its spectrum a + b (1 - phi²) / |1 - phi exp(-i w)|²
-[Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12]. Rows are predicted from those before them [Levinson-Durbin
-recursion; Brockwell and Davis, Time Series: Theory and Methods, 2nd ed., prop. 5.2.1]; what that leaves is white, and an exact
-likelihood of all rows. So a wave, a step or a pulse is held against the noise that there is at its own frequencies.
+A row is predicted from those before it; what that leaves is white, and an exact likelihood of all rows [Brockwell and Davis, Time
+Series: Theory and Methods, 2nd ed., prop. 5.2.1]. Low-passed, resonant and wandering noise are such processes, of high order where
+need be. So a wave, a step or a pulse is held against the noise that there is at its own frequencies.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.signal import lfilter
 from scipy.sparse import csr_array
 
 if TYPE_CHECKING:
@@ -23,15 +23,30 @@ if TYPE_CHECKING:
 LONGEST = 60
 """Rows that a prediction looks back over, at the most."""
 
+ROWS_PER_ORDER = 5
+"""Rows per coefficient of a prediction, at the least: with fewer, the corrected criterion of Akaike no longer holds."""
+
 NOTHING = 1e-3
-"""Partial autocorrelation from which on a row says nothing more about a later one."""
+"""Partial autocorrelation below which a row says nothing more about a later one."""
+
+STEADY = 0.999
+"""Partial autocorrelation at the most: what is alike over more than a thousand rows cannot be told from a trend."""
+
+LEAST_NEW = 1e-3
+"""Share of the standard deviation of a row that is new in it, at the least: a recording has digits, and rounds."""
+
+FREQUENCIES = 4096
+"""Frequencies of a spectrum from which predictions are worked out: a line of one in a thousand rows keeps its height."""
 
 DECAYS = np.concatenate([np.arange(0.1, 0.9, 0.1), 1.0 - np.geomspace(0.1, 0.005, 12)])
-"""Values of phi that are tried: neighbours resemble each other over 200 rows at the most. What is alike over more is structure
-that a model should name."""
+"""Correlations of a first-order process from one row to the next that are tried: neighbours resemble each other over 200 rows at the
+most. What is alike over more is structure that a model should name."""
 
 SHARES = np.geomspace(0.01, 100.0, 33)
-"""Ratios b / a that are tried."""
+"""Variances of a first-order process that are tried, over that of the white noise under it."""
+
+LOG_VARIANCE = np.pi**2 / 6.0
+"""Variance of the log of one power."""
 
 FEWEST = 6
 """Frequencies in a band of a spectrum, at the least."""
@@ -45,9 +60,6 @@ SHORTEST = 64
 LOG_MEAN = 0.5772156649
 """By how much the mean of log power lies below the log of its mean, for noise [Euler's constant]."""
 
-LOG_VARIANCE = np.pi**2 / 6.0
-"""Variance of the log of one power."""
-
 
 @dataclass(frozen=True)
 class Coloured:
@@ -55,28 +67,50 @@ class Coloured:
 
     Attributes:
         sigma: standard deviation of one row, in the unit of the residual.
-        share: part of its variance that belongs to the first-order process, from 0 to 1.
-        decay: correlation of that from one row to the next.
+        partial: partial autocorrelations from lag 1 on; none for white noise.
+        of_first_order: whether it is white noise on top of a first-order process, which two numbers say.
     """
 
     sigma: float
-    share: float = 0.0
-    decay: float = 0.0
+    partial: tuple[float, ...] = ()
+    of_first_order: bool = False
+
+    @classmethod
+    def first_order(cls, sigma: float, share: float, decay: float) -> Coloured:
+        """White noise on top of a first-order process.
+
+        Args:
+            sigma: standard deviation of one row.
+            share: part of the variance that belongs to the process, from 0 to 1.
+            decay: correlation of that from one row to the next.
+        """
+        lags = np.arange(LONGEST + 1)
+        return cls(sigma, partial_autocorrelations(np.where(lags == 0, 1.0, share * decay**lags)), of_first_order=True)
 
     @property
     def is_white(self) -> bool:
         """Whether neighbours do not resemble each other."""
-        return self.share == 0.0
+        return not self.partial
+
+    @property
+    def order(self) -> int:
+        """Rows that a prediction looks back over."""
+        return len(self.partial)
+
+    @property
+    def parameters(self) -> int:
+        """Numbers that say how neighbours resemble each other."""
+        return min(self.order, 2) if self.of_first_order else self.order
 
     @property
     def correlation_samples(self) -> float:
         """Rows that count as one independent row for anything smooth; 1 for white noise."""
-        return 1.0 + 2.0 * self.share * self.decay / (1.0 - self.decay)
+        return (self.effective / self.sigma) ** 2
 
     @property
     def effective(self) -> float:
         """Standard deviation of white noise with the same power at frequency zero."""
-        return self.sigma * float(np.sqrt(self.correlation_samples))
+        return self.innovation / abs(float(self.filter.sum()))
 
     @property
     def innovation(self) -> float:
@@ -85,36 +119,29 @@ class Coloured:
 
     def with_innovation(self, innovation: float) -> Coloured:
         """The same at a level where so much is new in a row."""
-        return Coloured(innovation / float(np.sqrt(self._predictors[1][-1])), self.share, self.decay)
-
-    def autocorrelation(self, lags: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Correlation of rows so far apart."""
-        return np.where(lags == 0, 1.0, self.share * self.decay ** np.abs(lags).astype(np.float64))
+        return replace(self, sigma=innovation / float(np.sqrt(self._predictors[1][-1])))
 
     @cached_property
     def _predictors(self) -> tuple[list[NDArray[np.float64]], list[float]]:
         """Coefficients of predictions from 0, 1, ... rows before, and the share of the variance that each leaves."""
-        rho = self.autocorrelation(np.arange(LONGEST + 1))
         coefficients, left = [np.zeros(0)], [1.0]
-        for order in range(1, LONGEST + 1):
+        for partial in self.partial:
             before = coefficients[-1]
-            partial = float((rho[order] - before @ rho[1:order][::-1]) / left[-1])
-            if abs(partial) < NOTHING:
-                break
             coefficients.append(np.concatenate([before - partial * before[::-1], [partial]]))
             left.append(left[-1] * (1.0 - partial**2))
         return coefficients, left
 
-    @property
+    @cached_property
     def filter(self) -> NDArray[np.float64]:
         """Coefficients that take a row and those before it to what is new in it, shape (p + 1,)."""
         return np.concatenate([[1.0], -self._predictors[0][-1]])
 
-    def gain(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Power gain of the filter at frequencies [cycles per row]."""
+    def log_power(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Log of the spectrum at frequencies [cycles per row], that of white noise being the log of its variance."""
         taps = self.filter
         phase = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(taps))))
-        return np.asarray(np.abs(phase @ taps) ** 2, dtype=np.float64)
+        gain = np.abs(phase @ taps) ** 2
+        return np.asarray(2.0 * np.log(self.innovation) - np.log(gain), dtype=np.float64)
 
     def whitening(self, stretches: Sequence[slice]) -> csr_array | None:
         """Matrix that makes noise of rows white with the standard deviation `innovation`; None where it is white.
@@ -143,6 +170,56 @@ class Coloured:
         size = max((stretch.stop for stretch in stretches), default=0)
         flat = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
         return csr_array(flat, shape=(size, size))
+
+    def unwhitened(self, white: NDArray[np.float64], stretches: Sequence[slice]) -> NDArray[np.float64]:
+        """Rows, shape (n,), that `whitening` takes to these.
+
+        Args:
+            white: shape (n,).
+            stretches: as of `whitening`.
+        """
+        if self.is_white:
+            return white
+        coefficients, left = self._predictors
+        most, found = len(coefficients) - 1, np.empty(len(white))
+        for stretch in stretches:
+            own, new = found[stretch], white[stretch]
+            begun = min(most, len(own))
+            for k in range(begun):
+                own[k] = new[k] / np.sqrt(left[-1] / left[k]) + coefficients[k] @ own[:k][::-1]
+            if len(own) > most:
+                state = _state(self.filter, own[:most])
+                own[most:] = lfilter([1.0], self.filter, new[most:], zi=state)[0]
+        return found
+
+
+def _state(taps: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np.float64]:
+    """State of the filter 1/taps behind outputs, the last one last, shape (p,)."""
+    order = len(taps) - 1
+    recent = before[::-1]
+    return np.array([-(taps[k + 1 :] @ recent[: order - k]) for k in range(order)])
+
+
+def partial_autocorrelations(correlation: NDArray[np.float64]) -> tuple[float, ...]:
+    """Partial autocorrelations of a process [Levinson-Durbin recursion], the last ones that say nothing left out.
+
+    Args:
+        correlation: autocorrelation from lag 0 on, shape (p + 1,).
+    """
+    coefficients, left, found = np.zeros(0), 1.0, []
+    for order in range(1, len(correlation)):
+        partial = float((correlation[order] - coefficients @ correlation[1:order][::-1]) / left)
+        if not abs(partial) < 1.0:
+            break  # as exact as the digits of the correlation are
+        partial = float(np.clip(partial, -STEADY, STEADY))
+        if left * (1.0 - partial**2) < LEAST_NEW**2:
+            break
+        coefficients = np.concatenate([coefficients - partial * coefficients[::-1], [partial]])
+        left *= 1.0 - partial**2
+        found.append(partial)
+    while found and abs(found[-1]) < NOTHING:
+        found.pop()
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +263,48 @@ def bands_of(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Bands | N
     return Bands(np.add.reduceat(every, starts) / count, np.add.reduceat(logs, starts) / count + LOG_MEAN, count)
 
 
-def coloured_noise(bands: Bands) -> Coloured:
-    """White noise on top of a first-order process whose spectrum is nearest to bands; white where nothing more is worth it."""
+def autoregressive(rows: NDArray[np.float64], stretches: Sequence[slice]) -> Coloured:
+    """Noise of which rows are made, by predictions that err least forward and backward.
+
+    [Burg's method; Percival and Walden, Spectral Analysis for Physical Applications, 1993, sec. 9.5]. The order is by Akaike's
+    criterion for few rows [Hurvich and Tsai, Biometrika 76 (1989) 297].
+
+    Args:
+        rows: shape (n,).
+        stretches: that follow one another without a gap.
+    """
+    ahead = [rows[stretch] for stretch in stretches if stretch.stop - stretch.start > 1]
+    count = sum(len(own) for own in ahead)
+    power = sum(float(own @ own) for own in ahead) / max(count, 1)
+    if not power > 0.0:
+        return Coloured(max(float(np.sqrt(power)), 1e-300))
+    behind = [own.copy() for own in ahead]
+    left, partials = 1.0, []
+    best, kept = akaike_cost(0, count), 0
+    for order in range(1, min(LONGEST, count // ROWS_PER_ORDER) + 1):
+        pairs = [(a[1:], b[:-1]) for a, b in zip(ahead, behind, strict=True) if len(a) > 1]
+        both = sum(float(a @ a) + float(b @ b) for a, b in pairs)
+        if not both > 0.0:
+            break
+        partial = float(np.clip(2.0 * sum(float(a @ b) for a, b in pairs) / both, -STEADY, STEADY))
+        if left * (1.0 - partial**2) < LEAST_NEW**2:
+            break
+        ahead, behind = [a - partial * b for a, b in pairs], [b - partial * a for a, b in pairs]
+        left *= 1.0 - partial**2
+        partials.append(partial)
+        cost = 0.5 * count * float(np.log(left)) + akaike_cost(order, count)
+        if cost < best:
+            best, kept = cost, order
+    return Coloured(float(np.sqrt(power)), tuple(partials[:kept]))
+
+
+def first_order(bands: Bands) -> Coloured:
+    """White noise on top of a first-order process whose spectrum is nearest to bands; white where nothing more is worth it.
+
+    Its autocovariance is a for lag 0 and b phi^|k| on top of it for every lag; its spectrum
+    a + b (1 - phi²) / |1 - phi exp(-i w)|² [Priestley, Spectral Analysis and Time Series, 1981, sec. 4.12]. With two parameters it
+    cannot follow lines that are waves nobody has found yet.
+    """
     weight = bands.count / LOG_VARIANCE
 
     def distance(shape: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -205,5 +322,29 @@ def coloured_noise(bands: Bands) -> Coloured:
         if squares[k] < best:
             best = float(squares[k])
             sigma = float(np.exp(0.5 * levels[k]) * np.sqrt(1.0 + SHARES[k]))
-            found = Coloured(sigma, float(SHARES[k] / (1.0 + SHARES[k])), float(decay))
+            found = Coloured.first_order(sigma, float(SHARES[k] / (1.0 + SHARES[k])), float(decay))
     return found
+
+
+def akaike_cost(parameters: int, rows: int) -> float:
+    """What so many fitted parameters cost in log likelihood [Hurvich and Tsai, Biometrika 76 (1989) 297]."""
+    return parameters * rows / max(rows - parameters - 2.0, 1.0)
+
+
+def with_put_back(noise: Coloured, bands: NDArray[np.float64], taken: NDArray[np.float64], rows: int) -> Coloured:
+    """The same with what was taken from its spectrum put back, of an order that so many rows can tell.
+
+    Args:
+        noise: as it was found.
+        bands: frequencies [cycles per row], rising, shape (b,).
+        taken: log of the share that is left there, shape (b,).
+        rows: that it was found from.
+    """
+    frequency = np.linspace(0.0, 0.5, FREQUENCIES + 1)
+    power = np.exp(noise.log_power(frequency) - np.interp(frequency, bands, taken))
+    covariance = np.fft.irfft(power)[: LONGEST + 1]
+    variance = float(covariance[0])
+    partials = np.array(partial_autocorrelations(covariance / variance)[: rows // ROWS_PER_ORDER])
+    costs = [akaike_cost(order, rows) for order in range(len(partials) + 1)]
+    gains = np.concatenate([[0.0], np.cumsum(0.5 * rows * np.log1p(-(partials**2)))])
+    return Coloured(float(np.sqrt(variance)), tuple(partials[: int(np.argmin(costs + gains))].tolist()))

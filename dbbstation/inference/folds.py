@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.channel import Channel
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
 
 FOLDS = 10
 """Stretches of rows that are held back in turn, where there are not enough blocks."""
@@ -29,12 +29,14 @@ class Fold:
     Attributes:
         name: of the part.
         rows: how many.
-        before: root mean square error with the base alone, in the unit of the residual.
+        as_simulated: root mean square error with nothing fitted but the mean of the other parts, in the unit of the residual.
+        before: with the base fitted to the other parts by ordinary least squares.
         after: with what was chosen from the other parts.
     """
 
     name: str
     rows: int
+    as_simulated: float
     before: float
     after: float
 
@@ -50,8 +52,13 @@ class HeldOutError:
     folds: tuple[Fold, ...]
 
     @property
+    def as_simulated(self) -> float:
+        """Over all parts, with nothing fitted but a mean."""
+        return self._all([fold.as_simulated for fold in self.folds])
+
+    @property
     def before(self) -> float:
-        """Over all parts, with the base alone."""
+        """Over all parts, with the base refitted by ordinary least squares."""
         return self._all([fold.before for fold in self.folds])
 
     @property
@@ -81,10 +88,11 @@ def held_out_error(
     for done, (name, rows) in enumerate(parts):
         progress("held-out part", done, len(parts))
         settled = choose_without(channel, rows)
-        none = np.zeros(len(channel.residual))
-        base = channel.base.samples @ settled.base_values(none)
-        before, after = channel.residual[rows] - base[rows], (channel.residual - settled.predicted())[rows]
-        found.append(Fold(name, int(rows.sum()), _rms(before), _rms(after)))
+        simulated = channel.residual - float(np.mean(channel.residual[~rows]))
+        refitted = channel.residual - channel.base.samples @ channel.without(rows).refitted()
+        corrected = channel.residual - settled.predicted()
+        errors = (_rms(errors[rows]) for errors in (simulated, refitted, corrected))
+        found.append(Fold(name, int(rows.sum()), *errors))
     return HeldOutError(tuple(found))
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
     from dbbstation.inference.variables import Variable
 
 SIGNIFICANT = 0.001

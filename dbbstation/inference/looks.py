@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from dbbstation.inference.pieces import Left
     from dbbstation.inference.variables import Variable
 
+PLACED = (Family.WAVE, Family.BUMP, Family.STEP)
+"""Patterns whose place, width or frequency is a nonlinear parameter."""
+
 STRONGEST = 2
 """Forms of each kind over each variable that are kept."""
 
@@ -149,6 +152,53 @@ def _least(tried: float) -> float:
     A log Bayes factor is at most half of the sum of squares that a form explains.
     """
     return -2.0 * NEIGHBOUR * log_odds(1, tried)
+
+
+def placed_better(pattern: Pattern, left: Left, kept: NDArray[np.bool_], size: float) -> Pattern:
+    """A wave, bump or step at the frequency, place and width where it explains most.
+
+    Args:
+        pattern: that `looked_for` made.
+        left: what is left beside everything but it.
+        kept: which rows were fitted, shape (n,).
+        size: as of `looked_for`.
+    """
+    (variable,), form = pattern.variables, pattern.form
+    if form is None:
+        return pattern
+    values = variable.values[kept]
+    for finer in CLOSER:
+        near = _moved(form, finer, variable.extent)
+        explained = [_explained_by(left, left.whitened(one.columns(values)), size) for one in near]
+        form = near[int(np.argmax(explained))]
+    return _pattern(variable, pattern.family, form, pattern.tried)
+
+
+def _explained_by(left: Left, columns: NDArray[np.float64], size: float) -> float:
+    """Sum of squares that whitened columns, shape (m, p), explain beside what was fitted, less what their sizes cost."""
+    beside = columns - left.axes @ (left.axes.T @ columns)
+    along = columns.T @ left.rest
+    return float(along @ np.linalg.solve(columns.T @ beside + np.eye(columns.shape[1]) / size**2, along))
+
+
+def _moved(form: Form, finer: float, extent: float) -> list[Form]:
+    """A form and those about it, at steps that are so much finer than those of the list; itself first."""
+    steps = (0.0, -1.0, 1.0, -2.0, 2.0)
+    if isinstance(form, Bump):
+        return [
+            Bump(form.centre + 0.2 * away * finer * form.width, form.width * float(np.exp(0.15 * wider * finer)))
+            for away in steps
+            for wider in steps
+        ]
+    if isinstance(form, Step):
+        return [Step(form.at + away * finer * form.width, form.width) for away in steps]
+    if isinstance(form, Wave):
+        return [Wave(max(form.frequency + away * finer * FINER[0] / extent, 0.25 / extent)) for away in steps]
+    return [form]
+
+
+CLOSER = (1.0, 1.0, 0.3, 0.3, 0.1, 0.03)
+"""Steps in which a place is moved to where it is best, in steps of the finest list."""
 
 
 def _explained(sums: Sums, forms: Sequence[Form], size: float) -> NDArray[np.float64]:

@@ -180,7 +180,7 @@ class ModelComparison:
         """Posterior means and covariance of the amplitudes and the slack of members."""
         columns, sd = _stacked(members)
         information = sd[:, None] * self._gram[np.ix_(columns, columns)] * sd + np.eye(len(sd))
-        factor = np.linalg.cholesky(information)
+        factor = cholesky(information)
         values = cho_solve((factor, True), sd * self._towards[columns])
         inverse = cho_solve((factor, True), np.eye(len(sd)))
         return Estimates(sd * values, sd[:, None] * inverse * sd)
@@ -215,7 +215,7 @@ class ModelComparison:
         found = {}
         for a, b in combinations(range(len(more)), 2):
             own = np.r_[ends[a] : ends[a + 1], ends[b] : ends[b + 1]]
-            half = np.linalg.cholesky(information[np.ix_(own, own)])
+            half = cholesky(information[np.ix_(own, own)])
             w = solve_triangular(half, along[own], lower=True, check_finite=False)
             found[a, b] = evidence + 0.5 * float(w @ w) - float(np.log(np.diag(half)).sum())
         return found
@@ -316,11 +316,27 @@ class ModelComparison:
             return self._last[1]
         columns, sd = _stacked(members)
         information = sd[:, None] * self._gram[np.ix_(columns, columns)] * sd + np.eye(len(sd))
-        lower = np.asarray(np.linalg.cholesky(information), dtype=np.float64)
+        lower = cholesky(information)
         z = solve_triangular(lower, sd * self._towards[columns], lower=True, check_finite=False)
         found = lower, z, 0.5 * float(z @ z) - float(np.log(np.diag(lower)).sum())
         self._last = tuple(members), found
         return found
+
+
+def cholesky(information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cholesky factor of the information of amplitudes in units of their priors, shape (p, p).
+
+    Products beside a base are differences. Where their last digits make the information negative, these are taken out.
+    """
+    try:
+        return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        last = DIGITS * float(np.diag(information).max())
+        return np.asarray(np.linalg.cholesky(information + last * np.eye(len(information))), dtype=np.float64)
+
+
+DIGITS = 1e-12
+"""Share of the largest product of columns that others are exact to."""
 
 
 def with_slack_of(member: Member, values: NDArray[np.float64]) -> Member:

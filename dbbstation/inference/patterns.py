@@ -48,6 +48,8 @@ class Family(StrEnum):
     HYSTERESIS = "hysteresis"
     SPEED = "speed"
     LAG = "lag"
+    MEMORY = "memory"
+    DEAD_TIME = "dead time"
     DRIFT = "drift"
     PRODUCT = "product"
     CURVE = "curve"

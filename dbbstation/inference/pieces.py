@@ -70,6 +70,18 @@ class Left:
         """Rows with their noise made white."""
         return rows if self.whitening is None else np.asarray(self.whitening @ rows)
 
+    def whitened_part(self, rows: NDArray[np.float64], here: slice, there: slice) -> NDArray[np.float64]:
+        """What rows that are zero but in one place become in another place once their noise is made white.
+
+        Args:
+            rows: in that place, shape (b, p).
+            here: that place.
+            there: the other one, which begins where it does.
+        """
+        if self.whitening is None:
+            return rows
+        return np.asarray(self.whitening[there, here] @ rows)
+
     def transposed(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Transpose of whitening, applied to whitened rows."""
         return rows if self.whitening is None else np.asarray(self.whitening.T @ rows)

@@ -10,8 +10,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import cho_solve
 
-from dbbstation.inference.model_comparison import ModelComparison
+from dbbstation.inference.model_comparison import ModelComparison, cholesky
 from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
@@ -131,17 +132,8 @@ class BesideBase:
         of_base = self._taken @ (causes.along[:, used] * size)
         gram = size[:, None] * causes.gram[np.ix_(used, used)] * size - of_base.T @ of_base
         towards = size[:, None] * (causes.samples.T @ targets)[used] - of_base.T @ (self._taken @ (axes.T @ targets))
-        values = _solved(gram + np.eye(len(used)), towards)
+        values = cho_solve((cholesky(gram + np.eye(len(used))), True), towards)
         every = np.zeros((len(sd), targets.shape[1]))
         every[used] = size[:, None] * values
         left = np.asarray(targets - causes.samples @ every, dtype=np.float64)
         return left - axes @ (self._taken.T @ (self._taken @ (axes.T @ left)))
-
-
-def _solved(gram: NDArray[np.float64], towards: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve for causes; where some are so much larger than the noise that rounding leaves no unit matrix, the least solution."""
-    try:
-        found = np.linalg.solve(gram, towards)
-    except np.linalg.LinAlgError:
-        found = np.linalg.lstsq(gram, towards, rcond=None)[0]
-    return np.asarray(found, dtype=np.float64)

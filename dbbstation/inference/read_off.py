@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,8 @@ from scipy.special import expit
 from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.patterns import Family
+from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.settle import impossible, moved
 from dbbstation.inference.verdict import Value, Verdict
 
@@ -18,14 +21,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.model_comparison import Cause, Member
-    from dbbstation.inference.patterns import Family
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
 
 OUT = 5.0
 """Standard deviations by which the norm of an effect must be out to be said to be there, or would have to be to be ruled out."""
 
 ABSENT = 0.01
 """Probability up to which something that would have been seen is ruled out, or its prior probability if that is less."""
+
+LATE = (Family.MEMORY, Family.DEAD_TIME)
+"""Families of what follows a variable late."""
 
 HALF = 0.5
 """Share of its largest value from which on an effect counts as being there, for the spans over which it is."""
@@ -142,7 +147,8 @@ class _Judge:
         pattern = self._settled.bank.patterns.get(cause.name)
         member = self._members.get(cause.name)
         equal = self._classes.get(cause.name, (cause.name,))
-        probability = self._alternatives.probability(equal)
+        pooled = self._pooled(cause.name)
+        probability = self._settled.averaged(self._alternatives.probability(pooled), pooled)
         gain, shown = self._beside[cause.name] if member is None else (self._best.log_factor(cause.name), member)
         if member is None:
             # The prior must not say how much could hide.
@@ -156,14 +162,15 @@ class _Judge:
         effect = self._settled.bank.samples(shown.columns) @ values
         whole, rms, confounded = self._concealed(effect)
         verdict, others, text = self._verdict(cause, member, probability, sigmas)
-        variables = pattern.variables if pattern else ()
+        law = self._settled.bank.laws.get(cause.name)
+        variables = pattern.variables if pattern else law.variables if law else ()
         there = verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS} and member is not None
         largest = _at_half(effect) if there else np.zeros(0, dtype=bool)
         channel = self._settled.channel
         return Finding(
             name=cause.name,
             verdict=verdict,
-            family=pattern.family if pattern else None,
+            family=pattern.family if pattern else law.family if law else None,
             label=shown.variant.label,
             variables=tuple(v.name for v in variables),
             probability=probability,
@@ -182,13 +189,44 @@ class _Judge:
             text=text,
         )
 
+    def _pooled(self, name: str) -> tuple[str, ...]:
+        """A cause and its class, and what would be the same to its user.
+
+        Of stretches of time that are other choices of stretches, which begin or end elsewhere; of what is in proportion to a variable,
+        the same with a delay too short to be seen.
+        """
+        equal = self._classes.get(name, (name,))
+        kind = self._kinds.get(name)
+        if name not in self._members or kind is None:
+            return equal
+        if kind[0] in IN_TIME:
+            same = [n for n, other in self._kinds.items() if other[0] is kind[0]]
+        elif kind[0] is Family.LINEAR:
+            same = [n for n, other in self._kinds.items() if other[0] in LATE and other[1] == kind[1]]
+        else:
+            return equal
+        return (*equal, *(n for n in same if n not in equal and n not in self._members))
+
+    @cached_property
+    def _kinds(self) -> dict[str, tuple[Family, tuple[str, ...]]]:
+        """Family and variables of each cause that has a family."""
+        bank = self._settled.bank
+        of_patterns = {name: (one.family, one.variables) for name, one in bank.patterns.items()}
+        of_laws = {n: (one.family, one.variables) for n, one in bank.laws.items() if one.family is not None}
+        there = {cause.name for cause in self._settled.causes}
+        return {
+            name: (family, tuple(v.name for v in variables))
+            for name, (family, variables) in (of_patterns | of_laws).items()
+            if name in there
+        }
+
     def _verdict(
         self, cause: Cause, member: Member | None, probability: float, sigmas: float
     ) -> tuple[Verdict, tuple[str, ...], str]:
         """Verdict, with whom it is ambiguous, and why."""
-        if member is not None and probability >= SURE:
-            faint = f"Its effect is only {sigmas:.2g} standard deviations out."
-            return (Verdict.IDENTIFIED, (), "") if sigmas >= OUT else (Verdict.AMBIGUOUS, (), faint)
+        if member is not None and self._alternatives.probability(self._pooled(cause.name)) >= SURE:
+            verdict, others, text = self._certain(probability, sigmas)
+            return verdict, others, text or self._unless_late(cause.name)
         if member is None and (why := self._impossible_in_place(cause)):
             return Verdict.RULED_OUT, (), why
         if alike := [name for name, equal in self._classes.items() if cause.name in equal and name != cause.name]:
@@ -200,6 +238,23 @@ class _Judge:
         if unsure := [name for name, others in self._alternatives.ambiguities.items() if cause.name in others]:
             return Verdict.AMBIGUOUS, (unsure[0],), f"These rows cannot tell it from {unsure[0]}."
         return self._absent(cause, probability)
+
+    def _unless_late(self, name: str) -> str:
+        """That these rows do not tell whether something linear comes late, where they do not."""
+        late = [
+            n for n in self._pooled(name) if n not in self._classes.get(name, (name,)) and self._kinds[n][0] in LATE
+        ]
+        if not late or self._alternatives.probability(late) < 1.0 - SURE:
+            return ""
+        return "These rows do not tell whether it comes late."
+
+    def _certain(self, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
+        """Verdict of what is there for sure beside the most probable noise."""
+        if probability < SURE:
+            return Verdict.AMBIGUOUS, (), "Noise whose neighbours resemble each other explains it as well."
+        if sigmas < OUT:
+            return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
+        return Verdict.IDENTIFIED, (), ""
 
     def _impossible_in_place(self, cause: Cause) -> str:
         """Why a law cannot stand in the place of what nothing measured tells from it; empty where it can."""

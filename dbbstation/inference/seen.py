@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.looks import looked_for
+from dbbstation.inference.looks import PLACED, looked_for, placed_better
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.pieces import Fitting, Left
 from dbbstation.inference.square_root import free_directions
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 IN_TIME = (Family.PULSES, Family.PULSES_BY_DIRECTION)
 """Patterns whose edges are nonlinear parameters: they are moved to their best places in each noise."""
+
+MOVED = (*IN_TIME, *PLACED)
+"""Patterns that have places, edges, widths or frequencies that are moved."""
 
 
 def seen(bank: Bank, members: Sequence[Member], *, in_time: bool) -> list[Pattern]:
@@ -57,27 +60,32 @@ def _left(bank: Bank, columns: NDArray[np.float64], sd: NDArray[np.float64]) -> 
     return Left.of(bank.target, columns, sd, bank.noise, bank.whitening)
 
 
-def edges_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> tuple[Member, ...]:
-    """Members with the ends of their stretches of time where they explain most beside the others, in the noise that there is."""
+def places_anew(bank: Bank, members: Sequence[Member], among: Container[str]) -> tuple[Member, ...]:
+    """Members with the places and ends of what was looked for where they explain most beside the others, in the noise there is."""
     channel = bank.channel
     members = list(members)
     for number, member in enumerate(members):
         pattern = bank.patterns.get(member.cause.name)
-        if pattern is None or pattern.family not in IN_TIME or pattern.name not in among:
+        if pattern is None or pattern.family not in MOVED or pattern.name not in among:
             continue
         others, sd = _fitted(bank, [*members[:number], *members[number + 1 :]])
         count = len(member.variant.columns)
-
-        better = refined(
-            pattern,
-            count,
-            partial(_left_beside, bank, Fitting.of(others, sd, bank.noise, bank.whitening), member.sd[:-1]),
-            channel.blocks,
-            channel.kept,
-            channel.size / bank.noise.innovation,
-            clock=channel.clock,
-            direction=channel.direction if pattern.family is Family.PULSES_BY_DIRECTION else None,
-        )
+        size = channel.size / bank.noise.innovation
+        if pattern.family in PLACED:
+            better = placed_better(pattern, _left(bank, others, sd), channel.kept, size)
+        else:
+            better = refined(
+                pattern,
+                count,
+                partial(_left_beside, bank, Fitting.of(others, sd, bank.noise, bank.whitening), member.sd[:-1]),
+                channel.blocks,
+                channel.kept,
+                size,
+                clock=channel.clock,
+                direction=channel.direction if pattern.family is Family.PULSES_BY_DIRECTION else None,
+            )
+        if better.name == pattern.name or better.name in bank.patterns:
+            continue
         bank.drop({pattern.name})
         bank.add([better])
         cause = next(cause for cause in bank.causes if cause.name == better.name)

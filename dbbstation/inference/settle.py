@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from copy import deepcopy
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,8 @@ from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.bank import Bank, alike, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
 from dbbstation.inference.patterns import patterns
-from dbbstation.inference.seen import IN_TIME, edges_anew, seen
+from dbbstation.inference.seen import MOVED, places_anew, seen
+from dbbstation.inference.settled import MOST_EXPANDED, Beginning, Settled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -19,14 +21,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.channel import Channel, Law
-    from dbbstation.inference.coloured import Coloured
-    from dbbstation.inference.hypotheses import Posterior
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.projection import BesideBase
-
-MOST_EXPANDED = 8
-"""Hypotheses whose neighbours are looked at in a search, at the most: a table may have dozens of members, each with neighbours."""
 
 MOST_ROUNDS = 12
 """Times that hypotheses, noise and looks may settle against each other."""
@@ -43,63 +40,11 @@ SEEDS = 3
 MOST_GROWN = 40
 """Causes that are taken in one after the other before the search begins, at the most."""
 
+MOST_PLACED = 3
+"""Times that what was looked for is moved to better places in the noise that is left, at the most."""
+
 NEGATIVE_SIGMA = 3.0
 """Standard deviations below zero from which a value that cannot be negative is impossible: one in 700 by chance."""
-
-
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """What the comparison came to.
-
-    Attributes:
-        channel: that was explained.
-        bank: columns and causes.
-        noise: of one row, from what everything together leaves.
-        causes: that were compared.
-        comparison: that the posterior came from.
-        posterior: over sets of causes.
-        refused: laws that would have to be what they cannot be, and why.
-    """
-
-    channel: Channel
-    bank: Bank
-    noise: Coloured
-    causes: tuple[Cause, ...]
-    comparison: ModelComparison
-    posterior: Posterior
-    refused: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def best(self) -> Hypothesis:
-        """The most probable hypothesis."""
-        return self.posterior.best
-
-    def effect(self, names: Sequence[str] | None = None) -> NDArray[np.float64]:
-        """What members of the best hypothesis do, over all rows, in the unit of the residual, shape (n,).
-
-        Args:
-            names: of the members; all if None.
-        """
-        total = np.zeros(len(self.channel.residual))
-        values = self.comparison.estimates(self.best.members).values if self.best.members else np.zeros(0)
-        for member in self.best.members:
-            own, values = values[: len(member.columns)], values[len(member.columns) :]
-            if names is None or member.cause.name in names:
-                total += self.bank.samples(member.columns) @ own
-        return total
-
-    def base_values(self, effect: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
-        """Values of the base columns beside an effect, that of all members if None, shape (k,)."""
-        return self.bank.base_values(self.effect() if effect is None else effect)
-
-    def predicted(self) -> NDArray[np.float64]:
-        """What base and members say of the residual, over all rows, shape (n,)."""
-        effect = self.effect()
-        return np.asarray(effect + self.channel.base.samples @ self.base_values(effect), dtype=np.float64)
-
-    def second_start(self) -> Hypothesis:
-        """The most probable hypothesis that a search comes to that begins with nothing."""
-        return search(self.comparison, self.causes, (), MOST_EXPANDED).best
 
 
 def settle(
@@ -111,9 +56,14 @@ def settle(
     most_looks: int = MOST_LOOKS,
     in_time: bool = True,
     thorough: bool = True,
+    beginnings: Sequence[Beginning] = tuple(Beginning),
+    rivals: bool = True,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Settled:
     """Compare sets of laws and patterns on a channel.
+
+    The noise is part of what is compared. It is measured beside one of several beginnings, then on what the best hypothesis of that
+    beginning leaves, until neither changes. The most probable outcome is returned, noise included, with the others in it.
 
     Args:
         channel: what is to be explained.
@@ -124,6 +74,8 @@ def settle(
         in_time: look for steps and pulses in time, too: False where a client has curves of each block instead.
         thorough: begin from several places, and look once more beside what a search ends at; False: begin with nothing and search
             once, where a selection is repeated many times and may be somewhat worse.
+        beginnings: of the noise.
+        rivals: let noise of any colour compete; False: it is of first order, measured beside everything, and nothing competes with it.
         progress: called with what is being done.
     """
     options = _Options(
@@ -134,7 +86,39 @@ def settle(
         in_time=in_time,
         thorough=thorough,
     )
-    return _settled(_begun(channel, options), options, progress)
+    if not rivals:
+        return _settled(_begun(channel, options), options, progress)
+    found: list[Settled] = []
+    if beside_all := [one for one in beginnings if one not in BESIDE_NOTHING]:
+        # What stands beside everything is worked out once, and gone on with under each kind of noise.
+        bank = _begun(channel, options)
+        begun = _settled(bank, options, progress)
+        found += [
+            _from(*deepcopy((bank, begun.best.members)), begun.refused, one, options, progress) for one in beside_all
+        ]
+    found += [
+        _from(_begun(channel, options), (), {}, one, options, progress) for one in beginnings if one in BESIDE_NOTHING
+    ]
+    found.sort(key=lambda one: -one.log_probability)
+    return replace(found[0], others=tuple(found[1:]))
+
+
+BESIDE_NOTHING = (Beginning.NOTHING, Beginning.NOTHING_LONG_TAILS)
+LONG_TAILS = (Beginning.EVERYTHING_LONG_TAILS, Beginning.NOTHING_LONG_TAILS)
+
+
+def _from(
+    bank: Bank,
+    members: tuple[Member, ...],
+    refused: Mapping[str, str],
+    beginning: Beginning,
+    options: _Options,
+    progress: Callable[[str], None],
+) -> Settled:
+    """What the comparison comes to from members whose noise is measured beside them."""
+    bank.measures_beside_members, bank.long_tails = True, beginning in LONG_TAILS
+    settled = _settled(bank, options, progress, members, refused)
+    return replace(settled, beginning=beginning, log_probability=_log_probability(bank, settled.best.members))
 
 
 @dataclass(frozen=True)
@@ -160,29 +144,38 @@ def _begun(channel: Channel, options: _Options) -> Bank:
     return bank
 
 
-def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> Settled:
+def _settled(
+    bank: Bank,
+    options: _Options,
+    progress: Callable[[str], None],
+    best: tuple[Member, ...] = (),
+    impossible: Mapping[str, str] | None = None,
+) -> Settled:
     """Look, compare, lay out anew, until nothing changes.
 
     Args:
         bank: of columns; they become more.
         options: of `settle`.
         progress: called with what is being done.
+        best: members to begin with.
+        impossible: laws that cannot be what they would have to be, and why.
     """
     channel, look = bank.channel, options.look
-    best: tuple[Member, ...] = ()
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
     laid_out: set[str] = set()
-    refused: dict[str, str] = {}
+    refused: dict[str, str] = dict(impossible or {})
     looked: set[frozenset[str]] = set()
     compared: Settled | None = None  # after the last look
-    most_probable = -np.inf
+    most_probable, times_placed = -np.inf, 0
+    # Members to begin with come from a comparison that had been looked about for.
+    blank = not best
     # Laws come first, at their best values: what they leave is looked at, and not what they do.
     looking = look and not channel.laws
     for number in range(MOST_ROUNDS):
-        bank.measure_noise()
+        bank.measure(best)
         starts: list[tuple[Member, ...]] = []
         if looking:
-            best, starts = _looked_about(bank, best, refused, progress, options, first=compared is None)
+            best, starts = _looked_about(bank, best, refused, progress, options, first=blank and compared is None)
             if compared is not None and _would_be_the_same(compared, bank, best, refused):
                 return compared
         progress(f"sets of causes, round {number + 1}")
@@ -199,16 +192,12 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
             laid_out |= {member.cause.name for member in rough}
             _lay_out(bank, beside, posterior.best, rough)
             continue
-        if impossible := _negative(settled):
-            refused |= impossible
+        if negative := _negative(settled):
+            refused |= negative
             continue
-        if (
-            stretched := {n for n in posterior.best.names & bank.looked_for if bank.patterns[n].family in IN_TIME}
-            - laid_out
-        ):
-            # Their ends were found in more noise than there is now.
-            best = edges_anew(bank, best, stretched)
-            laid_out |= stretched | {member.cause.name for member in best}
+        if times_placed < MOST_PLACED and (moved := _placed(bank, best)):
+            times_placed += 1
+            best = moved
             continue
         if not look or (looking and (not options.thorough or posterior.best.names in looked)):
             break
@@ -220,6 +209,13 @@ def _settled(bank: Bank, options: _Options, progress: Callable[[str], None]) -> 
                 break
         looking = look
     return settled
+
+
+def _placed(bank: Bank, members: tuple[Member, ...]) -> tuple[Member, ...]:
+    """Members with what was looked for moved to better places, found in less noise than before; none where none is better."""
+    named = {member.cause.name for member in members} & bank.looked_for
+    better = places_anew(bank, members, {name for name in named if bank.patterns[name].family in MOVED})
+    return better if [one.cause.name for one in better] != [one.cause.name for one in members] else ()
 
 
 def _would_be_the_same(compared: Settled, bank: Bank, best: Sequence[Member], refused: Mapping[str, str]) -> bool:
@@ -253,17 +249,19 @@ def _looked(
     for number in range(most_looks):
         known = set(bank.patterns)
         new = bank.add(seen(bank, members, in_time=in_time))
-        noise = bank.measure_noise()
+        noise = bank.measure(members)
         progress(f"look {number + 1}: {len(members)} causes, noise about {noise.sigma:.3g}")
         comparison = bank.beside().comparison(bank.target)
-        more = edges_anew(bank, grown(comparison, bank.but_for(refused), members), set(new))
+        more = places_anew(bank, grown(comparison, bank.but_for(refused), members), set(new))
         fresh = set(bank.patterns) - known
         taken = {member.cause.name for member in more}
         # What is taken in makes the noise less, and less noise lets in more: together they must be more probable than before.
+        if bank.measures_beside_members:
+            bank.measure(more)
         after = _log_probability(bank, more)
         if not taken & fresh or after <= before:
             bank.drop(fresh)
-            bank.measure_noise()
+            bank.measure(members)
             break
         bank.drop(fresh - taken)
         members, before = more, after
@@ -295,7 +293,8 @@ def _looked_about(
 def _log_probability(bank: Bank, members: Sequence[Member]) -> float:
     """Of the noise that there is and members together, but for what is the same for all of a channel."""
     odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
-    return bank.log_likelihood() + bank.beside().comparison(bank.target).log_evidence(members) + odds
+    evidence = bank.beside().comparison(bank.target).log_evidence(members)
+    return bank.log_likelihood() + evidence + bank.tails_beyond(members) + odds
 
 
 def grown(comparison: ModelComparison, causes: Sequence[Cause], start: Sequence[Member] = ()) -> tuple[Member, ...]:

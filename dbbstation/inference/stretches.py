@@ -240,6 +240,9 @@ class _Look:
         first, last = (int(edge) for edge in self._windows[int(self._worth(along, self._own).argmax())])
         for _ in range(ENDS_MOVED):
             low, high = self._within(first, last)
+            if high - low < SHORTEST:
+                return None
+            first = min(first, high - SHORTEST)
             ends = np.arange(first + SHORTEST, high + 1)
             last = int(ends[int(self._worth_of(np.full(len(ends), first), ends).argmax())])
             starts = np.arange(low, last - SHORTEST + 1)
@@ -269,9 +272,10 @@ class _Look:
         ends = float(0.5 * (self._at[last - 1] + self._at[last])) if last < len(self._at) else np.inf
         for finer in FINER:
             moves = np.arange(-4.0, 5.0) * finer
-            begins, _ = self._best_edges(begins + moves, np.full(len(moves), ends))
-            _, ends = self._best_edges(np.full(len(moves), begins), ends + moves)
-        column = self._whitened(np.array([begins]), np.array([ends]))[:, 0]
+            # Edges between rows must leave the rows that a stretch has at the least.
+            begins, _ = self._best_edges(np.minimum(begins + moves, ends - SHORTEST), np.full(len(moves), ends))
+            _, ends = self._best_edges(np.full(len(moves), begins), np.maximum(ends + moves, begins + SHORTEST))
+        column = self._left.whitened(self._columns(np.array([begins]), np.array([ends])))[:, 0]
         beside = column - self._axes @ (self._axes.T @ column)
         # Of what it explains its prior leaves a little; then all of it is as if it had been fitted with the rest [Woodbury].
         information = max(float(column @ beside), 0.0) + 1.0 / self._size**2
@@ -286,23 +290,25 @@ class _Look:
 
     def _best_edges(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> tuple[float, float]:
         """Those edges of some between which one value explains most; the middle ones where they are alike."""
-        columns = self._whitened(begins, ends)
-        # Stretches differ about the edge that moves only, and what is alike in them is multiplied once.
-        one = columns[:, :1]
-        away = columns - one
-        near = np.flatnonzero(away.any(axis=1))
-        along = one.T @ self._rest + away[near].T @ self._rest[near]
-        taken = self._axes.T @ one + self._axes[near].T @ away[near]
-        own = np.sum(columns**2, axis=0) - np.sum(taken**2, axis=0)
+        columns = self._columns(begins, ends)
+        # Stretches differ about the edge that moves only, and what is alike in them is whitened and multiplied once.
+        one = self._left.whitened(columns[:, :1])
+        differs = np.flatnonzero((columns != columns[:, :1]).any(axis=1))
+        near = slice(int(differs[0]), int(differs[-1]) + 1) if len(differs) else slice(0, 0)
+        reach = slice(near.start, min(near.stop + self._left.coloured.order, len(columns)))
+        away = self._left.whitened_part(columns[near] - columns[near, :1], near, reach)
+        along = one.T @ self._rest + away.T @ self._rest[reach]
+        taken = self._axes.T @ one + self._axes[reach].T @ away
+        own = np.sum(one**2) + 2.0 * (one[reach].T @ away)[0] + np.sum(away**2, axis=0) - np.sum(taken**2, axis=0)
         explained = along**2 / (np.maximum(own, 0.0) + 1.0 / self._size**2)
         order = np.argsort(np.abs(np.arange(len(begins)) - len(begins) // 2), kind="stable")
         k = int(order[int(np.argmax(explained[order] * (1.0 - ALIKE * np.arange(len(order)))))])
         return float(begins[k]), float(ends[k])
 
-    def _whitened(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Whitened columns of stretches, shape (m, p)."""
+    def _columns(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Columns of stretches, shape (m, p)."""
         form = Stretches(tuple(begins.tolist()), tuple(ends.tolist()), self._clock.response)
-        return self._left.whitened(form.columns(self._at) * self._factor[:, None])
+        return form.columns(self._at) * self._factor[:, None]
 
 
 INDEPENDENT = 4.0

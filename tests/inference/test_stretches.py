@@ -14,8 +14,9 @@ from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.curves import Clock, Stretches
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.pieces import Fitting
+from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
-from dbbstation.inference.stretches import _squares_of_edges
+from dbbstation.inference.stretches import SHORTEST, _squares_of_edges
 
 ROWS = 1200
 
@@ -108,7 +109,7 @@ def test_the_likelihood_of_uneven_noise_is_that_of_its_covariance(rng):
     found = []
     for spread, level in cases:
         bank = Bank(channel)
-        bank._take(bank.noise.with_innovation(level), spread)
+        bank._take(bank.noise.with_innovation(level), spread, np.ones(rows))
         found.append(bank.log_likelihood())
     wanted = [dense(spread, level) for spread, level in cases]
     assert np.diff(found) == pytest.approx(np.diff(wanted), rel=1e-6)
@@ -117,7 +118,7 @@ def test_the_likelihood_of_uneven_noise_is_that_of_its_covariance(rng):
 @pytest.mark.parametrize("longest", [5, 200])
 def test_sums_of_squares_of_a_stretch_are_those_of_its_whitened_rows(longest):
     """By brute force: ones between zeros, filtered row by row."""
-    noise = Coloured(1.0, 0.6, 0.8)
+    noise = Coloured.first_order(1.0, 0.6, 0.8)
     taps = noise.filter
     found = _squares_of_edges(noise, longest)
     for length in range(1, longest + 1, 13):
@@ -136,3 +137,15 @@ def test_what_is_left_beside_columns_in_two_parts_is_ridge_regression(rng):
     precision = np.diag(np.where(np.isfinite(sd), 1.0 / sd**2, 0.0))
     values = np.linalg.solve(columns.T @ columns / noise**2 + precision, columns.T @ target / noise**2)
     np.testing.assert_allclose(left.rest, (target - columns @ values) / noise, atol=1e-12)
+
+
+def test_a_single_row_is_no_stretch(rng):
+    """One row of ten times the noise: a wrong value, which no stretch of three rows explains as a row of its own."""
+    rows = 400
+    residual = rng.normal(0.0, 1.0, rows)
+    residual[200:203] += (12.0, 1.0, 0.0)
+    base = Base.flat(("offset",), np.ones((rows, 1)))
+    time = np.arange(rows, dtype=np.float64)
+    channel = Channel(residual, "", (slice(0, rows),), ("one",), (), base, time=time)
+    for finding in read_off(settle(channel)):
+        assert all(last - first + 1 >= SHORTEST for first, last in finding.rows)

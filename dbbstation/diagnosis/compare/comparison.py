@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.read_off import Finding
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
     from dbbstation.sources.contract import ErrorSource
@@ -192,7 +192,7 @@ def compare(
     matching = match(a, b)
     progress("candidates")
     sides = Sides.of(machine, matching.pairs)
-    settled = settle(channel_of(sides, sources), in_time=False, progress=progress)
+    settled = settle(channel_of(sides, sources), in_time=False, rivals=False, progress=progress)
     progress("verdicts")
     return Comparison(
         matching=matching,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.diagnosis.compare.sides import Sides
     from dbbstation.inference.held_out import HeldOut
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
 
 FOLDS = 5
 """Groups of tests that are held out in turn."""

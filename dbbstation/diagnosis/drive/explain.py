@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.channel import DriveChannel
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.recordings import Recordings
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
 
 MOST_ROUNDS = 6
 """Times that something impossible is refused and all is compared again."""
@@ -60,7 +60,13 @@ def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Ca
     for number in range(MOST_ROUNDS):
         base = [name for name in (MASS, VISCOUS) if name not in dropped]
         drive = drive_channel(recordings, sources, base, refused)
-        settled = settle(drive.channel, most_expanded=MOST_EXPANDED, most_looks=MOST_LOOKS, progress=progress)
+        settled = settle(
+            drive.channel,
+            most_expanded=MOST_EXPANDED,
+            most_looks=MOST_LOOKS,
+            rivals=False,
+            progress=progress,
+        )
         settled = _possible_first(drive, settled)
         after = fit(drive, settled, settled.best.members)
         if number == 0:

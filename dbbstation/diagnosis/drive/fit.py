@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.channel import DriveChannel
     from dbbstation.inference.hypotheses import Hypothesis
     from dbbstation.inference.model_comparison import Member
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
 
 METHOD_U_SHARE = 5e-4
 """Standard uncertainty, of a value, that low-pass, differences and the moment of a reversal leave of a perfect recording;

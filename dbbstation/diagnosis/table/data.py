@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.inference.channel import Base, Channel, Law
+from dbbstation.inference.memory import memory_laws
 from dbbstation.inference.variables import Kind, Variable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.table.contract import TableSource
+
+REFITTED = 2.0
+"""What refitting a parameter changes the simulated value by, one standard deviation, over what that was off by as simulated [rms].
+One to three give the same names; see docs/mismatch.md."""
 
 OFFSET = "offset"
 """Name of the base column that is the same for all rows."""
@@ -37,6 +42,9 @@ class Table:
         names: of the blocks.
         clock: variable that orders the rows; None where nothing does.
         in_row_order: rows stand in the order in which they were measured, though no column says when.
+        known: standard uncertainty to which parameters were known before, by name, in their own units.
+        free: parameters of which nothing is known, such as initial states.
+        has_offset: whether measured and simulated values may differ by a constant that is of no interest.
     """
 
     measured: NDArray[np.float64]
@@ -50,6 +58,9 @@ class Table:
     names: tuple[str, ...]
     clock: Variable | None
     in_row_order: bool = False
+    known: Mapping[str, float] = field(default_factory=dict)
+    free: frozenset[str] = frozenset()
+    has_offset: bool = True
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -59,13 +70,25 @@ class Table:
         """Whether rows follow one another in time."""
         return self.clock is not None or self.in_row_order
 
+    def spread_of(self, name: str) -> float:
+        """Standard deviation of what a parameter may be off by, before the recording is looked at; infinite where it is free."""
+        if name == OFFSET or name in self.free:
+            return np.inf
+        if name in self.known:
+            return self.known[name]
+        # What changes the simulated value by much more than it was off by is no correction of a parameter.
+        moves = float(np.sqrt(np.mean(np.square(self.derivatives[name]))))
+        off = float(np.std(self.measured - self.simulated))
+        return REFITTED * off / moves if moves > 0.0 and off > 0.0 else np.inf
+
     def channel(self, sources: Sequence[TableSource] = ()) -> Channel:
         """Channel of measured less simulated.
 
         Args:
             sources: physics of the user's own; those that lack a column are left out by the caller.
         """
-        samples = np.column_stack([np.ones(len(self)), *self.derivatives.values()])
+        columns = {OFFSET: np.ones(len(self)), **self.derivatives} if self.has_offset else dict(self.derivatives)
+        samples = np.column_stack([np.zeros((len(self), 0)), *columns.values()])
         simulated = Variable(self.simulated_name, self.unit, Kind.ANY, self.simulated)
         time = None if self.clock is None else self.clock.values
         if time is None and self.in_row_order:
@@ -73,17 +96,28 @@ class Table:
         follows = self.variables
         if np.ptp(self.simulated) > 0.0 and not any(_is_same(v.values, self.simulated) for v in follows):
             follows = (*follows, simulated)
+        residual, time_unit = (
+            self.measured - self.simulated,
+            self.clock.unit if self.clock is not None and self.clock.unit else "row",
+        )
+        laws = [self._law(source) for source in sources]
+        if time is not None and (size := float(np.std(residual))) > 0.0:
+            laws += memory_laws(follows, time, time_unit, self.blocks, size, self.unit)
         return Channel(
-            residual=self.measured - self.simulated,
+            residual=residual,
             unit=self.unit,
             blocks=self.blocks,
             names=self.names,
             variables=follows,
-            base=Base.flat((OFFSET, *self.derivatives), samples),
-            laws=tuple(self._law(source) for source in sources),
+            base=Base(
+                tuple(columns), samples, np.array([*map(self.spread_of, columns)]), np.zeros(len(columns), dtype=bool)
+            ),
+            laws=tuple(laws),
             time=time,
-            time_unit=self.clock.unit if self.clock is not None and self.clock.unit else "row",
+            time_unit=time_unit,
             simulated=simulated,
+            least_noise=float(np.hypot(_rounding(self.measured), _rounding(self.simulated))),
+            noise_follows=tuple(_sizes_of_noise(follows, time, self.blocks)),
         )
 
     def _law(self, source: TableSource) -> Law:
@@ -111,6 +145,28 @@ class Table:
             form_uncertainty=source.form_uncertainty,
             follows=follows,
         )
+
+
+def _sizes_of_noise(
+    variables: Sequence[Variable], time: NDArray[np.float64] | None, blocks: Sequence[slice]
+) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """What a part of the noise may be in proportion to: how far a variable is from either end of its range, and its speed."""
+    for variable in variables:
+        yield f"{variable.name} less its least value", variable.values - variable.low
+        yield f"its largest value less {variable.name}", variable.high - variable.values
+        if time is not None and variable.kind is not Kind.TIME and variable.is_path(blocks):
+            yield f"speed of {variable.name}", np.abs(variable.rates(time, blocks))
+
+
+def _rounding(values: NDArray[np.float64]) -> float:
+    """Standard deviation of what was rounded off values that are multiples of a step [JCGM 100:2008, sec. F.2.2.1]."""
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > EQUAL * np.ptp(values)]
+    return float(steps.min()) / float(np.sqrt(12.0)) if len(steps) else 0.0
+
+
+EQUAL = 1e-9
+"""Share of a range by which values differ that are equal."""
 
 
 def _is_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:

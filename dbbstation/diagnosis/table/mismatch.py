@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
 from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.left_over import left_over
+from dbbstation.inference.noise import noise_of
 from dbbstation.inference.patterns import Family, covers_turns, turn
 from dbbstation.inference.read_off import OUT, read_off
 from dbbstation.inference.settle import settle, static_patterns
+from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import compress, solve, with_random
 from dbbstation.inference.verdict import Value, Verdict
 
@@ -28,8 +32,11 @@ if TYPE_CHECKING:
     from dbbstation.inference.left_over import LeftOver
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.read_off import Finding
-    from dbbstation.inference.settle import Settled
+    from dbbstation.inference.settled import Settled
     from dbbstation.texts import Texts
+
+FAR_STATED = 3.0
+"""Standard uncertainties by which a parameter is off what was stated of it from which on this is said: one in 400 by chance."""
 
 FOLD_ROWS = 3000
 """Rows that a selection for a held-out part is made from, at the most, evenly spaced: fewer rows can only make its error larger."""
@@ -41,15 +48,24 @@ class Fitted:
 
     Attributes:
         name: `offset`, or of the parameter.
-        before: with the base alone.
+        before: with the base alone, by ordinary least squares; its uncertainty allows for neighbours that resemble each other.
         after: with what was found beside it.
         confounded: share of what the parameter does that this can do as well, R².
+        known: standard uncertainty to which it was known before; None where it was free.
+        stated: whether the user gave that; else it is what moves the simulated value twice as far as that was off.
     """
 
     name: str
     before: Value
     after: Value
     confounded: float
+    known: float | None = None
+    stated: bool = False
+
+    @property
+    def is_far(self) -> bool:
+        """Whether it moved so far that its derivative, or what was known of it, must be asked again."""
+        return self.known is not None and abs(self.after.value) > (FAR_STATED if self.stated else 1.0) * self.known
 
 
 @dataclass(frozen=True)
@@ -112,10 +128,19 @@ class Mismatch:
         return bool(self.settled.best.members) or not self.left.is_noise
 
     @property
+    def offset(self) -> Value | None:
+        """Constant that lies between measured and simulated values; None where there may be none."""
+        return next((one.before for one in self.fitted if one.name == OFFSET), None)
+
+    @property
     def offset_is_there(self) -> bool:
         """Whether a constant lies between them that is none of chance."""
-        offset = self.fitted[0].before
-        return abs(offset.value) >= OUT * offset.uncertainty
+        return self.offset is not None and abs(self.offset.value) >= OUT * self.offset.uncertainty
+
+    @property
+    def parameters(self) -> tuple[Fitted, ...]:
+        """Parameters of the simulation."""
+        return tuple(one for one in self.fitted if one.name != OFFSET)
 
     @property
     def explained(self) -> NDArray[np.float64]:
@@ -155,8 +180,9 @@ def find_mismatch(
         CalibrationError: the difference is so much larger than its noise that rounding hides what it follows.
     """
     try:
-        return _found(table, sources, lacking or {}, progress, hold_out=hold_out)
-    except np.linalg.LinAlgError as error:
+        with np.errstate(over="raise"):
+            return _found(table, sources, lacking or {}, progress, hold_out=hold_out)
+    except (np.linalg.LinAlgError, FloatingPointError) as error:
         what = "the difference is so much larger than its noise that rounding hides what it follows"
         remedy = "check that measured and simulated values are of one quantity in one unit"
         raise CalibrationError(
@@ -176,14 +202,15 @@ def _found(
     channel = replace(channel, static=static_patterns(channel))
     settled = settle(channel, progress=progress)
     findings = read_off(settled)
-    held_out = held_out_error(channel, choose_without, progress) if hold_out else None
+    chosen = partial(choose_without, beginning=settled.beginning)
+    held_out = held_out_error(channel, chosen, progress) if hold_out else None
     return Mismatch(
         table=table,
         settled=settled,
         findings=findings,
         shares=_shares(settled),
         resembles=_resembles(settled),
-        fitted=_fitted(settled),
+        fitted=_fitted(settled, table),
         left=left_over(settled),
         held_out=held_out,
         lacking=lacking,
@@ -192,12 +219,15 @@ def _found(
     )
 
 
-def choose_without(channel: Channel, rows: NDArray[np.bool_]) -> Settled:
-    """Repeat the whole selection without some rows, shape (n,).
+def choose_without(
+    channel: Channel, rows: NDArray[np.bool_], *, beginning: Beginning = Beginning.EVERYTHING
+) -> Settled:
+    """Repeat the whole selection without some rows, shape (n,), from one beginning of the noise.
 
     It is searched less widely than all rows are, from one beginning, which can only make the error of its predictions larger.
     """
-    return settle(channel.without(rows).thinned(FOLD_ROWS), most_expanded=0, thorough=False)
+    kept = channel.without(rows).thinned(FOLD_ROWS)
+    return settle(kept, most_expanded=0, thorough=False, beginnings=(beginning,))
 
 
 def _second_start(settled: Settled, findings: Sequence[Finding]) -> float:
@@ -257,29 +287,38 @@ def _followed(effect: NDArray[np.float64], columns: NDArray[np.float64]) -> floa
     return 1.0 - float(np.sum((effect - both @ values) ** 2)) / whole if whole > 0.0 else 0.0
 
 
-def _fitted(settled: Settled) -> tuple[Fitted, ...]:
+def _fitted(settled: Settled, table: Table) -> tuple[Fitted, ...]:
     """Base parameters with the base alone, and beside everything that was found."""
     channel, bank, members = settled.channel, settled.bank, settled.best.members
     noise, known, size = settled.noise.innovation, channel.known, channel.base.samples.shape[1]
-    alone = solve([compress(np.arange(size), bank.base, bank.target)], known, noise, channel.held)
-    beside = alone
+    alone = channel.fitted(channel.target, _noise_alone(channel))
+    beside = solve([compress(np.arange(size), bank.base, bank.target)], known, noise, channel.held)
     if members:
         columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
         both = with_random(known, np.concatenate([member.sd for member in members]))
         block = compress(np.arange(columns.shape[1]), columns, bank.target)
         beside = solve([block], both, noise, channel.held)
     before, after = np.diag(alone.covariance), np.diag(beside.covariance)[:size]
-    units = ["" if k == 0 else "in its own unit" for k in range(size)]
-    units[0] = channel.unit
+    units = [channel.unit if name == OFFSET else "in its own unit" for name in channel.base.names]
     return tuple(
         Fitted(
             name,
             Value(float(alone.x[k]), float(np.sqrt(max(before[k], 0.0))), units[k]),
             Value(float(beside.x[k]), float(np.sqrt(max(after[k], 0.0))), units[k]),
             float(np.clip(1.0 - before[k] / after[k], 0.0, 1.0)) if after[k] > 0.0 else 1.0,
+            float(channel.base.prior[k]) if np.isfinite(channel.base.prior[k]) else None,
+            name in table.known,
         )
         for k, name in enumerate(channel.base.names)
     )
+
+
+def _noise_alone(channel: Channel) -> float:
+    """Standard deviation of white noise that leaves values of the base alone as uncertain as what it leaves does."""
+    left = channel.target - channel.base.samples[channel.kept] @ channel.refitted()
+    runs = [left[rows] for rows in channel.stretches] if channel.time is not None else [left]
+    found = noise_of(runs, channel.base.samples.shape[1])
+    return max(found.effective if channel.time is not None else found.sigma, channel.least_noise, 1e-300)
 
 
 def _rms(values: NDArray[np.float64]) -> float:

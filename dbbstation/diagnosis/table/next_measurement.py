@@ -45,7 +45,7 @@ def next_measurements(found: Mismatch) -> tuple[Next, ...]:
 
 def _suggested(found: Mismatch) -> Iterator[Next]:
     yield from _apart(found)
-    for parameter in found.fitted[1:]:
+    for parameter in found.parameters:
         if parameter.confounded > TAKEN_UP:
             text = f"Measure where {parameter.name} matters and what was found does not: {100 * parameter.confounded:.0f} % of it"
             yield Next(f"{text} can be taken for these.", ())

@@ -34,20 +34,39 @@ def mismatch_summary(found: Mismatch) -> dict[str, Any]:
             for v in table.variables
         ],
         "mismatch": found.is_there,
-        "offset": {**_value(found.fitted[0].before), "significant": found.offset_is_there},
+        "offset": None if found.offset is None else {**_value(found.offset), "significant": found.offset_is_there},
         "noise": {
             "sigma": noise.sigma,
             "rows_as_one": noise.correlation_samples,
             "measured_in_order": ordered,
+            "order": noise.order,
+            "degrees_of_freedom": None if math.isinf(settled.bank.tails) else settled.bank.tails,
+            "grows_with": settled.bank.grows_with or None,
+            "beginnings": [
+                {
+                    "beside": one.beginning.value,
+                    "log_odds": one.log_probability - settled.log_probability,
+                    "effects": sorted(one.best.names),
+                }
+                for one in (settled, *settled.others)
+            ],
         },
         "residual_rms": {"before": found.rms_before, "after": found.rms_after},
         "held_out_rms": None
         if found.held_out is None
         else {
+            "as_simulated": found.held_out.as_simulated,
             "before": found.held_out.before,
             "after": found.held_out.after,
             "folds": [
-                {"name": f.name, "rows": f.rows, "before": f.before, "after": f.after} for f in found.held_out.folds
+                {
+                    "name": fold.name,
+                    "rows": fold.rows,
+                    "as_simulated": fold.as_simulated,
+                    "before": fold.before,
+                    "after": fold.after,
+                }
+                for fold in found.held_out.folds
             ],
         },
         "led_by": [
@@ -62,6 +81,9 @@ def mismatch_summary(found: Mismatch) -> dict[str, Any]:
                 "after": _value(p.after),
                 "shift": p.after.value - p.before.value,
                 "confounded": p.confounded,
+                "known": p.known,
+                "stated": p.stated,
+                "far": p.is_far,
             }
             for p in found.fitted
         ],

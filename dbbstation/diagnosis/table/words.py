@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.patterns import Family
+from dbbstation.inference.seen import IN_TIME
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.table.mismatch import Mismatch
@@ -19,6 +20,8 @@ MEANINGS: dict[Family, str] = {
     Family.HYSTERESIS: "It turns its sign with the direction of travel: play or friction.",
     Family.SPEED: "It grows with the speed: viscous friction, or a delay of this variable.",
     Family.LAG: "The measured value runs after the simulated one (negative: ahead of it).",
+    Family.MEMORY: "It follows this variable late: a body warms up, a material creeps, a sensor or a filter lags.",
+    Family.DEAD_TIME: "It follows this variable after a dead time: transport, a network, or a clock that is off.",
     Family.DRIFT: "It grows with time: warming, wear, or a clock that runs at another rate.",
     Family.PRODUCT: "It depends on both together: no curve over one of them alone shows it.",
     Family.CURVE: "It follows this variable smoothly.",
@@ -37,6 +40,9 @@ def sentence_of(found: Mismatch, finding: Finding) -> str:
     parts = [_where(found, finding)]
     if finding.family is not None:
         parts.append(MEANINGS[finding.family])
+        clock = found.table.clock
+        if finding.family in IN_TIME or (clock is not None and clock.name in finding.variables):
+            parts.append(HAPPENED)
     if finding.name in found.texts:
         texts = found.texts[finding.name]
         parts += [texts.what, texts.confirm]
@@ -55,6 +61,8 @@ def sentence_of(found: Mismatch, finding: Finding) -> str:
     parts.append(finding.text)
     return " ".join(part for part in parts if part)
 
+
+HAPPENED = "It is something that happened in these rows: no law says whether it comes again."
 
 HALF = 0.5
 """Share of a curve that a named form must follow to be said to be most of it."""

@@ -1,0 +1,169 @@
+"""Effects with a memory: what follows a variable late, as a first-order lag or after a dead time.
+
+A residual alone shows their shadow: a curve over time, a hysteresis, something in proportion to the speed. Laid out as laws, they are
+held against those by what they predict.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.channel import Law
+from dbbstation.inference.patterns import Family, log_odds
+from dbbstation.inference.variables import Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.variables import Variable
+
+LENGTHS = 10
+"""Time constants, and dead times, that are tried at first. Each is then moved to where it fits best."""
+
+SHORTEST_ROWS = 2.0
+"""Rows in the shortest time constant: what is over within a row is no memory."""
+
+LONGEST_SHARE = 1.0 / 3.0
+"""Share of the longest block that the longest time constant is: of a longer one, only the start is seen, which is a drift."""
+
+LONGEST_DELAY_SHARE = 0.1
+"""Share of the longest block that the longest dead time is: the rows before it say nothing about it."""
+
+LATE = 0.1
+"""Probability that an effect that follows a variable does so late enough to be seen, by either of both ways: a linear effect over what
+changes slowly is as late as one likes, and is called linear."""
+
+AT_ONCE = 0.5
+"""Probability that the simulation has the effect, but at once: then the memory shows as what comes late less what comes at once."""
+
+
+def memory_laws(
+    variables: Sequence[Variable],
+    time: NDArray[np.float64],
+    time_unit: str,
+    blocks: Sequence[slice],
+    size: float,
+    unit: str,
+) -> list[Law]:
+    """A first-order lag and a dead time of each variable that is sampled along a path.
+
+    Args:
+        variables: that an effect may follow.
+        time: of the rows, rising within blocks, shape (n,).
+        time_unit: of it.
+        blocks: rows of each, in time order.
+        size: of an effect, one standard deviation, in the unit of the residual.
+        unit: of the residual.
+    """
+    usable = [v for v in variables if v.kind is not Kind.TIME and v.extent > 0.0 and v.is_path(blocks)]
+    moving = [rows for rows in blocks if rows.stop - rows.start > 1]
+    steps = [np.diff(time[rows]) for rows in moving]
+    if not usable or min((float(step.min()) for step in steps), default=0.0) <= 0.0:
+        return []
+    row = float(np.median(np.concatenate(steps)))
+    longest = max(float(np.sum(step)) for step in steps)
+    kinds = (
+        (Family.MEMORY, "time constant", _lag, _grid(SHORTEST_ROWS * row, LONGEST_SHARE * longest)),
+        (Family.DEAD_TIME, "dead time", _delay, _grid(row, LONGEST_DELAY_SHARE * longest)),
+    )
+    found = []
+    for family, parameter, columns, grid in kinds:
+        for variable in usable if grid else ():
+            gain = size / variable.half_range
+            starts = len(blocks) if family is Family.MEMORY else 0
+            own = (0.0,) * starts
+            found.append(
+                Law(
+                    name=f"{family} of {variable.name}",
+                    columns=partial(columns, variable, time, blocks),
+                    plausible=np.array([gain, gain, *(size for _ in own)]),
+                    parameters=("gain", "gain", *(f"start {k + 1}" for k in range(starts)), parameter),
+                    units=(
+                        *(f"{unit}/{variable.unit}" if variable.unit else unit for _ in range(2)),
+                        *(unit for _ in own),
+                        time_unit,
+                    ),
+                    grids=(grid,),
+                    log_odds=log_odds(len(usable)) + float(np.log(LATE / len(kinds))),
+                    choices=_choices(2 + starts),
+                    sizes=partial(_sizes, partial(columns, variable, time, blocks), size),
+                    family=family,
+                    variables=(variable,),
+                )
+            )
+    return found
+
+
+def _sizes(
+    columns: Callable[[tuple[float, ...]], NDArray[np.float64]], size: float, point: tuple[float, ...]
+) -> NDArray[np.float64]:
+    """Amplitudes at which each column reaches as far as any effect does, shape (p,)."""
+    return np.asarray(size / np.maximum(np.abs(columns(point)).max(axis=0), 1e-300))
+
+
+def _choices(width: int) -> tuple[tuple[tuple[int, ...], float, str], ...]:
+    """The simulation lacks the effect, or has it at once; either with what is left of the state at the start."""
+    starts = tuple(range(2, width))
+    return (
+        ((0, *starts), float(np.log(1.0 - AT_ONCE)), "which the simulation lacks"),
+        ((1, *starts), float(np.log(AT_ONCE)), "which the simulation has at once"),
+    )
+
+
+def _grid(shortest: float, longest: float) -> tuple[float, ...]:
+    return tuple(np.geomspace(shortest, longest, LENGTHS).tolist()) if longest > 2.0 * shortest else ()
+
+
+def _lag(
+    variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], point: tuple[float, ...]
+) -> NDArray[np.float64]:
+    """Late value, late less present value, and what fades from the start of each block, shape (n, 2 + blocks)."""
+    found = np.zeros((len(time), 2 + len(blocks)))
+    for k, rows in enumerate(blocks):
+        values, at = variable.travel(rows), time[rows]
+        found[rows, 1] = lagging(values, at, point[0])
+        found[rows, 0] = values - _middle(variable) + found[rows, 1]
+        found[rows, 2 + k] = np.exp(-(at - at[0]) / point[0])
+    return found
+
+
+def _delay(
+    variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], point: tuple[float, ...]
+) -> NDArray[np.float64]:
+    """Value a while ago, and that less the present one, shape (n, 2); before the first row it was as there."""
+    found = np.zeros((len(time), 2))
+    for rows in blocks:
+        values, at = variable.travel(rows), time[rows]
+        ago = np.interp(at - point[0], at, values)
+        found[rows] = np.column_stack([ago - _middle(variable), ago - values])
+    return found
+
+
+def _middle(variable: Variable) -> float:
+    return 0.5 * (variable.low + variable.high)
+
+
+def lagging(values: NDArray[np.float64], time: NDArray[np.float64], constant: float) -> NDArray[np.float64]:
+    """What a first-order lag makes of values, less these, shape (n,); it begins settled on the first one.
+
+    Exact for values on straight lines between rows [triangle-hold equivalent: Franklin, Powell and Workman, Digital Control of
+    Dynamic Systems, 3rd ed., sec. 6.3.2].
+
+    Args:
+        values: shape (n,).
+        time: rising, shape (n,).
+        constant: time constant, in the unit of `time`.
+    """
+    steps = np.diff(time)
+    fades = np.exp(-steps / constant)
+    falls = np.diff(values) * (constant / steps) * -np.expm1(-steps / constant)
+    behind, found = 0.0, [0.0]
+    for fade, fall in zip(fades.tolist(), falls.tolist(), strict=True):
+        behind = fade * behind - fall
+        found.append(behind)
+    return np.array(found)

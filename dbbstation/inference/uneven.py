@@ -1,0 +1,74 @@
+"""Noise that is not the same in all rows: its variance grows with something, or what is new in a row has long tails."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import gammaln
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+GROWN = np.array([0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
+"""Parts of the noise that grow that are tried, over the constant part, where they are as large as on average."""
+
+TAILS = (2.5, 3.0, 4.0, 6.0, 10.0)
+"""Degrees of freedom of Student's t that are tried."""
+
+TAIL_ROUNDS = 12
+"""Times that weights and scale are settled against each other."""
+
+
+def most_probable_variance(
+    powers: NDArray[np.float64], even: NDArray[np.float64], grows: NDArray[np.float64], odds: float
+) -> tuple[float, NDArray[np.float64]]:
+    """Cost of the variance of each row that makes squares most probable, and that variance [Schwarz 1978].
+
+    Args:
+        powers: squares of rows, shape (m,).
+        even: variance that does not grow, up to a factor, shape (m,).
+        grows: parts that may, shape (m, k).
+        odds: log of the number of candidates that this one is of.
+    """
+    squares = grows / np.maximum(np.mean(grows, axis=0), 1e-300)
+    every = np.array(list(product(GROWN, repeat=squares.shape[1])))
+    costs = []
+    for parts in every:
+        tried = even + squares @ np.square(parts)
+        costs.append(0.5 * np.sum(np.log(tried)) + 0.5 * len(powers) * np.log(np.mean(powers / tried)))
+    parameters = np.count_nonzero(every, axis=1)
+    priced = np.array(costs) + 0.5 * np.log(len(powers)) * parameters + odds
+    k = int(np.argmin(priced))
+    return float(priced[k]), even + squares @ np.square(every[k])
+
+
+def most_probable_tails(new: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    """Root of the weight of each row, shape (m,), and degrees of freedom of Student's t that what is new in rows follows best.
+
+    Args:
+        new: in units of its standard deviation, shape (m,).
+    """
+    squares = np.square(new)
+    best, found = -np.inf, (np.ones(len(new)), np.inf)
+    for tails in TAILS:
+        scale = 1.0
+        for _ in range(TAIL_ROUNDS):  # expectation and maximisation [Lange, Little and Taylor, JASA 84 (1989) 881]
+            weight = (tails + 1.0) / (tails + squares / scale)
+            scale = max(float(np.mean(weight * squares)), 1e-300)
+        likely = float(np.sum(log_student(new / np.sqrt(scale), tails))) - 0.5 * len(new) * float(np.log(scale))
+        if likely > best:
+            best, found = likely, (np.sqrt((tails + 1.0) / (tails + squares / scale)), tails)
+    return found
+
+
+def log_student(new: NDArray[np.float64], tails: float) -> NDArray[np.float64]:
+    """Log density of Student's t of so many degrees of freedom, over the height of the normal density, shape (m,).
+
+    Args:
+        new: in units of the scale, shape (m,).
+        tails: degrees of freedom.
+    """
+    height = gammaln(0.5 * (tails + 1.0)) - gammaln(0.5 * tails) - 0.5 * np.log(0.5 * tails)
+    return np.asarray(height - 0.5 * (tails + 1.0) * np.log1p(new**2 / tails))

@@ -1,0 +1,93 @@
+"""Noise of any colour, with a variance that grows, with long tails: found again where it was made by a closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import norm, t
+
+from dbbstation.inference.coloured import Coloured, autoregressive, with_put_back
+from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance
+
+RADIUS, TURN = 0.9, 2.0 * np.pi / 12.0
+RESONANT = np.array([1.0, -2.0 * RADIUS * np.cos(TURN), RADIUS**2])
+"""Taps of a second-order process; its first partial autocorrelation is a1 / (1 + a2), its second a2, both with the other sign."""
+
+
+def made(rng, rows=4000):
+    return lfilter([1.0], RESONANT, rng.standard_normal(rows + 500))[500:]
+
+
+def test_a_resonant_process_is_found_with_its_order_and_spectrum(rng):
+    found = autoregressive(made(rng), [slice(0, 4000)])
+    expected = (-RESONANT[1] / (1.0 + RESONANT[2]), -RESONANT[2])
+    assert found.partial[:2] == pytest.approx(expected, abs=0.03)
+    assert found.order <= 6
+    assert found.innovation == pytest.approx(1.0, rel=0.05)
+    frequency = np.linspace(0.02, 0.48, 24)
+    gain = np.abs(np.exp(-2j * np.pi * np.outer(frequency, np.arange(3))) @ RESONANT) ** 2
+    assert found.log_power(frequency) == pytest.approx(-np.log(gain), abs=0.4)
+
+
+def test_stretches_are_not_taken_for_neighbours(rng):
+    """Two halves that follow different constants of a walk: a row of one says nothing of the first row of the other."""
+    rows = made(rng)
+    order = np.concatenate([rows[2000:], rows[:2000]])
+    halves = autoregressive(order, [slice(0, 2000), slice(2000, 4000)])
+    assert halves.partial[:2] == pytest.approx(autoregressive(rows, [slice(0, 4000)]).partial[:2], abs=0.01)
+
+
+def test_white_noise_is_mostly_found_white(rng):
+    orders = [autoregressive(rng.standard_normal(400), [slice(0, 400)]).order for _ in range(60)]
+    assert np.mean(np.array(orders) == 0) > 0.5
+    assert max(orders) < 12
+
+
+def test_unwhitening_undoes_whitening(rng):
+    noise = Coloured(2.0, (0.7, -0.5, 0.2))
+    stretches = [slice(0, 2), slice(2, 3), slice(3, 90)]
+    white = rng.standard_normal(90)
+    whitening = noise.whitening(stretches)
+    assert whitening is not None
+    assert whitening @ noise.unwhitened(white, stretches) == pytest.approx(white, abs=1e-12)
+
+
+def test_a_first_order_process_has_the_effective_samples_of_its_sum():
+    noise = Coloured.first_order(2.0, share=0.8, decay=0.9)
+    assert noise.correlation_samples == pytest.approx(1.0 + 2.0 * 0.8 * 0.9 / (1.0 - 0.9), rel=0.01)
+
+
+def test_what_columns_took_is_put_back_where_they_took_it(rng):
+    noise = autoregressive(made(rng), [slice(0, 4000)])
+    bands = np.array([0.0, 0.05, 0.1, 0.5])
+    whole = with_put_back(noise, bands, np.log([0.25, 0.25, 1.0, 1.0]), 4000)
+    at = np.array([0.02, 0.25, 0.4])
+    assert whole.log_power(at) - noise.log_power(at) == pytest.approx([np.log(4.0), 0.0, 0.0], abs=0.2)
+
+
+@pytest.mark.parametrize("degrees", [3.0, 6.0])
+def test_long_tails_are_found_with_their_degrees_of_freedom(rng, degrees):
+    new = 1.7 * rng.standard_t(degrees, 6000)
+    trust, tails = most_probable_tails(new)
+    assert tails == degrees
+    # A row that is as far out as its scale has the weight one; one far out hardly any.
+    assert trust[np.abs(new).argmin()] == pytest.approx(np.sqrt((degrees + 1.0) / degrees), rel=1e-3)
+    assert trust[np.abs(new).argmax()] < 0.4
+
+
+def test_the_density_of_long_tails_is_that_of_students_t():
+    at = np.linspace(-9.0, 9.0, 37)
+    assert log_student(at, 4.0) - log_student(at[:1], 4.0) == pytest.approx(t.logpdf(at, 4.0) - t.logpdf(at[0], 4.0))
+    assert log_student(at, 4.0) == pytest.approx(t.logpdf(at, 4.0) - norm.logpdf(0.0), abs=1e-12)
+
+
+def test_a_variance_that_grows_is_found_with_its_size(rng):
+    speed = np.abs(np.sin(np.linspace(0.0, 40.0, 3000)))
+    powers = np.square(rng.standard_normal(3000) * np.hypot(0.5, speed))
+    cost, variance = most_probable_variance(powers, np.ones(3000), np.square(speed)[:, None], 0.0)
+    assert cost < most_probable_variance(powers, np.ones(3000), np.zeros((3000, 0)), 0.0)[0]
+    assert np.corrcoef(variance, 0.25 + speed**2)[0, 1] > 0.999
+    # Parts that grow are tried in steps of two.
+    ratio = (0.25 + speed.max() ** 2) / (0.25 + speed.min() ** 2)
+    assert 0.5 * ratio < variance.max() / variance.min() < 2.0 * ratio

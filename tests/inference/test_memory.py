@@ -1,0 +1,110 @@
+"""Lags and dead times as laws: against a differential equation solved finely, and what is said of tables that lack one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from dbbstation.diagnosis.table.mismatch import find_mismatch
+from dbbstation.inference.memory import lagging, memory_laws
+from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.verdict import Verdict
+from tests.diagnosis.table.nulls import moving, table_of
+
+NOISE_MM = 0.02
+
+
+@pytest.mark.parametrize("constant", [0.03, 0.4, 5.0])
+def test_a_lag_is_that_of_its_differential_equation(rng, constant):
+    time = np.cumsum(rng.uniform(0.05, 0.2, 120))
+    values = np.cumsum(rng.standard_normal(120))
+    late = values + lagging(values, time, constant)
+    solved = solve_ivp(
+        lambda t, y: (np.interp(t, time, values) - y) / constant,
+        (time[0], time[-1]),
+        values[:1],
+        t_eval=time,
+        rtol=1e-9,
+        atol=1e-10,
+        max_step=0.01,
+    )
+    assert late == pytest.approx(solved.y[0], abs=1e-5)
+
+
+def test_each_block_begins_by_itself():
+    time = np.tile(np.arange(50.0), 2)
+    values = np.concatenate([np.sin(time[:50] / 9.0), 5.0 + np.sin(time[50:] / 9.0)])
+    blocks = (slice(0, 50), slice(50, 100))
+    (memory, dead) = memory_laws([Variable("x", "mm", Kind.LENGTH, values)], time, "s", blocks, 1.0, "mm")
+    both = memory.columns((4.0,))
+    alone = memory_laws([Variable("x", "mm", Kind.LENGTH, values[50:])], time[50:], "s", blocks[:1], 1.0, "mm")[0]
+    assert both[50:, 1] == pytest.approx(alone.columns((4.0,))[:, 1], abs=1e-12)
+    # A dead time of three rows is a shift by three rows.
+    shifted = dead.columns((3.0,))[:, 1] + values
+    assert shifted[3:50] == pytest.approx(values[:47], abs=1e-12)
+    assert shifted[53:] == pytest.approx(values[50:97], abs=1e-12)
+    assert shifted[50] == values[50]
+
+
+def test_what_stands_still_or_jumps_has_no_memory(rng):
+    time = np.arange(60.0)
+    poses = Variable("pose", "mm", Kind.LENGTH, rng.uniform(0.0, 100.0, 60))
+    clock = Variable("t_s", "s", Kind.TIME, time)
+    assert memory_laws([poses, clock], time, "s", (slice(0, 60),), 1.0, "mm") == []
+
+
+def _late(values, time, constant):
+    """Euler's method in a hundredth of a row: another way to the same."""
+    state, found = values[0], [values[0]]
+    for k in range(1, len(values)):
+        for j in range(100):
+            now = values[k - 1] + (values[k] - values[k - 1]) * (j + 0.5) / 100.0
+            state += (now - state) * (time[k] - time[k - 1]) / 100.0 / constant
+        found.append(state)
+    return np.array(found)
+
+
+def _told(seed, effect_of, size):
+    rng = np.random.default_rng([seed, 77])
+    axis = moving(rng, 500)
+    effect, parameters = effect_of(axis)
+    effect = effect - effect.mean()
+    gain = size * NOISE_MM / np.std(effect)
+    simulated = axis.place + 0.1 * axis.load
+    measured = simulated + gain * effect + NOISE_MM * rng.standard_normal(500)
+    found = find_mismatch(table_of(axis, measured, simulated), hold_out=False)
+    return found, gain, parameters
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("at_once", [False, True], ids=["lacking", "at once"])
+def test_a_first_order_memory_is_named_with_its_time_constant(seed, at_once):
+    def creeping(axis):
+        constant = float(axis.t[-1]) / 18.0
+        return _late(axis.load, axis.t, constant) - at_once * axis.load, constant
+
+    found, gain, constant = _told(seed, creeping, 3.0)
+    finding = next(one for one in found.findings if one.name == "memory of load_n")
+    assert finding.verdict is Verdict.IDENTIFIED
+    assert finding.label.endswith("at once" if at_once else "lacks")
+    for name, true in (("gain", gain), ("time constant", constant)):
+        value = finding.values[name]
+        assert abs(value.value - true) < 3.0 * value.uncertainty
+        assert value.uncertainty < 0.2 * true
+    assert {one.name for one in found.there if one.family != "wave"} == {"memory of load_n"}
+
+
+@pytest.mark.slow
+def test_a_dead_time_of_some_rows_is_one_of_what_comes_late():
+    def delayed(axis):
+        delay = 12.0 * float(axis.t[1])
+        simulated = axis.place + 0.1 * axis.load
+        return np.interp(axis.t - delay, axis.t, simulated) - simulated, delay
+
+    found, _, delay = _told(2, delayed, 20.0)
+    finding = next(one for one in found.findings if one.name == "dead time of simulated_mm")
+    assert finding.verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}
+    value = finding.values["dead time"]
+    assert abs(value.value - delay) < 3.0 * value.uncertainty

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
+from dbbstation.files.places import real_path
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
@@ -23,11 +25,11 @@ class InputBook:
 
     def note_read(self, path: Path) -> None:
         """Note that a file was read, whether or not outputs name it among their inputs."""
-        self._read.add(path.resolve())
+        self._read.add(real_path(path))
 
     def was_read(self, path: Path) -> bool:
         """Whether a file was read so far."""
-        return path.resolve() in self._read
+        return real_path(path) in self._read
 
     def note(self, path: Path, digest: str) -> None:
         """Note a file; one that is read again after a change counts as it was last."""

@@ -128,3 +128,44 @@ def test_half_a_surrogate_pair_is_no_character(tmp_path):
     text = (FIXTURES / "machines" / "reference.yaml").read_text(encoding="utf-8")
     path.write_text(re.sub(r"name: .*", r'name: "\\ud800"', text, count=1), encoding="utf-8")
     assert "half a surrogate pair is no character" in told("check", path)
+
+
+@pytest.fixture
+def circle_of_links(tmp_path):
+    path = tmp_path / "loop"
+    path.symlink_to("loop")
+    return path
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["check", "LOOP"],
+        ["session", "list", "LOOP"],
+        ["session", "reject", "LOOP", "a-ccw-1", "--reason", "x"],
+        ["export", "SESSION", "--out", "LOOP"],
+        ["circles", "SESSION", "--csv", "LOOP"],
+        ["history", "LOOP"],
+        ["sources", "--source-file", "LOOP"],
+        ["replay", "LOOP"],
+        ["instruments", "LOOP"],
+        ["settings", "--settings", "LOOP"],
+        ["monitor", "--instrument", "mahr-c1202", "--zero-mm", "150", "--port", "LOOP", "--count", "1"],
+    ],
+    ids=" ".join,
+)
+def test_links_that_lead_in_a_circle(session, circle_of_links, command):
+    outcome = call(*({"LOOP": circle_of_links, "SESSION": session}.get(word, word) for word in command))
+    assert outcome.code != 0
+    assert "loop" in outcome.err
+    assert "fault of dbbstation" not in outcome.err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["circles", "SESSION", "--csv", ""], ["export", "SESSION", "--out", ""], ["calibrate", "SESSION", "--out", ""]],
+)
+def test_an_output_without_a_name(session, command):
+    outcome = call(*(session if word == "SESSION" else word for word in command))
+    assert outcome.code != 0
+    assert "name a file" in outcome.err

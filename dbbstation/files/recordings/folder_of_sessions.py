@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.gateway import head_of
+from dbbstation.files.places import real_path
 from dbbstation.files.recordings.session_name import SESSION_FILE
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def files_of(folder: Path) -> FolderFiles:
         raise InputError([Problem(str(folder), 0, 0, what, "name a folder that holds session folders")])
     if (folder / SESSION_FILE).is_file():
         what = "this folder is one session, a history is of a folder that holds several"
-        raise InputError([Problem(str(folder), 0, 0, what, f"name the folder around it: {folder.resolve().parent}")])
+        raise InputError([Problem(str(folder), 0, 0, what, f"name the folder around it: {real_path(folder).parent}")])
     look(folder, 1)
     if not sessions:
         raise InputError([_no_sessions(folder)])

@@ -15,6 +15,7 @@ from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.gateway import digest_of
+from dbbstation.files.places import real_path
 from dbbstation.files.recordings import session_name
 from dbbstation.files.recordings.entries import (
     RunEntry,
@@ -297,7 +298,7 @@ def parse_session(
         faults.append(unreadable(file, error))
         return None
     return SessionFolder(
-        name=folder.resolve().name,
+        name=real_path(folder).name,
         folder=folder,
         machine=machine.to_domain(),
         plan=planned,

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
-from dbbstation.files.places import real_path
+from dbbstation.files.places import real_path, text_of_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,7 +44,7 @@ class InputBook:
         sessions = {path.parent for path in self._digests if path.name == "session.yaml"}
         named: dict[str, str] = {}
         for path, digest in self._digests.items():
-            name = f"{path.parent.name}/{path.name}" if path.parent in sessions else path.name
+            name = text_of_name(f"{path.parent.name}/{path.name}" if path.parent in sessions else path.name)
             if named.get(name, digest) != digest:
                 name = next(f"{name} ({k})" for k in range(2, len(self._digests) + 2) if f"{name} ({k})" not in named)
             named[name] = digest

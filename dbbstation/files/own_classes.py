@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import os
 import sys
 import traceback
 from inspect import isabstract
@@ -57,7 +58,7 @@ def classes_in_files(
 
 def module_name(path: Path) -> str:
     """Return a name that no other file has."""
-    return f"dbbstation_own_{hashlib.sha256(str(real_path(path)).encode()).hexdigest()[:16]}"
+    return f"dbbstation_own_{hashlib.sha256(os.fsencode(real_path(path))).hexdigest()[:16]}"
 
 
 def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:

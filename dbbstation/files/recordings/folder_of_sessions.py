@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.gateway import head_of
-from dbbstation.files.places import real_path
+from dbbstation.files.places import real_path, text_of_name
 from dbbstation.files.recordings.session_name import SESSION_FILE
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class FolderFiles:
     """Files of a folder, by their paths in it.
 
     Attributes:
-        sessions: session files.
+        sessions: session files, with names that can be written in UTF-8.
         models: files that may be models.
         closed: folders that cannot be looked into, with the reason.
     """
@@ -56,12 +56,12 @@ def files_of(folder: Path) -> FolderFiles:
             with os.scandir(here) as listed:
                 entries = sorted(listed, key=lambda entry: entry.name)
         except OSError as error:
-            closed.append((here.relative_to(folder).as_posix(), reason_of(error)))
+            closed.append((text_of_name(here.relative_to(folder).as_posix()), reason_of(error)))
             return
         is_session = here != folder and any(entry.name == SESSION_FILE for entry in entries)
         for entry in entries:
             path = here / entry.name
-            name = path.relative_to(folder).as_posix()
+            name = text_of_name(path.relative_to(folder).as_posix())
             if is_session and entry.name == SESSION_FILE:
                 sessions[name] = path
             elif entry.is_file() and entry.name.endswith((".yaml", ".yml")) and _may_be_model(path):

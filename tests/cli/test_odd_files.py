@@ -202,7 +202,7 @@ def named_otherwise(tmp_path):
     "line",
     [
         "calibrate s? --out out?.yaml --source-file own?.py --json",
-        "circles s? --csv out?.csv --model m?.yaml",
+        "circles s? --csv out?.csv --findings --model m?.yaml",
         "evaluate s? --model m?.yaml",
         "export s? --out out?.csv",
         "history . --csv out?.csv --html out?.html",

@@ -20,7 +20,8 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import OutputError, Problem
-from dbbstation.files.atomic import sync_folder
+from dbbstation.files.atomic import sync_folder, write_bytes
+from dbbstation.files.gateway import content_of
 from dbbstation.files.refused import refusal
 from dbbstation.files.source_text import read_bytes
 
@@ -189,6 +190,8 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
         raise _refused(log, error) from error
     try:
         _refuse_another(log, handle)
+        if os.fstat(handle).st_nlink > 1:
+            handle = _parted(log, handle)
         try:
             if log.size > log.end:
                 os.ftruncate(handle, log.end)
@@ -205,6 +208,24 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
             os.close(handle)
     end = log.end + len(line)
     return replace(log, events=(*log.events, event), end=end, size=end)
+
+
+def _parted(log: EventLog, handle: int) -> int:
+    """Part a log from the other names of its file, such as that in a backup made of links: they keep what it held.
+
+    Returns:
+        The file that has the log's name now, open; the former one is closed.
+
+    Raises:
+        OutputError: the disk refuses; the log is as before then.
+    """
+    try:
+        write_bytes(log.path, content_of(log.path), force=True, rewrites=True)
+        parted = os.open(log.path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
+    except OSError as error:
+        raise _refused(log, error) from error
+    os.close(handle)
+    return parted
 
 
 def taken_back(log: EventLog) -> None:

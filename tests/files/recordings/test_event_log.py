@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -315,6 +316,21 @@ def test_the_log_is_listed_with_reasons_and_anchor(folder: Path) -> None:
         ("run started", "a-cw-2"),
     ]
     assert call("session", "log", folder).out.endswith(f"anchor {listed['anchor']}\n")
+
+
+def test_a_backup_made_of_links_keeps_what_it_held(folder: Path, tmp_path: Path) -> None:
+    """As `cp -al` and `rsync --link-dest` make it: a log that is continued in place would continue the backup's."""
+    backup = Path(shutil.copytree(folder, tmp_path / "backup", copy_function=os.link))
+    before = {path.relative_to(backup): path.read_bytes() for path in backup.rglob("*") if path.is_file()}
+    with SessionWriter.open(folder) as writer:
+        judged = writer.judge(writer.runs[0], accepted=False, reason="chip")
+        writer.note(Note(BEGUN, "gate closed"))
+    assert {name: (backup / name).read_bytes() for name in before if name.name != ".lock"} == {
+        name: data for name, data in before.items() if name.name != ".lock"
+    }
+    assert read_session(backup).runs[0].state is RunState.ACCEPTED
+    assert read_session(folder).runs[0] == judged
+    assert (folder / EVENTS_FILE).read_bytes().startswith(before[Path(EVENTS_FILE)])
 
 
 def test_a_part_that_was_removed_while_it_is_recorded_is_written_anew(folder: Path) -> None:

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.errors import OutputError, Problem
 from dbbstation.files.atomic import sync_folder, write_bytes
 from dbbstation.files.gateway import content_of
+from dbbstation.files.recordings.session_name import RUNS
 from dbbstation.files.refused import refusal
 from dbbstation.files.source_text import read_bytes
 
@@ -184,8 +185,16 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
     event = _event(line, log.links[-1] if log.events else "")
     if event is None:
         raise ValueError(f"{members} is no change of a session file")
+    # A log that was read is not begun anew where it has gone.
+    create = 0 if log.size else os.O_CREAT
     try:
-        handle = os.open(log.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        handle = os.open(log.path, os.O_RDWR | create | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    except FileNotFoundError as error:
+        raise OutputError(
+            "the event log is gone: the session was moved or deleted while it was written into",
+            where=str(log.path),
+            remedy=f"bring it back; runs in {log.path.parent / RUNS} go into its folder {RUNS}, in place of a .part of the same run",
+        ) from error
     except OSError as error:
         raise _refused(log, error) from error
     try:

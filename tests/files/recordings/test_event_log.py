@@ -333,6 +333,35 @@ def test_a_backup_made_of_links_keeps_what_it_held(folder: Path, tmp_path: Path)
     assert (folder / EVENTS_FILE).read_bytes().startswith(before[Path(EVENTS_FILE)])
 
 
+@pytest.mark.parametrize("when", ["while it is recorded", "once it is sealed"])
+def test_a_session_that_is_moved_in_mid_run_says_so_and_takes_the_run_when_it_is_back(folder: Path, when: str) -> None:
+    away = folder.with_name("away")
+    with SessionWriter.open(folder) as writer:
+        journal = writer.start_run("a", Direction.CCW, COLUMNS, started=BEGUN)
+        fill(journal, 300)
+        if when == "while it is recorded":
+            folder.rename(away)
+            journal.sync()
+            with pytest.raises(OutputError, match="was moved or deleted while it was written into; bring it back"):
+                writer.finish_run(journal)
+        else:
+            writer.finish_run(journal)
+            folder.rename(away)
+            with pytest.raises(OutputError, match="was moved or deleted"):
+                writer.judge(writer.runs[-1], accepted=True)
+    recorded = sorted(folder.glob("runs/*"))
+    assert sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()) == [
+        path.relative_to(folder).as_posix() for path in recorded
+    ]
+    for path in recorded:
+        (away / "runs" / f"{path.name}.part").unlink(missing_ok=True)
+        path.rename(away / "runs" / path.name)
+    with SessionWriter.open(away) as writer:
+        judged = writer.judge(writer.runs[-1], accepted=True)
+        assert len(writer.session.load(judged).recording.t_s) == 300
+    assert sound(away)
+
+
 def test_a_part_that_was_removed_while_it_is_recorded_is_written_anew(folder: Path) -> None:
     with SessionWriter.open(folder) as writer:
         journal = writer.start_run("a", Direction.CCW, COLUMNS, started=BEGUN)

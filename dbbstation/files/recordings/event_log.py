@@ -17,6 +17,7 @@ import os
 import re
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import OutputError, Problem
@@ -235,6 +236,24 @@ def _parted(log: EventLog, handle: int) -> int:
         raise _refused(log, error) from error
     os.close(handle)
     return parted
+
+
+def set_back(log: EventLog) -> list[str]:
+    """Say where an event is dated before the one that it follows: by the clock of the computer, not by what happened."""
+    dated = [(number, event, event.at) for number, event in enumerate(log.events, start=1) if event.at is not None]
+    told = []
+    for (_, _, before), (number, event, at) in pairwise(dated):
+        back_s = (before - at).total_seconds()
+        if back_s > CLOCK_S:
+            told.append(
+                f"the clock was set back by {back_s:.0f} s before event {number} ({event.what}): how much later than earlier runs "
+                "those from then on were is not known"
+            )
+    return told
+
+
+CLOCK_S = 1.0
+"""Events are dated to the second, and network time corrects clocks by less [s]."""
 
 
 def taken_back(log: EventLog) -> None:

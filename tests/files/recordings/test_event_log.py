@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shutil
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -316,6 +317,18 @@ def test_the_log_is_listed_with_reasons_and_anchor(folder: Path) -> None:
         ("run started", "a-cw-2"),
     ]
     assert call("session", "log", folder).out.endswith(f"anchor {listed['anchor']}\n")
+
+
+@pytest.mark.parametrize(("back_s", "said"), [(1, False), (2, True), (18000, True)])
+def test_a_clock_that_was_set_back_is_told(folder: Path, back_s: int, said: bool) -> None:  # noqa: FBT001
+    last = read_event_log(folder, []).events[-1].at
+    with SessionWriter.open(folder, clock=lambda: last - timedelta(seconds=back_s)) as writer:
+        writer.note(Note(BEGUN, "gate closed"))
+        writer.note(Note(BEGUN, "gate open"))
+    outcome = call("check", folder)
+    assert outcome.code == DONE
+    assert outcome.err.count(f"the clock was set back by {back_s} s before event 26 (noted)") == said
+    assert outcome.err.count("the clock was set back") == said
 
 
 def test_a_backup_made_of_links_keeps_what_it_held(folder: Path, tmp_path: Path) -> None:

@@ -137,6 +137,9 @@ def write_folder(
             _refuse_overwriting(folder / name, force=force)
             if not own:
                 _refuse_input(folder / name)
+        if own and not real_path((folder / name).parent).is_relative_to(real_path(folder)):
+            what = "a link in the session leads out of it, and nothing is written there"
+            raise OutputError(what, where=str((folder / name).parent), remedy="put the folder itself there")
     with _told(folder):
         _replace_all(folder, files, read_only)
     for name in files:

@@ -319,6 +319,23 @@ def test_the_log_is_listed_with_reasons_and_anchor(folder: Path) -> None:
     assert call("session", "log", folder).out.endswith(f"anchor {listed['anchor']}\n")
 
 
+def test_a_link_in_the_place_of_the_copies_is_not_followed(folder: Path, tmp_path: Path) -> None:
+    """It may lead to a whole disk: nothing there is read or written."""
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "letter.txt").write_text("dear", encoding="utf-8")
+    shutil.rmtree(folder / "sealed")
+    (folder / "sealed").symlink_to(elsewhere)
+    outcome = call("check", folder)
+    assert outcome.code == FAILED
+    assert "sealed is a link: the copies of what was sealed are part of the session" in outcome.err
+    assert "letter" not in outcome.err
+    outcome = call("session", "seal", folder)
+    assert outcome.code == FAILED
+    assert "a link in the session leads out of it" in outcome.err
+    assert [path.name for path in elsewhere.iterdir()] == ["letter.txt"]
+
+
 @pytest.mark.parametrize(("back_s", "said"), [(1, False), (2, True), (18000, True)])
 def test_a_clock_that_was_set_back_is_told(folder: Path, back_s: int, said: bool) -> None:  # noqa: FBT001
     last = read_event_log(folder, []).events[-1].at

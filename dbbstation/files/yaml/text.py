@@ -241,7 +241,7 @@ class _Walk:
                 line = self.key_places[*location, key][0]
                 self._fault(
                     key_node,
-                    f"the key `{shortened(str(key))}` stands here a second time, first in line {line}",
+                    f"the key `{shortened(key_node.value)}` stands here a second time, first in line {line}",
                     "remove one",
                 )
                 continue

@@ -78,7 +78,8 @@ def load_history(
         models = reading.every(found.models, model_from, partial(_model_data, source_files=tuple(source_files)))
         kept.drop_others([*found.sessions, *found.models])
         moment = now or datetime.now(UTC)
-        seals = [note for one in sessions if (note := _seal_note(kept, folder, one, moment))]
+        folders = {_called(name): path.parent for name, path in found.sessions.items()}
+        seals = [note for one in sessions if (note := _seal_note(kept, folders[one.name], one, moment))]
         notes = [*([kept.problem] if kept.problem else []), *seals]
     progress(reading.of, reading.of)
     sessions, alike = _once(sessions)
@@ -105,7 +106,7 @@ def load_history(
 def _seal_note(kept: Kept, folder: Path, one: SessionFigures, moment: datetime) -> str:
     """Note the anchor of a session, and say where it is not a continuation of the one that was noted before."""
     noted = kept.noted(one.name)
-    if noted is None or noted.anchor == one.anchor or noted.anchor in links_of(folder / one.name):
+    if noted is None or noted.anchor == one.anchor or noted.anchor in links_of(folder):
         if one.anchor and (noted is None or noted.anchor != one.anchor):
             kept.note(one.name, Noted(one.anchor, moment.isoformat(timespec="seconds")))
         return ""

@@ -6,6 +6,8 @@ before, or marks that turn the direction of writing, behind which words change p
 
 from __future__ import annotations
 
+import re
+
 _CONTROL = [*range(0x20), *range(0x7F, 0xA0)]
 """C0 and C1 controls and delete [ECMA-48]."""
 
@@ -28,11 +30,19 @@ TEXT = {code: shown for code, shown in _ONE_LINE.items() if chr(code) not in "\n
 """What stands for each character that a text of several lines must not hold, as `str.translate` takes it."""
 
 
+_MANY = re.compile(rf"([{re.escape(''.join(map(chr, [*_CONTROL, *_DIRECTION, *_LINES, *_HALVES])))}])\1{{8,}}")
+"""Nine and more of one character that is shown: a line of a file that a disk has filled up with zeros."""
+
+
+def _counted(many: re.Match[str]) -> str:
+    return many[0] if many[1] in "\n\t" else f"{many[1]} ({len(many[0])} times)"
+
+
 def printable(text: str) -> str:
     r"""Return a text of any number of lines with `\x1b` in place of an escape character, and so on; `\n` and `\t` stay."""
-    return text if text.isascii() and text.isprintable() else text.translate(TEXT)
+    return text if text.isascii() and text.isprintable() else _MANY.sub(_counted, text).translate(TEXT)
 
 
 def on_one_line(text: str) -> str:
     r"""Return a text as `printable` does, with `\x0a` in place of an end of a line: a name, a cell of a table."""
-    return text if text.isascii() and text.isprintable() else text.translate(_ONE_LINE)
+    return text if text.isascii() and text.isprintable() else _MANY.sub(_counted, text).translate(_ONE_LINE)

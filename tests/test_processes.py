@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import subprocess
+import sys
 import time
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 
@@ -48,6 +51,28 @@ def test_a_fault_is_raised_here_and_ends_them():
 def test_what_a_dead_process_leaves_is_worked_out_here():
     """As where the system has no memory left for it."""
     assert dict(each(eval, [f"__import__('os')._exit(9) if {IN_CHILD} else 7", "8"], 2)) == {0: 7, 1: 8}
+
+
+SLEEPS = """
+from dbbstation.processes import each
+if __name__ == "__main__":
+    for place, process in each(eval, ["__import__('os').getpid()", "__import__('time').sleep(1000)"], 2):
+        print(process, flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what a process does stands in /proc")
+def test_a_kill_of_the_one_that_started_them_ends_them(tmp_path):
+    """A kill leaves that one no moment to end them."""
+    script = tmp_path / "sleeps.py"
+    script.write_text(SLEEPS, encoding="utf-8")
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        child = int(process.stdout.readline())
+        process.kill()
+    given_up_s = time.monotonic() + 60.0
+    while Path(f"/proc/{child}").exists() and "Z (zombie)" not in Path(f"/proc/{child}/status").read_text("ascii"):
+        assert time.monotonic() < given_up_s
+        time.sleep(0.02)
 
 
 def test_work_that_is_given_up_leaves_no_process():

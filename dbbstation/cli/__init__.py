@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 import click
 
 from dbbstation import __version__
+from dbbstation.cli.interrupted import politely_ended
 from dbbstation.cli.lazy import LazyGroup
 from dbbstation.cli.output import echo
-from dbbstation.errors import OutputError, StationError
+from dbbstation.cli.streams import drop_output, drop_unwritable, flush_output, open_missing
+from dbbstation.errors import StationError
 from dbbstation.files.inputs import input_book
-from dbbstation.files.refused import in_a_sentence, refusal
+from dbbstation.files.refused import in_a_sentence
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,15 +93,20 @@ def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
+    open_missing()
     # The matrices are narrow: threads of the linear algebra cost twice what they save. Read when NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = _DEBUG in given
     try:
         # Not `cli.main`, which answers Ctrl-C with an empty line of its own.
-        with input_book(), cli.make_context("dbbstation", _own_first(given), obj=tuple(given)) as context:
+        with (
+            politely_ended(),
+            input_book(),
+            cli.make_context("dbbstation", _own_first(given), obj=tuple(given)) as context,
+        ):
             code = cli.invoke(context)
-        _flush()
+            flush_output()
     except click.exceptions.Exit as left:
         code = left.exit_code
     except click.ClickException as problem:
@@ -113,12 +120,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(FAILED)
     except BrokenPipeError:
         # Whoever read the output has seen enough, as `| head` does.
-        _drop_output()
+        drop_output()
         sys.exit(FAILED)
     except (StationError, OSError) as problem:
         if debug:
             raise
-        _drop_unwritable()
+        drop_unwritable()
         echo(in_a_sentence(problem) if isinstance(problem, OSError) else str(problem), err=True)
         sys.exit(FAILED)
     except Exception as problem:
@@ -128,34 +135,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)
-
-
-def _flush() -> None:
-    """Bring the output to where it goes.
-
-    Raises:
-        OutputError: the disk that it goes to refuses.
-    """
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        why, remedy = refusal(error)
-        raise OutputError(f"cannot be written: {why}", where="standard output", remedy=remedy) from error
-
-
-def _drop_unwritable() -> None:
-    """Forget output that cannot be written: the interpreter would try again behind the sentence that says what to do."""
-    try:
-        sys.stdout.flush()
-    except (OSError, ValueError):
-        _drop_output()
-
-
-def _drop_output() -> None:
-    """Let the interpreter flush what is left of the output into nothing."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _own_first(given: list[str]) -> list[str]:

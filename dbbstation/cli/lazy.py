@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from dbbstation.cli.log import attended
+from dbbstation.cli.text_types import in_utf8
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,7 +44,7 @@ class LazyGroup(click.Group):
         command: click.Command = getattr(module, name)
         # Docstrings are raw, so that they may hold backslashes; click wants its "do not wrap" as the one character.
         command.help = (command.help or "").replace(r"\b", "\b")
-        return attended(command)
+        return attended(in_utf8(command))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -11,6 +11,7 @@ import logging
 import os
 import platform
 import shlex
+import stat
 import sys
 import time
 from contextlib import contextmanager, suppress
@@ -21,6 +22,7 @@ import click
 
 from dbbstation.cli.provenance import PROGRAM, command_of
 from dbbstation.cli.shop import folder_of_sessions
+from dbbstation.files.recorded_ground import session_around
 from dbbstation.printable import printable
 
 if TYPE_CHECKING:
@@ -140,10 +142,27 @@ def _to_file(context: click.Context) -> logging.Handler | None:
         # A log is no reason to fail: recordings may lie where nobody may write.
         with suppress(OSError):
             path.parent.mkdir(parents=True, exist_ok=True)
+            if not _free(path):
+                continue
             file = _undisturbing(RotatingFileHandler)(path, maxBytes=LARGEST_BYTES, backupCount=KEPT, encoding="utf-8")
             file.setFormatter(_FORM)
             return file
     return None
+
+
+def _free(path: Path) -> bool:
+    """Whether a log may stand there: nothing else does. Not in a session, and nothing that a pipe or a second name leads to.
+
+    Raises:
+        OSError: the system does not say.
+    """
+    if session_around(path) is not None:
+        return False
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        return True
+    return stat.S_ISREG(found.st_mode) and found.st_nlink == 1
 
 
 _Kind = TypeVar("_Kind", bound=logging.Handler)

@@ -10,6 +10,7 @@ import click
 from click.core import ParameterSource
 
 from dbbstation import __version__
+from dbbstation.files.places import name_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,4 +53,4 @@ def _words(parameter: click.Parameter, value: object) -> Iterator[str]:
             yield parameter.opts[0]
             if parameter.is_flag:
                 continue
-        yield each.resolve().name if isinstance(each, Path) else str(each)
+        yield name_of(each) if isinstance(each, Path) else str(each)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from dbbstation.errors import OutputError
 from dbbstation.files.inputs import was_read
+from dbbstation.files.places import real_path
 from dbbstation.files.recorded_ground import refuse_recorded
 from dbbstation.files.refused import refusal
 
@@ -50,7 +51,7 @@ def write_bytes(path: Path, data: bytes, *, force: bool = False, rewrites: bool 
     if not rewrites:
         refuse_recorded(path)
         _refuse_input(path)
-    path = path.resolve()  # a link stays a link, what it leads to is replaced
+    path = real_path(path)  # a link stays a link, what it leads to is replaced
     with _told(path):
         temporary = _temporary(path)
         try:
@@ -79,7 +80,7 @@ def streamed(path: Path, *, force: bool = False) -> Iterator[BinaryIO]:
     """
     refuse_existing(path, force=force)
     _refuse_input(path)
-    target = path.resolve()
+    target = real_path(path)
     with _told(path):
         temporary = _temporary(target)
         try:
@@ -136,6 +137,9 @@ def write_folder(
             _refuse_overwriting(folder / name, force=force)
             if not own:
                 _refuse_input(folder / name)
+        if own and not real_path((folder / name).parent).is_relative_to(real_path(folder)):
+            what = "a link in the session leads out of it, and nothing is written there"
+            raise OutputError(what, where=str((folder / name).parent), remedy="put the folder itself there")
     with _told(folder):
         _replace_all(folder, files, read_only)
     for name in files:
@@ -170,9 +174,9 @@ def refuse_outputs(paths: Iterable[Path | None], *, force: bool) -> None:
         if path is None:
             continue
         refuse_existing(path, force=force)
-        if path.resolve() in named:
+        if real_path(path) in named:
             raise OutputError("two outputs have this name", where=str(path), remedy="name another file for one of them")
-        named.add(path.resolve())
+        named.add(real_path(path))
 
 
 def _refuse_input(path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem, TravelError
+from dbbstation.errors import InputError, Problem, TravelError, few
 from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.every_format import SCHEMAS
 from dbbstation.files.formats.jig import parse_jig
@@ -20,6 +20,7 @@ from dbbstation.files.formats.settings import read_settings
 from dbbstation.files.recordings.anchors import SHORTEST, anchor_of
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.event_log import read_event_log, set_back
 from dbbstation.files.recordings.judged import JUDGED, judge_session
 from dbbstation.files.recordings.run_csv import PART, read_run
 from dbbstation.files.recordings.seal import copy_faults
@@ -237,6 +238,9 @@ def _session(checked: Checked) -> None:
         checked.problems.append(Problem(str(session.plan_path), 0, 0, f"{error.where}: {error.what}", error.remedy))
     _judge(checked, session, wanted)
     checked.warnings += [Problem(str(session.folder), 0, 0, amendment.text) for amendment in session.amendments]
+    log = read_event_log(session.folder, [])
+    if log is not None:
+        checked.warnings += few([Problem(str(log.path), 0, 0, what) for what in set_back(log)])
     if session.seal is not None:
         checked.problems += copy_faults(session.folder, session.seal, session.amendments)
     checked.summary = f"session: {_states(session)}; {_seal(session)}"

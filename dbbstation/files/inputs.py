@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
+from dbbstation.files.places import real_path, text_of_name
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
@@ -23,11 +25,11 @@ class InputBook:
 
     def note_read(self, path: Path) -> None:
         """Note that a file was read, whether or not outputs name it among their inputs."""
-        self._read.add(path.resolve())
+        self._read.add(real_path(path))
 
     def was_read(self, path: Path) -> bool:
         """Whether a file was read so far."""
-        return path.resolve() in self._read
+        return real_path(path) in self._read
 
     def note(self, path: Path, digest: str) -> None:
         """Note a file; one that is read again after a change counts as it was last."""
@@ -42,7 +44,7 @@ class InputBook:
         sessions = {path.parent for path in self._digests if path.name == "session.yaml"}
         named: dict[str, str] = {}
         for path, digest in self._digests.items():
-            name = f"{path.parent.name}/{path.name}" if path.parent in sessions else path.name
+            name = text_of_name(f"{path.parent.name}/{path.name}" if path.parent in sessions else path.name)
             if named.get(name, digest) != digest:
                 name = next(f"{name} ({k})" for k in range(2, len(self._digests) + 2) if f"{name} ({k})" not in named)
             named[name] = digest

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from dbbstation import __version__
+from dbbstation.files.places import real_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -233,15 +234,15 @@ def index_file(folder: Path) -> Path:
     """Return where the index of a folder is kept: in the user's cache folder, under a hash of the folder's path."""
     import platformdirs  # noqa: PLC0415 - only a history looks for it
 
-    digest = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:24]
+    digest = hashlib.sha256(os.fsencode(real_path(folder))).hexdigest()[:24]
     return platformdirs.user_cache_path("dbbstation", appauthor=False) / "history" / f"{digest}.sqlite"
 
 
 def _unfit(file: Path, folder: Path) -> str:
     """Return why an index must not stand where it would; empty where it may."""
-    if file.resolve().is_relative_to(folder.resolve()):
+    if real_path(file).is_relative_to(real_path(folder)):
         return "the cache folder lies in the folder of the sessions; set XDG_CACHE_HOME to another"
-    kind = _file_system(file.resolve())
+    kind = _file_system(real_path(file))
     return f"the cache folder lies on a share ({kind}); set XDG_CACHE_HOME to a local one" if kind in SHARES else ""
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import os
 import sys
 import traceback
 from inspect import isabstract
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from dbbstation.catalogue import Found, classes_of, in_words
 from dbbstation.errors import Problem
+from dbbstation.files.places import real_path
 from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
 
 if TYPE_CHECKING:
@@ -37,7 +39,7 @@ def classes_in_files(
         faults: a file that is not there, not Python or has no such class is added.
     """
     found = []
-    for path in {path.resolve(): path for path in files}.values():
+    for path in {real_path(path): path for path in files}.values():
         tree = _parsed(path, faults)
         module = None if tree is None else _run(path, tree, faults)
         if tree is None or module is None:
@@ -56,7 +58,7 @@ def classes_in_files(
 
 def module_name(path: Path) -> str:
     """Return a name that no other file has."""
-    return f"dbbstation_own_{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:16]}"
+    return f"dbbstation_own_{hashlib.sha256(os.fsencode(real_path(path))).hexdigest()[:16]}"
 
 
 def _parsed(path: Path, faults: list[Problem]) -> ast.Module | None:

@@ -61,7 +61,7 @@ class Provenance:
 
 def beside_table(path: Path) -> Path:
     """Return the file beside a table that says where it comes from."""
-    return path.with_name(path.name + BESIDE_TABLE)
+    return path.parent / (path.name + BESIDE_TABLE)  # not `with_name`: an empty name is refused where it is written
 
 
 def refuse_existing_table(path: Path, *, force: bool) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import OutputError
 from dbbstation.files.gateway import head_of
+from dbbstation.files.places import real_path
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,7 +23,7 @@ def session_around(path: Path) -> Path | None:
 
     Links are followed: what counts is where the file would come to lie. A session file that was spoilt still marks its folder.
     """
-    return next((folder for folder in path.resolve().parents if _is_session(folder)), None)
+    return next((folder for folder in real_path(path).parents if _is_session(folder)), None)
 
 
 def refuse_recorded(path: Path) -> None:

@@ -123,7 +123,9 @@ def refined(
     columns[:, doubtful] = 0.0
     for k in sorted(range(len(found)), key=lambda one: one in doubtful):
         window = np.searchsorted(clock.rows[kept], [found[k]])
+        # Beside the others it may have come to be shorter than a stretch can be, also at the end of the rows.
         window[0, 1] = max(window[0, 1], min(window[0, 0] + SHORTEST, int(kept.sum())))
+        window[0, 0] = min(window[0, 0], window[0, 1] - SHORTEST)
         look = _Look(lefts(k, columns), blocks, kept, size, clock, factor[kept], window)
         look.tried = pattern.tried
         best = look.best()

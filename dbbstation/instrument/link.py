@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -216,7 +217,7 @@ def connected_ports() -> list[tuple[str, str, str]]:
 
 
 def _is_pseudo_terminal(port: str) -> bool:
-    return "://" not in port and str(Path(port).resolve()).startswith(("/dev/pts/", "/dev/ttys"))
+    return "://" not in port and os.path.realpath(port).startswith(("/dev/pts/", "/dev/ttys"))
 
 
 def _not_opened(port: str, baud: int, error: Exception) -> InstrumentError:

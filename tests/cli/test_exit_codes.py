@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -146,19 +147,69 @@ def test_an_interrupt_leaves_no_half_result(run, monkeypatch, tmp_path, fifteen)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_ctrl_c(tmp_path, fifteen):
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_ctrl_c_a_polite_kill_and_a_closed_terminal(tmp_path, fifteen, name):
     """Sent as soon as the log says that the session was read: the fit still lies ahead."""
     command = [*PROGRAM, "calibrate", str(fifteen), "--out", str(tmp_path / "model.yaml"), "--verbose"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         while "session.yaml" not in (line := process.stderr.readline()):
             assert line, "the program ended before it read the session"
-        process.send_signal(signal.SIGINT)
+        process.send_signal(getattr(signal, name))
         out, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, out) == (FAILED, "")
     assert "interrupted; what was written before stays" in err
     assert "Traceback" not in err
     assert not (tmp_path / "model.yaml").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals and shells of Unix")
+def test_what_nohup_made_it_deaf_to_stays_so():
+    script = f"trap '' HUP; {shlex.quote(sys.executable)} -c {shlex.quote(HANGS_UP)}"
+    done = subprocess.run(["/bin/sh", "-c", script], capture_output=True, text=True, check=False, timeout=PATIENCE_S)
+    assert (done.returncode, done.stderr) == (DONE, "")
+
+
+HANGS_UP = """
+import os, signal
+from dbbstation.cli.interrupted import politely_ended
+with politely_ended():
+    os.kill(os.getpid(), signal.SIGHUP)
+"""
+
+
+SMALL = shipped_folder("fixtures") / "sessions" / "small"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals and shells of Unix")
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(("words", "code"), [("session list", DONE), ("session list nowhere", FAILED)])
+def test_started_without_a_stream(tmp_path, closed, words, code):
+    command = shlex.join([*PROGRAM, *words.split(), *([str(SMALL)] if code == DONE else [])])
+    done = subprocess.run(
+        ["/bin/sh", "-c", f"{command} {closed}"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        timeout=PATIENCE_S,
+        env={**os.environ, "DBBSTATION_LOG": "off"},
+    )
+    assert (done.returncode, bool(done.stdout)) == (code, code == DONE and ">&-" not in closed.split())
+    assert "fault of dbbstation" not in done.stderr
+
+
+def test_no_file_takes_the_place_of_a_stream():
+    """What a library complains of on standard error must not go into a recording."""
+    script = "from dbbstation.cli.streams import open_missing as o; o(); print(open('/dev/null').fileno())"
+    done = subprocess.run(
+        ["/bin/sh", "-c", f"exec {shlex.quote(sys.executable)} -c {shlex.quote(script)} <&- 2>&-"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE_S,
+    )
+    assert int(done.stdout) > 2
 
 
 def test_as_a_module_and_as_a_script():

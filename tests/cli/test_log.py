@@ -106,6 +106,25 @@ def test_the_environment_names_another_or_none(run, shop, monkeypatch, named):
     assert not of_user(shop).exists()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links and pipes of Unix")
+@pytest.mark.parametrize("how", ["link", "second name", "pipe", "named in the environment"])
+def test_it_is_written_into_no_recording_and_waits_for_no_pipe(run, shop, monkeypatch, how):
+    log, recording = shop / "dbbstation.log", shop / "small" / "runs" / "a-ccw-1.csv"
+    before = recording.read_bytes()
+    if how == "link":
+        log.symlink_to(recording)
+    elif how == "second name":
+        log.hardlink_to(recording)
+    elif how == "pipe":
+        os.mkfifo(log)
+    else:
+        monkeypatch.setenv("DBBSTATION_LOG", str(recording))
+    for _ in range(2):
+        assert run("session", "list", shop / "small").code == DONE
+    assert recording.read_bytes() == before
+    assert of_user(shop).exists() == (how != "named in the environment")
+
+
 def test_a_fault_stands_there_with_its_traceback_and_the_terminal_has_one_line(run, shop):
     (shop / "small" / "plan.yaml").unlink()
     outcome = run("evaluate", shop / "small", "--model", MODEL)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import shutil
 import zlib
 
 import pytest
 
+from dbbstation.cli import USAGE
 from dbbstation.files.shipped import shipped_folder
 from tests.cli.conftest import call
 
@@ -128,3 +130,97 @@ def test_half_a_surrogate_pair_is_no_character(tmp_path):
     text = (FIXTURES / "machines" / "reference.yaml").read_text(encoding="utf-8")
     path.write_text(re.sub(r"name: .*", r'name: "\\ud800"', text, count=1), encoding="utf-8")
     assert "half a surrogate pair is no character" in told("check", path)
+
+
+@pytest.fixture
+def circle_of_links(tmp_path):
+    path = tmp_path / "loop"
+    path.symlink_to("loop")
+    return path
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["check", "LOOP"],
+        ["session", "list", "LOOP"],
+        ["session", "reject", "LOOP", "a-ccw-1", "--reason", "x"],
+        ["export", "SESSION", "--out", "LOOP"],
+        ["circles", "SESSION", "--csv", "LOOP"],
+        ["history", "LOOP"],
+        ["sources", "--source-file", "LOOP"],
+        ["replay", "LOOP"],
+        ["instruments", "LOOP"],
+        ["settings", "--settings", "LOOP"],
+        ["monitor", "--instrument", "mahr-c1202", "--zero-mm", "150", "--port", "LOOP", "--count", "1"],
+    ],
+    ids=" ".join,
+)
+def test_links_that_lead_in_a_circle(session, circle_of_links, command):
+    outcome = call(*({"LOOP": circle_of_links, "SESSION": session}.get(word, word) for word in command))
+    assert outcome.code != 0
+    assert "loop" in outcome.err
+    assert "fault of dbbstation" not in outcome.err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["circles", "SESSION", "--csv", ""], ["export", "SESSION", "--out", ""], ["calibrate", "SESSION", "--out", ""]],
+)
+def test_an_output_without_a_name(session, command):
+    outcome = call(*(session if word == "SESSION" else word for word in command))
+    assert outcome.code != 0
+    assert "name a file" in outcome.err
+
+
+def test_a_file_among_sessions_is_named_with_what_leaves_files_out(session):
+    """As `shop/*` does, where the log lies beside the sessions."""
+    log = session.parent / "dbbstation.log"
+    log.write_text("2026-11-23T08:00:00+0000 1 INFO $ dbbstation check session\n", encoding="utf-8")
+    assert f"{log}: this file is no session; name session folders; `{log.parent}/*/`" in told("calibrate", session, log)
+
+
+NO_UTF8 = os.fsdecode(b"\xfc")
+"""A byte of Latin-1, as names have that come from an old archive or share."""
+
+
+@pytest.fixture
+def named_otherwise(tmp_path):
+    """Files and a session whose names are not in UTF-8."""
+    shop = tmp_path / f"shop{NO_UTF8}"
+    shop.mkdir()
+    try:
+        shutil.copytree(FIXTURES / "sessions" / "small", shop / f"s{NO_UTF8}")
+    except OSError:
+        pytest.skip("this file system knows no such names")
+    shutil.copy(FIXTURES / "models" / "small.yaml", shop / f"m{NO_UTF8}.yaml")
+    shutil.copy(FIXTURES / "sources" / "scale_bow.py", shop / f"own{NO_UTF8}.py")
+    return shop
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "calibrate s? --out out?.yaml --source-file own?.py --json",
+        "circles s? --csv out?.csv --findings --model m?.yaml",
+        "evaluate s? --model m?.yaml",
+        "export s? --out out?.csv",
+        "history . --csv out?.csv --html out?.html",
+        "report s? --out out?.html",
+        "session list s?",
+        "session reject s? a-ccw-1 --reason chip",
+        "session seal s?",
+    ],
+)
+def test_names_that_are_not_in_utf8(named_otherwise, monkeypatch, line):
+    monkeypatch.chdir(named_otherwise)
+    outcome = call(*line.replace("?", NO_UTF8).split())
+    assert outcome.code == 0, outcome.err
+    written = [path.read_text(encoding="utf-8").replace(r"\\", "\\") for path in named_otherwise.glob("out*")]
+    assert not written or any(r"s\xfc" in text for text in written)
+
+
+def test_a_text_that_is_not_in_utf8_is_refused(session):
+    outcome = call("session", "reject", session, "a-ccw-1", "--reason", f"gr{NO_UTF8}n")
+    assert outcome.code == USAGE
+    assert "'--reason': its character 3 is not written in UTF-8" in outcome.err

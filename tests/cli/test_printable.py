@@ -85,6 +85,15 @@ def test_the_searches_find_ways_round():
     assert writes_tables(ast.parse("csv.writer(f)\n','.join(a)\n', '.join(b)\nnp.savetxt(f, x)")) == [1, 2, 4]
 
 
+def test_many_of_one_control_are_counted():
+    """As a disk leaves them in a file that was being written."""
+    assert on_one_line(f"t_s{chr(0) * 4000}µ") == r"t_s\x00 (4000 times)µ"
+    assert (
+        printable(f"{chr(0) * 8}{chr(27) * 9}{chr(10) * 20}{'-' * 40}")
+        == r"\x00" * 8 + r"\x1b (9 times)" + "\n" * 20 + "-" * 40
+    )
+
+
 def test_controls_are_shown_and_text_stays():
     every = "".join(map(chr, [*range(0xA1), 0x202E, 0x2066, 0x2028, 0xD800]))
     for made in (printable(every), on_one_line(every)):

@@ -29,7 +29,7 @@ ROUND_IT = {
     "instrument/holders.py": "asks the system in /proc who holds a port",
     "files/kept.py": "asks the system in /proc what is mounted",
     "cli/hang_up.py": "opens the null device",
-    "cli/__init__.py": "opens the null device",
+    "cli/streams.py": "opens the null device",
     "cli/settings.py": "reads a file of the package",
     "report/html.py": "reads a file of the package",
     "files/recordings/event_log.py": "appends to the log, and cuts what could not be noted",

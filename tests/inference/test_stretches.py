@@ -13,10 +13,10 @@ from dbbstation.inference.channel import Base, Channel
 from dbbstation.inference.coloured import Coloured
 from dbbstation.inference.curves import Clock, Stretches
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.pieces import Fitting
+from dbbstation.inference.pieces import Fitting, Left
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
-from dbbstation.inference.stretches import SHORTEST, _squares_of_edges
+from dbbstation.inference.stretches import SHORTEST, _pattern, _squares_of_edges, refined
 
 ROWS = 1200
 
@@ -113,6 +113,17 @@ def test_the_likelihood_of_uneven_noise_is_that_of_its_covariance(rng):
         found.append(bank.log_likelihood())
     wanted = [dense(spread, level) for spread, level in cases]
     assert np.diff(found) == pytest.approx(np.diff(wanted), rel=1e-6)
+
+
+@pytest.mark.parametrize("edges", [(37.5, np.inf), (38.5, np.inf), (-np.inf, 0.5), (12.2, 12.4), (30.0, 30.0)])
+def test_a_stretch_that_came_to_be_too_short_is_sought_among_long_enough_ones(rng, edges):
+    """Beside others a stretch may come to two rows at an end: three were looked for behind the last row there."""
+    rows = 40
+    left = Left(rng.normal(0.0, 1.0, rows), np.zeros((rows, 0)), 1.0, Coloured(1.0), None)
+    clock = Clock.plain(rows)
+    pattern = _pattern(Family.PULSES, (), [edges], clock, np.ones(rows), 10.0)
+    found = refined(pattern, 1, lambda _k, _columns: left, [slice(0, rows)], np.ones(rows, dtype=bool), 1.0)
+    assert np.count_nonzero(found.samples[:, 0]) >= SHORTEST - 1
 
 
 @pytest.mark.parametrize("longest", [5, 200])

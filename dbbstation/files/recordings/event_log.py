@@ -17,10 +17,13 @@ import os
 import re
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from dbbstation.errors import OutputError, Problem
-from dbbstation.files.atomic import sync_folder
+from dbbstation.files.atomic import sync_folder, write_bytes
+from dbbstation.files.gateway import content_of
+from dbbstation.files.recordings.session_name import RUNS
 from dbbstation.files.refused import refusal
 from dbbstation.files.source_text import read_bytes
 
@@ -183,12 +186,22 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
     event = _event(line, log.links[-1] if log.events else "")
     if event is None:
         raise ValueError(f"{members} is no change of a session file")
+    # A log that was read is not begun anew where it has gone.
+    create = 0 if log.size else os.O_CREAT
     try:
-        handle = os.open(log.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        handle = os.open(log.path, os.O_RDWR | create | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    except FileNotFoundError as error:
+        raise OutputError(
+            "the event log is gone: the session was moved or deleted while it was written into",
+            where=str(log.path),
+            remedy=f"bring it back; runs in {log.path.parent / RUNS} go into its folder {RUNS}, in place of a .part of the same run",
+        ) from error
     except OSError as error:
         raise _refused(log, error) from error
     try:
         _refuse_another(log, handle)
+        if os.fstat(handle).st_nlink > 1:
+            handle = _parted(log, handle)
         try:
             if log.size > log.end:
                 os.ftruncate(handle, log.end)
@@ -205,6 +218,42 @@ def appended(log: EventLog, what: str, at: datetime | None, members: Mapping[str
             os.close(handle)
     end = log.end + len(line)
     return replace(log, events=(*log.events, event), end=end, size=end)
+
+
+def _parted(log: EventLog, handle: int) -> int:
+    """Part a log from the other names of its file, such as that in a backup made of links: they keep what it held.
+
+    Returns:
+        The file that has the log's name now, open; the former one is closed.
+
+    Raises:
+        OutputError: the disk refuses; the log is as before then.
+    """
+    try:
+        write_bytes(log.path, content_of(log.path), force=True, rewrites=True)
+        parted = os.open(log.path, os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW)
+    except OSError as error:
+        raise _refused(log, error) from error
+    os.close(handle)
+    return parted
+
+
+def set_back(log: EventLog) -> list[str]:
+    """Say where an event is dated before the one that it follows: by the clock of the computer, not by what happened."""
+    dated = [(number, event, event.at) for number, event in enumerate(log.events, start=1) if event.at is not None]
+    told = []
+    for (_, _, before), (number, event, at) in pairwise(dated):
+        back_s = (before - at).total_seconds()
+        if back_s > CLOCK_S:
+            told.append(
+                f"the clock was set back by {back_s:.0f} s before event {number} ({event.what}): how much later than earlier runs "
+                "those from then on were is not known"
+            )
+    return told
+
+
+CLOCK_S = 1.0
+"""Events are dated to the second, and network time corrects clocks by less [s]."""
 
 
 def taken_back(log: EventLog) -> None:

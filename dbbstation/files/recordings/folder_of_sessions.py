@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.gateway import head_of
+from dbbstation.files.places import real_path, text_of_name
 from dbbstation.files.recordings.session_name import SESSION_FILE
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ class FolderFiles:
     """Files of a folder, by their paths in it.
 
     Attributes:
-        sessions: session files.
+        sessions: session files, with names that can be written in UTF-8.
         models: files that may be models.
         closed: folders that cannot be looked into, with the reason.
     """
@@ -55,12 +56,12 @@ def files_of(folder: Path) -> FolderFiles:
             with os.scandir(here) as listed:
                 entries = sorted(listed, key=lambda entry: entry.name)
         except OSError as error:
-            closed.append((here.relative_to(folder).as_posix(), reason_of(error)))
+            closed.append((text_of_name(here.relative_to(folder).as_posix()), reason_of(error)))
             return
         is_session = here != folder and any(entry.name == SESSION_FILE for entry in entries)
         for entry in entries:
             path = here / entry.name
-            name = path.relative_to(folder).as_posix()
+            name = text_of_name(path.relative_to(folder).as_posix())
             if is_session and entry.name == SESSION_FILE:
                 sessions[name] = path
             elif entry.is_file() and entry.name.endswith((".yaml", ".yml")) and _may_be_model(path):
@@ -73,7 +74,7 @@ def files_of(folder: Path) -> FolderFiles:
         raise InputError([Problem(str(folder), 0, 0, what, "name a folder that holds session folders")])
     if (folder / SESSION_FILE).is_file():
         what = "this folder is one session, a history is of a folder that holds several"
-        raise InputError([Problem(str(folder), 0, 0, what, f"name the folder around it: {folder.resolve().parent}")])
+        raise InputError([Problem(str(folder), 0, 0, what, f"name the folder around it: {real_path(folder).parent}")])
     look(folder, 1)
     if not sessions:
         raise InputError([_no_sessions(folder)])

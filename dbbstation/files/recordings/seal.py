@@ -163,6 +163,10 @@ def copy_faults(folder: Path, seal: Seal, amendments: Sequence[Amendment]) -> It
         seal: of it.
         amendments: by which further copies are known.
     """
+    if (folder / SEALED).is_symlink():  # it may lead to a whole disk
+        what = f"{SEALED} is a link: the copies of what was sealed are part of the session"
+        yield Problem(str(folder / SEALED), 0, 0, what, "put the folder itself there")
+        return
     known = {copy_name(name, digest): digest for name, digest in seal.files.items()}
     known |= {one.former: one.former_sha256 for one in amendments if is_copy(one.former) and one.what != RUNS}
     there = {path.relative_to(folder).as_posix() for path in (folder / SEALED).rglob("*") if path.is_file()}

@@ -15,6 +15,7 @@ from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.gateway import digest_of
+from dbbstation.files.places import name_of
 from dbbstation.files.recordings import session_name
 from dbbstation.files.recordings.entries import (
     RunEntry,
@@ -248,6 +249,16 @@ def no_session(folder: Path) -> Problem:
     return Problem(str(folder), 0, 0, what, f"did you mean {near}?" if near else "name a session folder")
 
 
+def _other_than_session(path: Path) -> Problem | None:
+    """What is wrong with a path that can be told to be no session without reading it."""
+    if path.is_dir():
+        return None if (path / SESSION_FILE).exists() else no_session(path)
+    if path.is_file() and path.suffix.lower() not in {".yaml", ".yml"}:  # such as the log beside them, by `shop/*`
+        remedy = f"name session folders; `{path.parent}/*/` names all in that folder and no files"
+        return Problem(str(path), 0, 0, "this file is no session", remedy)
+    return None
+
+
 MOST_NAMED = 4
 """Sessions that are named beside a folder that is none."""
 
@@ -263,8 +274,9 @@ def parse_session(
         as_sealed: what is not as it was sealed is a fault.
         instead: files that are read as if they stood in the folder, by `machine` and `plan`.
     """
-    if path.is_dir() and not (path / SESSION_FILE).exists():
-        faults.append(no_session(path))
+    wrong = _other_than_session(path)
+    if wrong is not None:
+        faults.append(wrong)
         return None
     file = path / SESSION_FILE if path.is_dir() else path
     folder = file.parent
@@ -297,7 +309,7 @@ def parse_session(
         faults.append(unreadable(file, error))
         return None
     return SessionFolder(
-        name=folder.resolve().name,
+        name=name_of(folder),
         folder=folder,
         machine=machine.to_domain(),
         plan=planned,

@@ -237,11 +237,13 @@ class _Walk:
                 self._fault(key_node, "a key must be one word or number", "write it as `key: value`")
                 continue
             key = self._scalar(key_node)
+            if type(key) not in {str, int}:  # `null`, `true` and `1.5` are words where a key stands
+                key = key_node.value
             if key in data:
                 line = self.key_places[*location, key][0]
                 self._fault(
                     key_node,
-                    f"the key `{shortened(str(key))}` stands here a second time, first in line {line}",
+                    f"the key `{shortened(key_node.value)}` stands here a second time, first in line {line}",
                     "remove one",
                 )
                 continue

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import shutil
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -315,6 +317,79 @@ def test_the_log_is_listed_with_reasons_and_anchor(folder: Path) -> None:
         ("run started", "a-cw-2"),
     ]
     assert call("session", "log", folder).out.endswith(f"anchor {listed['anchor']}\n")
+
+
+def test_a_link_in_the_place_of_the_copies_is_not_followed(folder: Path, tmp_path: Path) -> None:
+    """It may lead to a whole disk: nothing there is read or written."""
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "letter.txt").write_text("dear", encoding="utf-8")
+    shutil.rmtree(folder / "sealed")
+    (folder / "sealed").symlink_to(elsewhere)
+    outcome = call("check", folder)
+    assert outcome.code == FAILED
+    assert "sealed is a link: the copies of what was sealed are part of the session" in outcome.err
+    assert "letter" not in outcome.err
+    outcome = call("session", "seal", folder)
+    assert outcome.code == FAILED
+    assert "a link in the session leads out of it" in outcome.err
+    assert [path.name for path in elsewhere.iterdir()] == ["letter.txt"]
+
+
+@pytest.mark.parametrize(("back_s", "said"), [(1, False), (2, True), (18000, True)])
+def test_a_clock_that_was_set_back_is_told(folder: Path, back_s: int, said: bool) -> None:  # noqa: FBT001
+    last = read_event_log(folder, []).events[-1].at
+    with SessionWriter.open(folder, clock=lambda: last - timedelta(seconds=back_s)) as writer:
+        writer.note(Note(BEGUN, "gate closed"))
+        writer.note(Note(BEGUN, "gate open"))
+    outcome = call("check", folder)
+    assert outcome.code == DONE
+    assert outcome.err.count(f"the clock was set back by {back_s} s before event 26 (noted)") == said
+    assert outcome.err.count("the clock was set back") == said
+
+
+def test_a_backup_made_of_links_keeps_what_it_held(folder: Path, tmp_path: Path) -> None:
+    """As `cp -al` and `rsync --link-dest` make it: a log that is continued in place would continue the backup's."""
+    backup = Path(shutil.copytree(folder, tmp_path / "backup", copy_function=os.link))
+    before = {path.relative_to(backup): path.read_bytes() for path in backup.rglob("*") if path.is_file()}
+    with SessionWriter.open(folder) as writer:
+        judged = writer.judge(writer.runs[0], accepted=False, reason="chip")
+        writer.note(Note(BEGUN, "gate closed"))
+    assert {name: (backup / name).read_bytes() for name in before if name.name != ".lock"} == {
+        name: data for name, data in before.items() if name.name != ".lock"
+    }
+    assert read_session(backup).runs[0].state is RunState.ACCEPTED
+    assert read_session(folder).runs[0] == judged
+    assert (folder / EVENTS_FILE).read_bytes().startswith(before[Path(EVENTS_FILE)])
+
+
+@pytest.mark.parametrize("when", ["while it is recorded", "once it is sealed"])
+def test_a_session_that_is_moved_in_mid_run_says_so_and_takes_the_run_when_it_is_back(folder: Path, when: str) -> None:
+    away = folder.with_name("away")
+    with SessionWriter.open(folder) as writer:
+        journal = writer.start_run("a", Direction.CCW, COLUMNS, started=BEGUN)
+        fill(journal, 300)
+        if when == "while it is recorded":
+            folder.rename(away)
+            journal.sync()
+            with pytest.raises(OutputError, match="was moved or deleted while it was written into; bring it back"):
+                writer.finish_run(journal)
+        else:
+            writer.finish_run(journal)
+            folder.rename(away)
+            with pytest.raises(OutputError, match="was moved or deleted"):
+                writer.judge(writer.runs[-1], accepted=True)
+    recorded = sorted(folder.glob("runs/*"))
+    assert sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()) == [
+        path.relative_to(folder).as_posix() for path in recorded
+    ]
+    for path in recorded:
+        (away / "runs" / f"{path.name}.part").unlink(missing_ok=True)
+        path.rename(away / "runs" / path.name)
+    with SessionWriter.open(away) as writer:
+        judged = writer.judge(writer.runs[-1], accepted=True)
+        assert len(writer.session.load(judged).recording.t_s) == 300
+    assert sound(away)
 
 
 def test_a_part_that_was_removed_while_it_is_recorded_is_written_anew(folder: Path) -> None:

@@ -74,6 +74,12 @@ def test_files_that_are_no_plan(tmp_path: Path, text: bytes, said: str) -> None:
     assert faults[0].startswith(said)
 
 
+@pytest.mark.parametrize("word", ["null", "~", "true", "1.5", ".nan", "1e400"])
+def test_a_key_that_would_be_no_text_as_a_value_is_a_word(tmp_path: Path, word: str) -> None:
+    faults = faults_of(read_plan, tmp_path / "plan.yaml", f"format: dbb-plan/1\n{word}: 1\n".encode())
+    assert any(fault.startswith(f":2:1: the key `{word}` is not known") for fault in faults)
+
+
 def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
     for path, said in ((tmp_path / "none.yaml", "there is no such file"), (tmp_path, "this is a folder")):
         with pytest.raises(InputError, match=said):

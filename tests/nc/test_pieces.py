@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import combinations, pairwise
 
@@ -151,14 +152,21 @@ def test_a_circle_takes_the_step_that_its_feed_needs(linuxcnc, table2, crooked):
     assert 2.0 * (1000.0 / 60.0) ** 2 / 1000.0 < arc_mm < 0.65
     assert one.chord_um == pytest.approx(1e3 * arc_mm**2 / (8.0 * 150.0), rel=0.05)
     assert one.feed_s <= 1.01 * one.nominal_feed_s
+
+
+def test_a_circle_that_is_slower_is_as_fast_as_its_chord_allows(linuxcnc, table2, crooked):
+    """At 0.1 µm: pieces of 0.34 mm in place of 0.26 mm, and the feed that the refusal names."""
+    machine = replace(crooked.machine, acceleration_mm_s2=1000.0)
+    model = MachineModel(machine, crooked.sources)
     with pytest.raises(
         StationError, match=r"test a ccw: F1000 cannot be kept within 0\.1 µm: the control reaches F7\d\d"
-    ):
+    ) as refused:
         circle_programs(table2, machine, linuxcnc, inverse=Inverse(model), tests=["a"], chord_mm=1e-4)
     fine = Inverse(model, prefer=Prefer.ACCURACY)
     (slow, _) = circle_programs(table2, machine, linuxcnc, inverse=fine, tests=["a"], chord_mm=1e-4)
-    assert slow.points > 4500
-    assert slow.feed_s > 1.3 * slow.nominal_feed_s
+    assert slow.chord_um <= 0.1
+    reached = float(re.search(r"reaches F(\d+)", str(refused.value))[1])
+    assert slow.feed_s == pytest.approx(slow.nominal_feed_s * 1000.0 / reached, rel=0.01)
     assert "--prefer accuracy costs" in slow.text
 
 

@@ -298,22 +298,25 @@ def _step_deg(
 ) -> float:
     """Angle between the points of a compensated circle [deg]: what its feed needs, and no less than was asked for.
 
+    Where the chord error is preferred, no more than that allows.
+
     Raises:
-        StationError: such a chord leaves the circle by more than `chord_mm`.
+        StationError: a chord as long as the feed needs leaves the circle by more than `chord_mm`.
     """
-    if prefer in {Prefer.ACCURACY, Prefer.POSITION_ONLY}:
+    if prefer is Prefer.POSITION_ONLY:
         return step_deg
     planner = planner_of(machine, dialect)
     # The arc is divided evenly: its steps may be smaller by a part in its number of points.
     needed_mm = 1.01 * float(planner.needed_mm(np.array(circle.feed_mm_min / 60.0)))
     step = max(step_deg, float(np.degrees(needed_mm / circle.radius_mm)))
     error_mm = chord_error_mm(circle, step)
-    if step > step_deg and error_mm > chord_mm and prefer is None:
-        longest_mm = np.array(np.sqrt(8.0 * circle.radius_mm * chord_mm) / 1.01)
-        reached = 60.0 * float(planner.reached_mm_s(longest_mm))
-        slow = Slow(0, circle.feed_mm_min, reached, 1e3 * error_mm)
-        raise too_slow(name, slow, 1e3 * chord_mm, machine, None)
-    return step
+    if step == step_deg or error_mm <= chord_mm or prefer is Prefer.FEED:
+        return step
+    longest_mm = float(np.sqrt(8.0 * circle.radius_mm * chord_mm)) / 1.01
+    if prefer is Prefer.ACCURACY:
+        return max(step_deg, float(np.degrees(longest_mm / circle.radius_mm)))
+    reached = 60.0 * float(planner.reached_mm_s(np.array(longest_mm)))
+    raise too_slow(name, Slow(0, circle.feed_mm_min, reached, 1e3 * error_mm), 1e3 * chord_mm, machine, None)
 
 
 UNCERTAIN_AT = 2000

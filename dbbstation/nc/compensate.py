@@ -32,6 +32,10 @@ DENSELY = np.arange(1, 14) / 13.0
 """Shares of a piece at which its distance from the curve is reported: a prime number of parts, so that no wave with some
 periods in a piece is met at its zeros."""
 
+SURELY_KEPT = 1.0 + 0.9 * (KEPT - 1.0)
+"""Share of the time that a feed which is named in a refusal may take: pieces for that feed are somewhat shorter than those it
+was found with, and must keep it as well."""
+
 FEED_KEPT = 1e-3
 """A feed stays as it is while the compensated move is as long as the wanted one within this share."""
 
@@ -262,7 +266,7 @@ def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner
     low, high = 0.0, 1.0
     for _ in range(20):
         middle = (low + high) / 2.0
-        low, high = (middle, high) if share(middle) <= KEPT else (low, middle)
+        low, high = (middle, high) if share(middle) <= SURELY_KEPT else (low, middle)
     takes, took = of.lost(_seconds(toolpath, planner), _seconds(done, planner))
     row = int(np.argmax((of.before == int(np.argmax(takes - took))) & (toolpath.kind == Step.FEED)))
     feed = float(toolpath.feed[row])

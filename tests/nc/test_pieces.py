@@ -13,10 +13,11 @@ from dbbstation.errors import StationError
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.compensate import Prefer, compensate_toolpath
 from dbbstation.nc.curve import felt_mm
-from dbbstation.nc.export import Inverse, circle_programs, compensated_program, planner_of
+from dbbstation.nc.export import Inverse, Program, circle_programs, compensated_program, planner_of
 from dbbstation.nc.pieces import longest, truest
-from dbbstation.nc.planner import LookAhead, Planner
+from dbbstation.nc.planner import KEPT, LookAhead, Planner
 from dbbstation.nc.toolpath import Step
+from dbbstation.plan.plan import Plan
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
 from tests.nc.test_compensate_any import Wound
 
@@ -168,6 +169,25 @@ def test_a_circle_that_is_slower_is_as_fast_as_its_chord_allows(linuxcnc, table2
     reached = float(re.search(r"reaches F(\d+)", str(refused.value))[1])
     assert slow.feed_s == pytest.approx(slow.nominal_feed_s * 1000.0 / reached, rel=0.01)
     assert "--prefer accuracy costs" in slow.text
+
+
+def test_the_feed_that_a_refusal_of_ramps_names_is_kept(linuxcnc, table2, crooked):
+    """Pieces for that feed are shorter than those that it was found with."""
+    machine = replace(crooked.machine, acceleration_mm_s2=500.0)
+    inverse = Inverse(MachineModel(machine, crooked.sources), prefer=Prefer.FEED)
+    test = table2.tests["a"]
+
+    def written(feed_mm_min: float) -> list[Program]:
+        circle = replace(test.circle, feed_mm_min=feed_mm_min)
+        plan = Plan("one circle", {"a": replace(test, circle=circle, directions=test.directions[:1])})
+        return circle_programs(plan, machine, linuxcnc, inverse=inverse, approach=None)
+
+    with pytest.raises(StationError, match="F3000 cannot be kept with --prefer feed either") as refused:
+        written(3000.0)
+    feed_mm_min = float(re.search(r"give F(\d+) or less", str(refused.value))[1])
+    assert 2900.0 < feed_mm_min < 3000.0
+    (program,) = written(feed_mm_min)
+    assert program.feed_s <= KEPT * program.nominal_feed_s
 
 
 def test_needed_length_and_reached_speed_are_inverses(linuxcnc, reference):

@@ -154,6 +154,26 @@ class Toolpath:
             arc=None,
         )
 
+    def part(self, rows: slice) -> Toolpath:
+        """Rows that follow each other as a toolpath of their own, without texts."""
+        begins = rows.indices(len(self))[0]
+        start = self.start if begins == 0 else self.before[begins]
+        return replace(
+            self,
+            kind=self.kind[rows],
+            poses=self.poses[rows],
+            feed_mm_min=self.feed_mm_min[rows],
+            feed_deg_min=self.feed_deg_min[rows],
+            dwell_s=self.dwell_s[rows],
+            line=self.line[rows],
+            corners_mm=self.corners_mm[rows],
+            system=self.system[rows],
+            frame=self.frame[rows],
+            text=MappingProxyType({}),
+            start=start,
+            arc=None if self.arc is None else self.arc[rows],
+        )
+
     @property
     def is_move(self) -> NDArray[np.bool_]:
         """Rows that are moves, whether or not they lead elsewhere, shape (n,)."""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import StationError
+from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.compensate import Prefer, compensate_toolpath
 from dbbstation.nc.curve import felt_mm
@@ -117,6 +118,35 @@ def test_what_is_reported_is_looked_for_at_many_places(linuxcnc, reference):
     off_um = 1e3 * felt_mm(reached - path.between(np.repeat(row, 1001), share)).max()
     assert off_um > 5.0
     assert done.chord_um == pytest.approx(off_um, rel=0.05)
+
+
+class Waved(LinearSource):
+    """All struts are longer by a wave along X."""
+
+    name = "waved"
+    belongs_to = Owner.MACHINE
+    needs = frozenset({Need.POSE})
+    texts = Texts("", "", "", "", "", "")
+
+    def parameters(self, machine):  # noqa: ARG002
+        return (Parameter("amount_mm", "mm", 0.01, ""),)
+
+    def derivative(self, motion, machine, values):  # noqa: ARG002
+        wave = np.sin(np.pi * motion.poses[:, 0] / 50.0)
+        return Effect(strut_mm=np.repeat(wave[:, None, None], 6, axis=1))
+
+
+def test_the_chord_error_is_that_of_all_places_of_a_piece(linuxcnc, reference):
+    """A piece whose ends and whose middle lie on it: a whole wave, against 800 places of the inverse itself."""
+    model = MachineModel(reference, (Fitted(Waved(), np.array([0.02])),))
+    path = linuxcnc.read("G21 G90\nG0 X-50 Y0 Z-1000 A0 B0 C0\nG1 X50 F1000\nM2\n", "line.ngc")
+    done = compensate_toolpath(path, model, chord_mm=None)
+    share = np.linspace(0.0, 1.0, 801)
+    at = compensated(model, Motion(poses=path.between(np.ones(801, dtype=np.int64), share), is_path=True))
+    off_um = 1e3 * felt_mm(at - (at[0] + share[:, None] * (at[-1] - at[0])))
+    assert off_um[400] < 0.05
+    assert off_um.max() > 20.0
+    assert done.chord_um == pytest.approx(off_um.max(), rel=0.02)
 
 
 def test_a_tolerance_that_is_missed_is_refused_unless_a_number_accepts_it(linuxcnc, reference):

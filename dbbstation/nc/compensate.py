@@ -12,7 +12,7 @@ from dbbstation.errors import StationError
 from dbbstation.nc.curve import Curve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, cuts
-from dbbstation.nc.splitting import SHORTEST_MM, looked_at, moves_of, rows_as_pieces, runs_of, split
+from dbbstation.nc.splitting import SHORTEST_MM, Pieces, looked_at, moves_of, parts_of, rows_as_pieces, runs_of, split
 from dbbstation.nc.toolpath import Step, rounded
 
 if TYPE_CHECKING:
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.machine_model import MachineModel
+    from dbbstation.nc.curve import Behind
     from dbbstation.nc.planner import Planner
-    from dbbstation.nc.splitting import Pieces
     from dbbstation.nc.toolpath import Toolpath
 
 CHORD_MM = 1e-4
@@ -31,6 +31,10 @@ wanted one: 0.1 µm, a tenth of what a ball bar repeats."""
 DENSELY = np.arange(1, 14) / 13.0
 """Shares of a piece at which its distance from the curve is reported: a prime number of parts, so that no wave with some
 periods in a piece is met at its zeros."""
+
+SURELY_KEPT = 1.0 + 0.9 * (KEPT - 1.0)
+"""Share of the time that a feed which is named in a refusal may take: pieces for that feed are somewhat shorter than those it
+was found with, and must keep it as well."""
 
 FEED_KEPT = 1e-3
 """A feed stays as it is while the compensated move is as long as the wanted one within this share."""
@@ -122,22 +126,46 @@ def compensate_toolpath(
         StationError: a correction is larger than that, or the path has too many pieces.
         ModelError: a source needs what a program does not give, such as temperatures, or the time where it is None.
     """
-    curve = Curve(toolpath, model, started_s, hold_tilt=prefer is Prefer.POSITION_ONLY)
+    needed_mm = _needed_mm(toolpath, planner, prefer)
+    runs = moves_of(toolpath) if chord_mm is None else runs_of(toolpath, needed_mm)
+    whole = np.zeros(len(toolpath), dtype=np.bool_)
+    if keep_arcs and toolpath.arc is not None:
+        whole = toolpath.arc[:, 2] != 0.0
+    before: Behind | None = None
     short: dict[int, float] = {}
-    if chord_mm is None:
-        pieces, runs = rows_as_pieces(toolpath), moves_of(toolpath)
-    else:
-        needed_mm = _needed_mm(toolpath, planner, prefer)
-        runs = runs_of(toolpath, needed_mm)
-        whole = np.zeros(len(toolpath), dtype=np.bool_)
-        if keep_arcs and toolpath.arc is not None:
-            whole = toolpath.arc[:, 2] != 0.0
-        pieces, short = split(curve, model, chord_mm, needed_mm, runs, for_feed=prefer is Prefer.FEED, whole=whole)
-    at = looked_at(curve, pieces, DENSELY)
-    commanded = at[:, -1]
-    shift_mm = felt_mm(commanded - toolpath.between(*row_and_share(pieces.end)))
-    _check_corrections(toolpath, pieces, shift_mm, largest_mm)
-    off_mm = _off_mm(toolpath, pieces, at)
+    tilt_left_mm = 0.0
+    parts = []
+    for rows in parts_of(toolpath, runs):
+        path = toolpath.part(rows)
+        begins_s = (
+            None if started_s is None else started_s + float(toolpath.end_s[rows.start - 1] if rows.start else 0.0)
+        )
+        curve = Curve(path, model, begins_s, hold_tilt=prefer is Prefer.POSITION_ONLY, before=before)
+        if chord_mm is None:
+            pieces = rows_as_pieces(path)
+        else:
+            pieces, lacking = split(
+                curve,
+                model,
+                chord_mm,
+                needed_mm[rows],
+                runs[rows],
+                for_feed=prefer is Prefer.FEED,
+                whole=whole[rows],
+                how_near=prefer is None,
+            )
+            short |= {run: max(mm, short.get(run, mm)) for run, mm in lacking.items()}
+        at = looked_at(curve, pieces, DENSELY)
+        shift_mm = felt_mm(at[:, -1] - path.between(*row_and_share(pieces.end)))
+        _check_corrections(path, pieces, shift_mm, largest_mm)
+        parts.append(_Part(pieces.behind(rows.start), at[:, -1], shift_mm, _off_mm(path, pieces, at)))
+        before, tilt_left_mm = curve.behind, max(tilt_left_mm, curve.tilt_left_mm)
+    pieces = Pieces(
+        *(np.concatenate(each) for each in zip(*((p.pieces.begin, p.pieces.end) for p in parts), strict=True))
+    )
+    commanded, shift_mm, off_mm = (
+        np.concatenate(each) for each in zip(*((p.commanded, p.shift_mm, p.off_mm) for p in parts), strict=True)
+    )
     corner_mm = 0.0 if chord_mm is None or keep_arcs else max(chord_mm, float(off_mm.max(initial=0.0)))
     done = _assembled(toolpath, pieces, commanded, runs, model.machine, corner_mm)
     slow = _slowest(toolpath, done, _Of(runs, runs[pieces.row[_written(toolpath, pieces)]]), planner, short)
@@ -149,11 +177,28 @@ def compensate_toolpath(
         greatest_um=1e3 * float(shift_mm.max(initial=0.0)),
         chord_um=1e3 * float(off_mm.max(initial=0.0)),
         chord_line=int(toolpath.line[pieces.row[worst]]) if len(off_mm) else 0,
-        tilt_um=1e3 * curve.tilt_left_mm,
+        tilt_um=1e3 * tilt_left_mm,
         seconds=float(_seconds(done, planner).sum()),
         nominal_seconds=float(_seconds(toolpath, planner).sum()),
         slow=slow,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What is commanded along some rows of a toolpath.
+
+    Attributes:
+        pieces: of the whole toolpath, k of them.
+        commanded: pose at the end of each, shape (k, 6) [mm, deg].
+        shift_mm: correction there, shape (k,) [mm].
+        off_mm: how far the curve leaves each piece, shape (k,) [mm].
+    """
+
+    pieces: Pieces
+    commanded: NDArray[np.float64]
+    shift_mm: NDArray[np.float64]
+    off_mm: NDArray[np.float64]
 
 
 def _check_corrections(toolpath: Toolpath, pieces: Pieces, shift_mm: NDArray[np.float64], largest_mm: float) -> None:
@@ -262,7 +307,7 @@ def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner
     low, high = 0.0, 1.0
     for _ in range(20):
         middle = (low + high) / 2.0
-        low, high = (middle, high) if share(middle) <= KEPT else (low, middle)
+        low, high = (middle, high) if share(middle) <= SURELY_KEPT else (low, middle)
     takes, took = of.lost(_seconds(toolpath, planner), _seconds(done, planner))
     row = int(np.argmax((of.before == int(np.argmax(takes - took))) & (toolpath.kind == Step.FEED)))
     feed = float(toolpath.feed[row])

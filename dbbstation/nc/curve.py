@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +27,19 @@ HOLDING = 3
 """Rounds in which the wanted tilt is moved until the commanded one is what the program says; each leaves a thousandth."""
 
 
+@dataclass(frozen=True, eq=False)
+class Behind:
+    """What a part of a toolpath leaves to the next one.
+
+    Attributes:
+        command: pose commanded last, shape (6,) [mm, deg].
+        passed: what the model remembers.
+    """
+
+    command: NDArray[np.float64]
+    passed: Passed
+
+
 class Curve:
     """What to command along a toolpath.
 
@@ -38,10 +51,17 @@ class Curve:
         model: calibrated model; what belongs to the machine is inverted.
         started_s: start of the program on the time scale of the model's sessions [s]; None where not known.
         hold_tilt: command A, B and C as they are programmed, and correct the tool tip alone.
+        before: what was left by the part that this one follows; None: it is the first that moves.
     """
 
     def __init__(
-        self, toolpath: Toolpath, model: MachineModel, started_s: float | None, *, hold_tilt: bool = False
+        self,
+        toolpath: Toolpath,
+        model: MachineModel,
+        started_s: float | None,
+        *,
+        hold_tilt: bool = False,
+        before: Behind | None = None,
     ) -> None:
         self.toolpath = toolpath
         self._model = model
@@ -53,6 +73,9 @@ class Curve:
         self._waits = self._known & ~self.leads_on & (toolpath.duration_s > 0.0) & has_history
         self.tilt_left_mm = 0.0
         """Largest correction of the tilt that was left out so far, as felt at `LEVER_MM` [mm]."""
+        self._before = before
+        self.behind = before
+        """What is left behind the last of the places that were looked at last."""
 
     def at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Poses to command at places in the order in which the program comes to them, shape (k, 6) [mm, deg].
@@ -73,12 +96,15 @@ class Curve:
         taken = moves | (self._waits[row] & (share == 1.0))
         if not moves.any():
             return np.where(self._known[row][:, None], path.poses[row], np.nan)
-        poses = np.vstack([path.before[first], path.between(row[taken], share[taken])])
+        poses = path.between(row[taken], share[taken])
         time_s = None
         if self._started_s is not None:
             begin_s = path.end_s - path.duration_s
-            there_s = begin_s[row[taken]] + share[taken] * path.duration_s[row[taken]]
-            time_s = self._started_s + np.concatenate([begin_s[first][None], there_s])
+            time_s = self._started_s + begin_s[row[taken]] + share[taken] * path.duration_s[row[taken]]
+        if self._before is None:
+            poses = np.vstack([path.before[first], poses])
+            if time_s is not None:
+                time_s = np.concatenate([self._started_s + begin_s[first][None], time_s])
         inverse = self._inverted(Motion(poses=poses, is_path=True, time_s=time_s))
         behind = np.cumsum(taken)
         # Until the next place that leads somewhere the machine stands where it comes to rest.
@@ -88,14 +114,21 @@ class Curve:
         return np.where(self._known[row][:, None], inverse[at_rest], np.nan)
 
     def _inverted(self, wanted: Motion) -> NDArray[np.float64]:
-        """Invert stretch by stretch: what a source with a history remembers goes from each to the next."""
-        passed: Passed | None = None
-        parts = []
+        """Invert stretch by stretch: what a source with a history remembers goes from each to the next.
+
+        Returns:
+            Commands, those before the first that moves first, shape (1 + number of places that move, 6) [mm, deg].
+        """
+        passed = None if self._before is None else self._before.passed
+        parts = [] if self._before is None else [self._before.command[None]]
         for start in range(0, len(wanted), PLACES_AT_ONCE):
             stretch = wanted.stretch(slice(start, start + PLACES_AT_ONCE))
             part, passed = self._stretch(passed or begun(self._model, stretch), stretch)
             parts.append(part)
-        return np.concatenate(parts)
+        commands = np.concatenate(parts)
+        if passed is not None:
+            self.behind = Behind(commands[-1], passed)
+        return commands
 
     def _stretch(self, passed: Passed, wanted: Motion) -> tuple[NDArray[np.float64], Passed]:
         command, behind = compensated_on(passed, wanted)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from dbbstation.machine.regularity import check_joints
 from dbbstation.model.uncertainty import position_uncertainty_mm
 from dbbstation.nc.circle_program import STEP_DEG, USUAL_APPROACH, chord_error_mm, circle_toolpath
 from dbbstation.nc.compensate import CHORD_MM, Prefer, Slow, compensate_toolpath
-from dbbstation.nc.kept import check_chord, check_feed, cost, too_slow
+from dbbstation.nc.kept import TooSlowError, check_chord, check_feed, cost
 from dbbstation.nc.limits import CIRCLE_CHORD_MM, LARGEST_CORRECTION_MM
 from dbbstation.nc.mark import marked
 from dbbstation.nc.nominal import COMPENSATED, check_machine, check_nominal, checksum
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from dbbstation.nc.toolpath import Toolpath
     from dbbstation.plan.circle import Circle
     from dbbstation.plan.plan import Plan
+
+What = TypeVar("What")
 
 
 @dataclass(frozen=True)
@@ -140,15 +143,19 @@ def circle_programs(
         progress(len(programs), len(runs))
         circle = plan.tests[name].run(direction)
         title = f"test {name} {direction}"
-        step = (
-            step_deg
-            if inverse is None
-            else _step_deg(circle, title, step_deg, chord_mm, inverse.prefer, machine, dialect)
-        )
-        path = circle_toolpath(circle, title, step_deg=step, approach=approach)
-        header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name})
-        header += _said(origin or {})
-        programs.append(_program(path, machine, dialect, f"{name}-{direction}", inverse, chord_mm, header, split=False))
+
+        def written(circle: Circle, *, title: str = title, stem: str = f"{name}-{direction}") -> Program:
+            step = step_deg
+            if inverse is not None:
+                step = _step_deg(circle, title, step_deg, chord_mm, inverse.prefer, machine, dialect)
+            path = circle_toolpath(circle, title, step_deg=step, approach=approach)
+            header = _circle_header(title, circle, step, {"plan": plan.name, "machine": machine.name})
+            return _program(path, machine, dialect, stem, inverse, chord_mm, header + _said(origin or {}), split=False)
+
+        def slower(mm_min: float, *, circle: Circle = circle) -> Circle:
+            return replace(circle, feed_mm_min=mm_min)
+
+        programs.append(_or_the_feed_that_is_kept(written, circle, slower, inverse))
     progress(len(programs), len(runs))
     return programs
 
@@ -213,7 +220,58 @@ def compensated_program(
     check_nominal(path)
     check_machine(path, machine)
     header = [f"machine: {machine.name}", *_said(origin or {})]
-    return _program(path, machine, dialect, path.name, inverse, chord_mm, header, split=True)
+
+    def written(path: Toolpath) -> Program:
+        return _program(path, machine, dialect, path.name, inverse, chord_mm, header, split=True)
+
+    def slower(mm_min: float) -> Toolpath:
+        return replace(path, feed_mm_min=np.minimum(path.feed_mm_min, mm_min))
+
+    return _or_the_feed_that_is_kept(written, path, slower, inverse)
+
+
+MOST_FEEDS, LESS = 12, 0.97
+"""How often a slower feed is tried, each by this share slower than the last at least: down to two thirds of the first that was
+named. A refusal takes that many times as long as a program at most."""
+
+
+def _or_the_feed_that_is_kept(
+    written: Callable[[What], Program],
+    what: What,
+    slower: Callable[[float], What],
+    inverse: Inverse | None,
+) -> Program:
+    """Return a program, or refuse it with a feed at which it is written.
+
+    Pieces for a smaller feed are shorter. Where the feed is preferred, one that was found with the pieces of a greater feed may be
+    more than they reach.
+
+    Args:
+        written: makes the program.
+        what: of this.
+        slower: the same with no F beyond this [mm/min].
+        inverse: the model to compensate with.
+
+    Raises:
+        TooSlowError: names that feed.
+        StationError: as `written` does.
+    """
+    try:
+        return written(what)
+    except TooSlowError as refused:
+        if inverse is None or inverse.prefer is not Prefer.FEED:
+            raise
+        first, reached = refused, math.floor(refused.reached_mm_min)
+    for _ in range(MOST_FEEDS):
+        try:
+            written(slower(reached))
+        except TooSlowError as refused:
+            reached = math.floor(min(refused.reached_mm_min, reached * LESS))
+        except StationError:
+            reached = math.floor(reached * LESS)
+        else:
+            break
+    raise first.reaching(reached)
 
 
 def _program(
@@ -298,22 +356,26 @@ def _step_deg(
 ) -> float:
     """Angle between the points of a compensated circle [deg]: what its feed needs, and no less than was asked for.
 
+    Where the chord error is preferred, no more than that allows.
+
     Raises:
-        StationError: such a chord leaves the circle by more than `chord_mm`.
+        StationError: a chord as long as the feed needs leaves the circle by more than `chord_mm`.
     """
-    if prefer in {Prefer.ACCURACY, Prefer.POSITION_ONLY}:
+    if prefer is Prefer.POSITION_ONLY:
         return step_deg
     planner = planner_of(machine, dialect)
     # The arc is divided evenly: its steps may be smaller by a part in its number of points.
     needed_mm = 1.01 * float(planner.needed_mm(np.array(circle.feed_mm_min / 60.0)))
     step = max(step_deg, float(np.degrees(needed_mm / circle.radius_mm)))
     error_mm = chord_error_mm(circle, step)
-    if step > step_deg and error_mm > chord_mm and prefer is None:
-        longest_mm = np.array(np.sqrt(8.0 * circle.radius_mm * chord_mm) / 1.01)
-        reached = 60.0 * float(planner.reached_mm_s(longest_mm))
-        slow = Slow(0, circle.feed_mm_min, reached, 1e3 * error_mm)
-        raise too_slow(name, slow, 1e3 * chord_mm, machine, None)
-    return step
+    if step == step_deg or error_mm <= chord_mm or prefer is Prefer.FEED:
+        return step
+    longest_mm = float(np.sqrt(8.0 * circle.radius_mm * chord_mm)) / 1.01
+    if prefer is Prefer.ACCURACY:
+        return max(step_deg, float(np.degrees(longest_mm / circle.radius_mm)))
+    reached = 60.0 * float(planner.reached_mm_s(np.array(longest_mm)))
+    slow = Slow(0, circle.feed_mm_min, reached, 1e3 * error_mm)
+    raise TooSlowError(name, slow, 1e3 * chord_mm, machine, None)
 
 
 UNCERTAIN_AT = 2000

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import StationError
@@ -17,16 +18,59 @@ CHOICES = "--prefer accuracy (slower), feed (less accurate) or position-only (A,
 LEVER = "100 mm from the tip"
 
 
+class TooSlowError(StationError):
+    """The control cannot keep a feed.
+
+    Args:
+        name: of the program.
+        slow: the move that loses most.
+        asked_um: chord error that was asked for [µm].
+        machine: whose acceleration was reckoned with.
+        prefer: what was preferred; None: nothing.
+    """
+
+    def __init__(self, name: str, slow: Slow, asked_um: float, machine: Machine, prefer: Prefer | None) -> None:
+        self._about = name, slow, asked_um, machine, prefer
+        self.reached_mm_min = slow.reached_mm_min
+        within = f" within {asked_um:g} µm" if prefer is None else f" with --prefer {prefer.value} either"
+        ways = [f"give F{math.floor(slow.reached_mm_min)} or less"]
+        if prefer is None and not math.isnan(slow.chord_um) and slow.chord_um > asked_um:
+            ways.append(f"--chord-um {up(slow.chord_um / 0.95)}")
+        ways.append(CHOICES if prefer is None else f"--prefer {Prefer.ACCURACY.value}")
+        super().__init__(
+            f"F{slow.asked_mm_min:g} cannot be kept{within}: the control reaches F{math.floor(slow.reached_mm_min)} here, with "
+            f"{said_acceleration(machine)}",
+            where=where(name, slow.line),
+            remedy=", or ".join(ways),
+        )
+
+    def reaching(self, mm_min: float) -> TooSlowError:
+        """The same with another feed that is reached [mm/min]."""
+        name, slow, asked_um, machine, prefer = self._about
+        return TooSlowError(name, replace(slow, reached_mm_min=mm_min), asked_um, machine, prefer)
+
+
 def check_chord(
     name: str, done: Compensation, asked_um: float, accepted_um: float | None, prefer: Prefer | None
 ) -> None:
     """Refuse a program that leaves the path by more than was asked for, unless a larger number was accepted.
 
+    Where the feed is preferred, a chord error as large as what is corrected is as wrong as the program that is not corrected.
+
     Raises:
         StationError: names the line and what is reached.
     """
-    if prefer is Prefer.FEED or done.chord_um <= max(asked_um, accepted_um or 0.0):
+    if done.chord_um <= max(asked_um, accepted_um or 0.0):
         return
+    if prefer is Prefer.FEED:
+        if done.chord_um < done.greatest_um:
+            return
+        raise StationError(
+            f"in pieces that keep the feed the path is off by {up(done.chord_um)} µm here, and the model corrects "
+            f"{up(done.greatest_um)} µm at most",
+            where=where(name, done.chord_line),
+            remedy=f"give a smaller F, or --prefer {Prefer.ACCURACY.value}; --accept-chord-um {up(done.chord_um)} writes it so",
+        )
     raise StationError(
         f"the path is kept within {up(done.chord_um)} µm here, not within {asked_um:g} µm: the correction has a step, or bends "
         "more than the shortest pieces follow",
@@ -42,22 +86,7 @@ def check_feed(name: str, done: Compensation, asked_um: float, machine: Machine,
         StationError: names the line and the feed that can be reached.
     """
     if done.slow is not None and prefer is not Prefer.ACCURACY:
-        raise too_slow(name, done.slow, asked_um, machine, prefer)
-
-
-def too_slow(name: str, slow: Slow, asked_um: float, machine: Machine, prefer: Prefer | None) -> StationError:
-    """Return the refusal of a feed that cannot be kept."""
-    within = f" within {asked_um:g} µm" if prefer is None else f" with --prefer {prefer.value} either"
-    ways = [f"give F{math.floor(slow.reached_mm_min)} or less"]
-    if prefer is None and not math.isnan(slow.chord_um) and slow.chord_um > asked_um:
-        ways.append(f"--chord-um {up(slow.chord_um / 0.95)}")
-    ways.append(CHOICES if prefer is None else f"--prefer {Prefer.ACCURACY.value}")
-    return StationError(
-        f"F{slow.asked_mm_min:g} cannot be kept{within}: the control reaches F{math.floor(slow.reached_mm_min)} here, with "
-        f"{said_acceleration(machine)}",
-        where=where(name, slow.line),
-        remedy=", or ".join(ways),
-    )
+        raise TooSlowError(name, done.slow, asked_um, machine, prefer)
 
 
 def said_acceleration(machine: Machine) -> str:

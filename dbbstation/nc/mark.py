@@ -37,6 +37,9 @@ FARTHEST_PLACE, FARTHEST_ANGLE, FARTHEST_ANGLE_OF_FEW = 1, 3, 9
 """Greatest steps of the last decimals of X, Y, Z and of A, B, C: a nanometre; half a nanometre, or three, at a point 100 mm from the
 tip. Where A, B and C stand still one pose in five has the mark; thirty poses are enough then."""
 
+TRIED_AT_ONCE = 16_384
+"""Steps that are tried together, of all poses: enough for arrays to be quick, and half a megabyte."""
+
 _SCALE = np.repeat([10.0**DECIMALS_MM, 10.0**DECIMALS_DEG], 3)
 _FELT_NM = np.array([1.0, 1.0, 1.0, 0.17, 0.17, 0.17])
 """What the last decimal is worth, of an angle at a point 100 mm from the tip [nm]."""
@@ -92,13 +95,24 @@ def _mark_many(numbers: NDArray[np.int64], free: NDArray[np.bool_], missing: NDA
     """Move these rows of six by the steps that are felt least, step by step; those that no step gives the mark stay."""
     sums = _sums(numbers)
     missing = missing[~_has_mark(sums[missing], BITS[4])]
-    for steps in _steps(FARTHEST_ANGLE, 1):
-        if not len(missing):
-            break
-        may = free[missing][:, steps != 0].all(axis=1)
-        found = may & _has_mark(sums[missing] + _sums(steps), BITS[4])
-        numbers[missing[found]] += steps
-        missing = missing[~found]
+    steps = _steps(FARTHEST_ANGLE, 1)
+    step_sums, moved, fixed = _sums(steps), _as_bits(steps != 0), _as_bits(~free)
+    begin, together = 0, max(TRIED_AT_ONCE // max(len(missing), 1), 1)
+    while len(missing) and begin < len(steps):
+        # The more are found, the more steps are tried at once.
+        some = slice(begin, begin + together)
+        may = (moved[some] & fixed[missing, None]) == 0
+        found = may & _has_mark(sums[missing, None] + step_sums[some], BITS[4])
+        hit = found.any(axis=1)
+        numbers[missing[hit]] += steps[some][found[hit].argmax(axis=1)]
+        missing = missing[~hit]
+        begin, together = begin + together, max(TRIED_AT_ONCE // max(len(missing), 1), 1)
+
+
+def _as_bits(axes: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Rows of six as one number each."""
+    bits: NDArray[np.int64] = axes @ (1 << np.arange(6))
+    return bits
 
 
 def _mark_few(numbers: NDArray[np.int64], free: NDArray[np.bool_], rows: NDArray[np.int64], bits: int) -> None:

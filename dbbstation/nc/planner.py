@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.nc.splitting import moves_of
 from dbbstation.nc.toolpath import Step
 
 if TYPE_CHECKING:
@@ -145,8 +146,16 @@ class Planner:
             corner = np.minimum(np.fmin(np.sqrt(OF_AN_ARC * a * within), np.inf), np.minimum(speed[:-1], speed[1:]))
         lost = sum((each - corner) ** 2 / (2.0 * a * each) for each in (speed[:-1], speed[1:]))
         both = np.maximum((ramp_s[:-1] + ramp_s[1:]) / 2.0 - lost, 0.0)
-        saved: NDArray[np.float64] = np.where(limited[:-1] | limited[1:], np.fmin(ramp, blended), both)
-        return saved
+        saved: NDArray[np.float64] = np.where(limited[:-1] & limited[1:], np.fmin(ramp, blended), both)
+        # Between a move that turns and one that does not, that one slows down with half its acceleration as well, which is a ramp
+        # of v/2a more. Where it is long they overlap, an arc as one move; a chord is too short for it.
+        move = moves_of(toolpath)
+        move_mm: NDArray[np.float64] = np.bincount(move, weights=toolpath.tip_mm)[move[rows]].astype(np.float64)
+        slower = np.minimum(speed[:-1], speed[1:])
+        is_long = self.reached_mm_s(move_mm) >= speed
+        overlap = np.where(is_long[:-1] & is_long[1:], np.fmin(2.0 * slower / a, blended), 0.0)
+        mixed = overlap - np.where(limited[:-1], speed[1:], speed[:-1]) / (2.0 * a)
+        return np.where(limited[:-1] != limited[1:], mixed, saved)
 
 
 def cuts(toolpath: Toolpath) -> NDArray[np.bool_]:

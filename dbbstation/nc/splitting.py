@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,6 +59,9 @@ ALMOST = 0.999
 COSINE = 0.97
 """Of the greatest angle at which a curve in short lines goes on, 14 degrees."""
 
+ROWS_AT_ONCE = 20_000
+"""Rows of a toolpath that are compensated together: thirty to a hundred megabytes, and long enough for arrays to be quick."""
+
 MOST_CELLS = 1_000_000
 """As many as `rs274.reader.MOST_ROWS`: the path itself is held in memory."""
 
@@ -68,6 +72,10 @@ class Pieces:
 
     begin: NDArray[np.float64]
     end: NDArray[np.float64]
+
+    def behind(self, rows: int) -> Pieces:
+        """The same places, counted from so many rows before."""
+        return Pieces(self.begin + rows, self.end + rows)
 
     @property
     def row(self) -> NDArray[np.int64]:
@@ -94,6 +102,29 @@ def moves_of(toolpath: Toolpath) -> NDArray[np.int64]:
         goes_on[1:] = same & (toolpath.line[1:] == toolpath.line[:-1]) & (toolpath.kind[1:] == toolpath.kind[:-1])
     moves: NDArray[np.int64] = np.cumsum(~goes_on) - 1
     return moves
+
+
+def parts_of(toolpath: Toolpath, runs: NDArray[np.int64]) -> list[slice]:
+    """Rows that are compensated one part after the other, so that long programs take little memory.
+
+    A part begins with a move at feed that leads on, where nothing rests that belongs to the part before; with a new run where
+    there is one near, else within an arc.
+    """
+    leads_on = (toolpath.tip_mm > 0.0) | (toolpath.turn_deg > 0.0)
+    # The first move shows where the machine comes from.
+    may = np.flatnonzero(leads_on)[1:]
+    may = may[(toolpath.kind[may] == Step.FEED) & (toolpath.tip_mm[may] > 0.0)]
+    new_run = may[runs[may] != runs[may - 1]]
+    cuts = [0]
+    while len(toolpath) - cuts[-1] > ROWS_AT_ONCE:
+        nearest = [at[(at > cuts[-1]) & (at <= cuts[-1] + ROWS_AT_ONCE)] for at in (new_run, may)]
+        found = next((int(at[-1]) for at in nearest if len(at)), None)
+        if found is None:
+            found = int(may[np.searchsorted(may, cuts[-1], side="right")]) if len(may) and may[-1] > cuts[-1] else None
+        if found is None:
+            break
+        cuts.append(found)
+    return [slice(begin, end) for begin, end in pairwise([*cuts, len(toolpath)])]
 
 
 def runs_of(toolpath: Toolpath, needed_mm: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -129,6 +160,7 @@ def split(
     *,
     for_feed: bool,
     whole: NDArray[np.bool_],
+    how_near: bool = True,
 ) -> tuple[Pieces, dict[int, float]]:
     """Return the pieces in which a toolpath is written.
 
@@ -140,10 +172,11 @@ def split(
         runs: number of the run that each row belongs to, within which pieces may end anywhere, shape (n,).
         for_feed: where the two cannot both be had, keep the feed.
         whole: rows that are one piece each, shape (n,).
+        how_near: look how near to the curve pieces of the needed length are; it takes as long as all the rest.
 
     Returns:
         The pieces, and for each run whose longest pieces are shorter than needed: its number, and how near to the curve
-        pieces of the needed length are [mm].
+        pieces of the needed length are, NaN where that was not looked for [mm].
 
     Raises:
         StationError: the path has too many cells.
@@ -166,9 +199,9 @@ def split(
         least = float(needed_mm[row[of]].max())
         ended = longest(nodes.way, nodes.at, nodes.may_end, OF_THE_TOLERANCE * tolerance_mm)
         if nodes.shortest(ended) < least:
-            kept = truest(nodes.way, nodes.at, nodes.may_end, least)
-            short[int(number[of[0]])] = nodes.distance_mm(kept)
-            ended = kept if for_feed else ended
+            kept = truest(nodes.way, nodes.at, nodes.may_end, least) if for_feed or how_near else None
+            short[int(number[of[0]])] = np.nan if kept is None else nodes.distance_mm(kept)
+            ended = kept if for_feed and kept is not None else ended
         begins.append(nodes.places[np.concatenate([[0], ended[:-1]])])
         ends.append(nodes.places[ended])
     end = np.concatenate(ends)

@@ -5,7 +5,9 @@ cannot be corrected in that line: its number would mean another place, off by th
 
 - a rapid leaves such an axis where it is; nothing is cut on the way, and the next line that names it brings it right;
 - a move at feed must be corrected in all axes. Where one of them is in another system, the program is right only where these
-  systems are one: it gets a guard that stops it otherwise.
+  systems are one: it gets a guard that stops it otherwise;
+- so does one in which an increment (G91) moves an axis from a place that was named in another system: programs that are written
+  name places, and this one has a number in no system.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.nc.toolpath import ACTIVE_SYSTEM, MACHINE_SYSTEM, SYSTEMS, Step
+from dbbstation.nc.toolpath import ACTIVE_SYSTEM, BY_INCREMENTS, MACHINE_SYSTEM, SYSTEMS, Step
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,13 +29,13 @@ def in_systems(toolpath: Toolpath) -> Toolpath:
     """Return a compensated toolpath that stays right where it counts in several systems, or is guarded."""
     if not elsewhere(toolpath).any():
         return toolpath
-    if not _mixed_feeds(toolpath).any():
+    if not _mixed_feeds(toolpath).any() and not np.any(toolpath.frame[toolpath.is_move] == BY_INCREMENTS):
         return _held(toolpath)
     used = {
         *np.unique(toolpath.frame[toolpath.is_move]).tolist(),
         *np.unique(toolpath.system[toolpath.is_move]).tolist(),
     }
-    named = tuple(SYSTEMS[system - 1] for system in sorted(used - {ACTIVE_SYSTEM, MACHINE_SYSTEM}))
+    named = tuple(SYSTEMS[system - 1] for system in sorted(used - {ACTIVE_SYSTEM, MACHINE_SYSTEM, BY_INCREMENTS}))
     return replace(toolpath, guard=tuple(sorted({*(toolpath.guard or ()), *named})))
 
 

@@ -63,6 +63,9 @@ class Ending(StrEnum):
 ACTIVE_SYSTEM, MACHINE_SYSTEM = -1, 0
 """Coordinates in which numbers count: the work system that the control happens to have; the machine's own (G53)."""
 
+BY_INCREMENTS = -2
+"""In place of a system: the axis was moved by an increment from a place that had been named in another system."""
+
 SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 """Work coordinate systems in order, from number 1."""
 
@@ -90,7 +93,8 @@ class Toolpath:
             infinite for as much as the feed needs, NaN where the program does not say.
         system: in which the numbers of each row count, shape (n,): `MACHINE_SYSTEM`, `ACTIVE_SYSTEM`, or 1 to 9 for one
             of `SYSTEMS`.
-        frame: in which the place of each axis was named last, up to each row, shape (n, 6): values as in `system`.
+        frame: in which the place of each axis was named last, up to each row, shape (n, 6): values as in `system`, or
+            `BY_INCREMENTS`.
         guard: not None where the program stops, says why and ends before it moves, if the work system in force or one of
             these, G92 or a tool length is not zero.
         ending: how the program ends.
@@ -152,6 +156,26 @@ class Toolpath:
             frame=self.frame[row],
             text=MappingProxyType({place[old]: text for old, text in self.text.items()}),
             arc=None,
+        )
+
+    def part(self, rows: slice) -> Toolpath:
+        """Rows that follow each other as a toolpath of their own, without texts."""
+        begins = rows.indices(len(self))[0]
+        start = self.start if begins == 0 else self.before[begins]
+        return replace(
+            self,
+            kind=self.kind[rows],
+            poses=self.poses[rows],
+            feed_mm_min=self.feed_mm_min[rows],
+            feed_deg_min=self.feed_deg_min[rows],
+            dwell_s=self.dwell_s[rows],
+            line=self.line[rows],
+            corners_mm=self.corners_mm[rows],
+            system=self.system[rows],
+            frame=self.frame[rows],
+            text=MappingProxyType({}),
+            start=start,
+            arc=None if self.arc is None else self.arc[rows],
         )
 
     @property
@@ -267,6 +291,7 @@ class ToolpathBuilder:
     Attributes:
         corner_mm: how far the control may round the corners of the moves that follow [mm]; None: not said.
         system: in which the numbers of the moves that follow count, as `Toolpath.system`.
+        increments: whether they are increments, which name no place.
         guard: as `Toolpath.guard`.
         ending: how the program ends.
     """
@@ -275,6 +300,7 @@ class ToolpathBuilder:
         self.name = name
         self.corner_mm: float | None = None
         self.system = ACTIVE_SYSTEM
+        self.increments = False
         self.guard: tuple[str, ...] | None = None
         self.ending = Ending.STOP
         self.numbers: tuple[int, ...] = ()
@@ -394,8 +420,8 @@ class ToolpathBuilder:
         return inner
 
     def _named(self, named: Sequence[int], system: int | None) -> None:
-        frame = self._frame.copy()
-        frame[list(named)] = self.system if system is None else system
+        frame, axes, counted = self._frame.copy(), list(named), self.system if system is None else system
+        frame[axes] = np.where((frame[axes] == counted) | (not self.increments), counted, BY_INCREMENTS)
         self._frame = frame
 
     def _add(

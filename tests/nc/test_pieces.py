@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import combinations, pairwise
 
@@ -9,13 +10,15 @@ import numpy as np
 import pytest
 
 from dbbstation.errors import StationError
+from dbbstation.model.compensation import compensated
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.compensate import Prefer, compensate_toolpath
 from dbbstation.nc.curve import felt_mm
-from dbbstation.nc.export import Inverse, circle_programs, compensated_program, planner_of
+from dbbstation.nc.export import Inverse, Program, circle_programs, compensated_program, planner_of
 from dbbstation.nc.pieces import longest, truest
-from dbbstation.nc.planner import LookAhead, Planner
+from dbbstation.nc.planner import KEPT, LookAhead, Planner
 from dbbstation.nc.toolpath import Step
+from dbbstation.plan.plan import Plan
 from dbbstation.sources.contract import Effect, Fitted, LinearSource, Motion, Need, Owner, Parameter, Texts
 from tests.nc.test_compensate_any import Wound
 
@@ -117,6 +120,35 @@ def test_what_is_reported_is_looked_for_at_many_places(linuxcnc, reference):
     assert done.chord_um == pytest.approx(off_um, rel=0.05)
 
 
+class Waved(LinearSource):
+    """All struts are longer by a wave along X."""
+
+    name = "waved"
+    belongs_to = Owner.MACHINE
+    needs = frozenset({Need.POSE})
+    texts = Texts("", "", "", "", "", "")
+
+    def parameters(self, machine):  # noqa: ARG002
+        return (Parameter("amount_mm", "mm", 0.01, ""),)
+
+    def derivative(self, motion, machine, values):  # noqa: ARG002
+        wave = np.sin(np.pi * motion.poses[:, 0] / 50.0)
+        return Effect(strut_mm=np.repeat(wave[:, None, None], 6, axis=1))
+
+
+def test_the_chord_error_is_that_of_all_places_of_a_piece(linuxcnc, reference):
+    """A piece whose ends and whose middle lie on it: a whole wave, against 800 places of the inverse itself."""
+    model = MachineModel(reference, (Fitted(Waved(), np.array([0.02])),))
+    path = linuxcnc.read("G21 G90\nG0 X-50 Y0 Z-1000 A0 B0 C0\nG1 X50 F1000\nM2\n", "line.ngc")
+    done = compensate_toolpath(path, model, chord_mm=None)
+    share = np.linspace(0.0, 1.0, 801)
+    at = compensated(model, Motion(poses=path.between(np.ones(801, dtype=np.int64), share), is_path=True))
+    off_um = 1e3 * felt_mm(at - (at[0] + share[:, None] * (at[-1] - at[0])))
+    assert off_um[400] < 0.05
+    assert off_um.max() > 20.0
+    assert done.chord_um == pytest.approx(off_um.max(), rel=0.02)
+
+
 def test_a_tolerance_that_is_missed_is_refused_unless_a_number_accepts_it(linuxcnc, reference):
     machine = replace(reference, acceleration_mm_s2=50_000.0)
     model = MachineModel(machine, (Fitted(Wound(), np.array([0.03])),))
@@ -151,15 +183,41 @@ def test_a_circle_takes_the_step_that_its_feed_needs(linuxcnc, table2, crooked):
     assert 2.0 * (1000.0 / 60.0) ** 2 / 1000.0 < arc_mm < 0.65
     assert one.chord_um == pytest.approx(1e3 * arc_mm**2 / (8.0 * 150.0), rel=0.05)
     assert one.feed_s <= 1.01 * one.nominal_feed_s
+
+
+def test_a_circle_that_is_slower_is_as_fast_as_its_chord_allows(linuxcnc, table2, crooked):
+    """At 0.1 µm: pieces of 0.34 mm in place of 0.26 mm, and the feed that the refusal names."""
+    machine = replace(crooked.machine, acceleration_mm_s2=1000.0)
+    model = MachineModel(machine, crooked.sources)
     with pytest.raises(
         StationError, match=r"test a ccw: F1000 cannot be kept within 0\.1 µm: the control reaches F7\d\d"
-    ):
+    ) as refused:
         circle_programs(table2, machine, linuxcnc, inverse=Inverse(model), tests=["a"], chord_mm=1e-4)
     fine = Inverse(model, prefer=Prefer.ACCURACY)
     (slow, _) = circle_programs(table2, machine, linuxcnc, inverse=fine, tests=["a"], chord_mm=1e-4)
-    assert slow.points > 4500
-    assert slow.feed_s > 1.3 * slow.nominal_feed_s
+    assert slow.chord_um <= 0.1
+    reached = float(re.search(r"reaches F(\d+)", str(refused.value))[1])
+    assert slow.feed_s == pytest.approx(slow.nominal_feed_s * 1000.0 / reached, rel=0.01)
     assert "--prefer accuracy costs" in slow.text
+
+
+def test_the_feed_that_a_refusal_of_ramps_names_is_kept(linuxcnc, table2, crooked):
+    """Pieces for that feed are shorter than those that it was found with."""
+    machine = replace(crooked.machine, acceleration_mm_s2=500.0)
+    inverse = Inverse(MachineModel(machine, crooked.sources), prefer=Prefer.FEED)
+    test = table2.tests["a"]
+
+    def written(feed_mm_min: float) -> list[Program]:
+        circle = replace(test.circle, feed_mm_min=feed_mm_min)
+        plan = Plan("one circle", {"a": replace(test, circle=circle, directions=test.directions[:1])})
+        return circle_programs(plan, machine, linuxcnc, inverse=inverse, approach=None)
+
+    with pytest.raises(StationError, match="F3000 cannot be kept with --prefer feed either") as refused:
+        written(3000.0)
+    feed_mm_min = float(re.search(r"give F(\d+) or less", str(refused.value))[1])
+    assert 2900.0 < feed_mm_min < 3000.0
+    (program,) = written(feed_mm_min)
+    assert program.feed_s <= KEPT * program.nominal_feed_s
 
 
 def test_needed_length_and_reached_speed_are_inverses(linuxcnc, reference):

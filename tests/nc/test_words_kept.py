@@ -126,6 +126,17 @@ def test_a_feed_that_mixes_systems_is_guarded(linuxcnc, crooked):
     assert linuxcnc.read(done, "done.ngc").guard == ("G54",)
 
 
+@pytest.mark.parametrize("move", ["G0 X60 Y23", "G1 X60 F100"])
+def test_an_increment_in_another_system_is_guarded(linuxcnc, crooked, move):
+    """From X5 in the system in force by 60 mm is X65 there, and in G54 only where the two are one."""
+    text = FIRST + f"G1 X5 F100\nG54 G91\n{move}\nM2\n"
+    done = compensated_program(linuxcnc.read(text, "part.ngc"), linuxcnc, Inverse(crooked)).text
+    assert linuxcnc.read(done, "done.ngc").guard == ("G54",)
+    again = FIRST + f"G1 X5 F100\nG91\n{move}\nG90 G54 G0 X1 Y2 Z-1000 A0 B0 C0\nG91 {move}\nM2\n"
+    done = compensated_program(linuxcnc.read(again, "part.ngc"), linuxcnc, Inverse(crooked)).text
+    assert linuxcnc.read(done, "done.ngc").guard is None
+
+
 # The guard.
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import accumulate, groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -97,13 +97,18 @@ def _said(event: Event) -> str:
     return event.said or event.kind
 
 
+def _spoken(events: list[Event]) -> list[int]:
+    """How many other events come before each move."""
+    others = accumulate(event.kind not in MOVES for event in events)
+    return [count for count, event in zip(others, events, strict=True) if event.kind in MOVES]
+
+
 class _Walk:
     def __init__(self, wanted: list[Event], done: list[Event], model: MachineModel) -> None:
         _same("what is said", said(wanted), said(done))
         self.wanted = [event for event in wanted if event.kind in MOVES]
         self.done = [event for event in done if event.kind in MOVES]
-        self.spoken = [sum(e.kind not in MOVES for e in wanted[:k]) for k, e in enumerate(wanted) if e.kind in MOVES]
-        self.spoken_done = [sum(e.kind not in MOVES for e in done[:k]) for k, e in enumerate(done) if e.kind in MOVES]
+        self.spoken, self.spoken_done = _spoken(wanted), _spoken(done)
         commanded = np.array([event.pose for event in self.done])
         middle = commanded.copy()
         middle[1:] = (commanded[1:] + commanded[:-1]) / 2.0

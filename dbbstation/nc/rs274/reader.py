@@ -190,6 +190,7 @@ class _Interpreter:
         distance, centres = block.code(Group.DISTANCE), block.code(Group.ARC_DISTANCE)
         if distance is not None:
             self._absolute = distance == 90.0  # noqa: PLR2004
+            self.path.increments = not self._absolute
         if centres is not None:
             self._absolute_centres = centres == 90.1  # noqa: PLR2004
         if Group.CYCLE in block.codes:

@@ -4,6 +4,9 @@
 LinuxCNC starts it as its DISPLAY, in the folder of the run, with the system's Python, which has the module `linuxcnc`.
 It reads `start.txt` (X, Y, Z, A, B and C) and `program.ngc`; it writes `samples.txt` (what `halsampler -t` prints) and `ended.txt`,
 which holds "ended" or what went wrong.
+
+A planner whose queue runs empty between two moves stops there, and blends with a move that it has begun already; both are
+wrong by themselves and say nothing of the program. The clock may run too fast for the interpreter, so this is looked for.
 """
 
 import pathlib
@@ -16,6 +19,13 @@ import linuxcnc
 HERE = pathlib.Path(__file__).resolve().parent
 PATIENCE_S = 20.0
 """For everything but the program itself."""
+
+FILLED, EMPTY = 20, 2
+"""Moves in the planner's queue: more than the first, and it has begun to follow a path; no more than the second, and it runs out."""
+
+BEHIND = "the interpreter fell behind the planner"
+
+WAITS = {linuxcnc.EXEC_WAITING_FOR_MOTION, linuxcnc.EXEC_WAITING_FOR_MOTION_AND_IO, linuxcnc.EXEC_WAITING_FOR_DELAY}
 
 command, status, errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
 
@@ -39,6 +49,22 @@ def refused():
     """What LinuxCNC complains about, apart from messages of the program."""
     told = errors.poll()
     return "" if told is None or told[0] in {linuxcnc.OPERATOR_TEXT, linuxcnc.OPERATOR_DISPLAY} else str(told[1])
+
+
+class Queue:
+    """Whether the planner's queue runs out although the program goes on."""
+
+    def __init__(self):
+        self.filled = False
+
+    def look(self):
+        # Before dwells and stops, and at the end of the program, the queue empties as it should.
+        if status.exec_state in WAITS or status.interp_state != linuxcnc.INTERP_READING:
+            self.filled = False
+        elif status.queue > FILLED:
+            self.filled = True
+        elif self.filled and status.queue <= EMPTY:
+            raise RuntimeError(BEHIND)
 
 
 def prepare():
@@ -68,18 +94,20 @@ def run():
         sampler = subprocess.Popen(["halsampler", "-t"], stdout=samples)  # noqa: S607 - as LinuxCNC has it
         subprocess.run(["halcmd", "setp", "sampler.0.enable", "1"], check=True)  # noqa: S607 - likewise
         command.auto(linuxcnc.AUTO_RUN, 0)
-        command.wait_complete()
-        time.sleep(0.1)
+        # `wait_complete` would wait for the program.
+        until(lambda: status.interp_state != linuxcnc.INTERP_IDLE, "starting the program")
+        queue = Queue()
         while True:
             status.poll()
             if idle():
                 break
+            queue.look()
             if status.paused or status.interp_state == linuxcnc.INTERP_PAUSED:
                 command.auto(linuxcnc.AUTO_RESUME)
             fault = refused()
             if fault:
                 raise RuntimeError(fault)
-            time.sleep(0.01)
+            time.sleep(0.001)
         time.sleep(0.2)
         sampler.terminate()
         sampler.wait()

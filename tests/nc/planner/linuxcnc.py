@@ -5,7 +5,8 @@ is made for it.
 
 LinuxCNC runs in real time. With `faster` its clock runs that many times as fast: the servo period and all times are divided
 by it, speeds multiplied by it, accelerations by its square, so that every servo cycle calculates with the same way per
-cycle and the same change of it. Samples are given with the times that they would have at the usual clock.
+cycle and the same change of it. Samples are given with the times that they would have at the usual clock. The interpreter
+is not part of that clock. Where it falls behind the planner, the program is run again with a slower one.
 """
 
 from __future__ import annotations
@@ -31,6 +32,14 @@ PERIOD_NS = 1_000_000
 
 GREATEST_MM_S, GREATEST_DEG_S, GREATEST_DEG_S2 = 500.0, 600.0, 10_000.0
 """Speeds of axes, and the acceleration of the angles: no limit for any program here."""
+
+
+BEHIND = "the interpreter fell behind the planner"
+"""As `drive.py` has it."""
+
+
+class BehindError(RuntimeError):
+    """The planner's queue ran empty on the way: what it did then is not what the program asks for."""
 
 
 def missing() -> str:
@@ -74,12 +83,24 @@ def run(text: str, *, mm_s2: float = 1000.0, faster: int = 1, patience_s: float 
     Args:
         text: the program; its first move names X, Y, Z, A, B and C.
         mm_s2: acceleration of X, Y and Z [mm/s²].
-        faster: how many times as fast as usual the clock runs.
+        faster: how many times as fast as usual the clock runs; halved as long as the interpreter falls behind.
         patience_s: how long to wait for its end.
 
     Raises:
         RuntimeError: LinuxCNC refuses the program or does not end.
+        BehindError: the interpreter falls behind at the usual clock too.
     """
+    while True:
+        try:
+            return run_once(text, mm_s2, faster, patience_s)
+        except BehindError:
+            if faster == 1:
+                raise
+            faster = max(faster // 2, 1)
+
+
+def run_once(text: str, mm_s2: float, faster: int, patience_s: float = 600.0) -> Ran:
+    """Run a program with this clock, or raise; arguments as for `run`."""
     with tempfile.TemporaryDirectory(prefix="dbbstation-planner-") as made, _Alone():
         folder = Path(made)
         _configure(folder, mm_s2, faster)
@@ -87,6 +108,8 @@ def run(text: str, *, mm_s2: float = 1000.0, faster: int = 1, patience_s: float 
         (folder / "start.txt").write_text(_first_point(text))
         printed = _started(folder, patience_s)
         ended = folder / "ended.txt"
+        if ended.exists() and ended.read_text() == BEHIND:
+            raise BehindError(BEHIND)
         if not ended.exists() or ended.read_text() != "ended":
             raise RuntimeError(ended.read_text() if ended.exists() else f"LinuxCNC did not start:\n{printed}")
         return _read(folder / "samples.txt", PERIOD_NS / 1e9)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -20,12 +19,13 @@ from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.tolerated import sizes_of
 from dbbstation.trace.circle import RawCircle
-from studies.fleet import over_machines
+from studies.kept_draws import drawn
 from tests.plant.noise import Noise
 from tests.plant.serial import Axis, SerialMachine
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
 
 COVERAGE_FACTOR = 2.0
 """k of U = k u, as it is printed."""
@@ -66,15 +66,21 @@ class Cell:
         white, correlated = COLOURS[self.colour]
         return Noise(self.level_um * white, self.level_um * correlated, 0.8)
 
+    @property
+    def name(self) -> str:
+        """As it stands in a table."""
+        return f"{self.colour} {self.level_um:g} µm"
+
 
 CELLS = tuple(Cell(level, colour) for colour in COLOURS for level in LEVELS_UM)
 
-Hits = dict[tuple[str, str], list[bool]]
-"""Whether intervals held the truth, by row and kind of circle."""
-
 
 def coverage_of_circles(
-    draws: int, seed: int, progress: Callable[[int], None], cells: Sequence[Cell] = CELLS
+    draws: int,
+    seed: int,
+    progress: Callable[[int], None],
+    cells: Sequence[Cell] = CELLS,
+    keep: Path | None = None,
 ) -> dict[str, Any]:
     """Draw circles, and count how often U about each figure contains the truth.
 
@@ -82,21 +88,30 @@ def coverage_of_circles(
         draws: for each noise; the three kinds of circles take turns.
         seed: of the first draw.
         progress: called with how many draws are done.
-        cells: noises.
+        cells: noises; they take turns too, so that a study that is cut short has as many of each.
+        keep: file of the draws; None where none are kept.
     """
-    rows: dict[str, dict[str, Any]] = {}
-    done = 0
-    for cell in cells:
-        hits: Hits = defaultdict(list)
-        for one in over_machines(partial(_drawn, cell), range(seed, seed + draws)):
-            for row, inside in one:
-                hits[row].append(inside)
-            done += 1
-            progress(done)
-        for (figure, kind), held in hits.items():
-            by_noise = rows.setdefault(figure, {}).setdefault(f"{cell.colour} {cell.level_um:g} µm", {})
-            by_noise[kind] = {"inside": sum(held), "draws": len(held)}
-    return {"draws": draws, "rows": rows}
+    counts: dict[str, dict[str, Any]] = {}
+    what = f"figures of circles, {', '.join(cell.name for cell in cells)}, from seed {seed}"
+    results = drawn(partial(_numbered, tuple(cells), seed), range(draws * len(cells)), keep, what)
+    for number, result in enumerate(results):
+        cell, kind = cells[number % len(cells)], _kind(seed + number // len(cells))
+        for figure, inside in result:
+            row = counts.setdefault(figure, {}).setdefault(cell.name, {})
+            count = row.setdefault(kind, {"inside": 0, "draws": 0})
+            count["inside"] += inside
+            count["draws"] += 1
+        progress(number + 1)
+    return {"draws": draws, "rows": counts}
+
+
+def _numbered(cells: Sequence[Cell], seed: int, number: int) -> list[tuple[str, bool]]:
+    """One draw by its number: noises take turns with each seed."""
+    return _drawn(cells[number % len(cells)], seed + number // len(cells))
+
+
+def _kind(seed: int) -> str:
+    return KINDS[seed % len(KINDS)]
 
 
 def pooled(row: dict[str, Any], noise: str = "", kind: str = "") -> tuple[int, int]:
@@ -110,11 +125,10 @@ def pooled(row: dict[str, Any], noise: str = "", kind: str = "") -> tuple[int, i
     return sum(c["inside"] for c in chosen), sum(c["draws"] for c in chosen)
 
 
-def _drawn(cell: Cell, seed: int) -> list[tuple[tuple[str, str], bool]]:
+def _drawn(cell: Cell, seed: int) -> list[tuple[str, bool]]:
     """One machine: its circle in both directions, noise and errors of bar and ball drawn; rows and whether they hold."""
     rng = np.random.default_rng([seed, int(1000 * cell.level_um), len(cell.colour)])
-    kind = KINDS[seed % len(KINDS)]
-    size = dict(zip(KINDS, (0.0, 0.3 * cell.level_um, 1.0), strict=True))[kind]
+    size = dict(zip(KINDS, (0.0, 0.3 * cell.level_um, 1.0), strict=True))[_kind(seed)]
     machine = _machine(rng, size)
     centre_mm = 0.02 * size * rng.standard_normal(2)
     radius_um = 5.0 * size * rng.standard_normal()
@@ -137,8 +151,7 @@ def _drawn(cell: Cell, seed: int) -> list[tuple[tuple[str, str], bool]]:
         u_ball_z_um=U_BALL_UM,
     )
     found = [*_of_one(read[0], true[0], known, seed), *_of_both(analyse_pair(*read), analyse_pair(*true), known)]
-    found += _of_look(read, machine)
-    return [((figure, kind), inside) for figure, inside in found]
+    return [(figure, bool(inside)) for figure, inside in (*found, *_of_look(read, machine))]
 
 
 def _machine(rng: np.random.Generator, size: float) -> SerialMachine:

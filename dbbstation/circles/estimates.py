@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -17,7 +18,7 @@ from dbbstation.circles.extremes import (
     least_of,
     range_of,
 )
-from dbbstation.circles.form import FormAndNoise, form_and_noise
+from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.path import path_of
 from dbbstation.circles.quantity import Quantity
 from dbbstation.circles.strip import strip_widths
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
+    from dbbstation.circles.form import FormAndNoise
     from dbbstation.circles.path import Filter
 
 CLEAR = 2.0
@@ -77,7 +79,7 @@ def _apart(one: CircleAnalysis) -> FormAndNoise:
         return form_and_noise(one.residual_um)
     ramp_um = one.closure.height_um * one.raw.phi_deg / FULL_TURN_DEG
     apart = form_and_noise(one.residual_um - ramp_um)
-    return FormAndNoise(apart.form_um + ramp_um, apart.power_um2)
+    return replace(apart, form_um=apart.form_um + ramp_um)
 
 
 def _drawn(one: CircleAnalysis) -> DrawnPath:
@@ -89,7 +91,7 @@ def _drawn(one: CircleAnalysis) -> DrawnPath:
 
 def _path(form_um: NDArray[np.float64], apart: FormAndNoise, one: CircleAnalysis, seed: int) -> DrawnPath:
     passed = one.chosen.passed(np.arange(len(form_um) // 2 + 1.0))
-    return drawn_path(FormAndNoise(form_um, apart.power_um2), one.path.theta_deg, passed, seed)
+    return drawn_path(replace(apart, form_um=form_um), one.path.theta_deg, passed, seed)
 
 
 def pair_estimate(pair: PairAnalysis, quantity: Quantity) -> Estimate | None:
@@ -140,5 +142,5 @@ def _hysteresis(pair: PairAnalysis) -> Estimate:
     apart = form_and_noise(1e3 * (radii[0] - radii[1]))
     chosen = pair.one.chosen
     passed = chosen.passed(np.arange(len(theta_deg) // 2 + 1.0))
-    own = FormAndNoise(_filtered(apart.form_um, chosen), apart.power_um2)
+    own = replace(apart, form_um=_filtered(apart.form_um, chosen))
     return estimated([drawn_path(own, theta_deg, passed, 2)], farthest_of, pair.h_um)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.errors import InputError, Problem, TraceError
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
@@ -37,7 +37,7 @@ from dbbstation.files.source_text import read_bytes, unreadable
 from dbbstation.files.yaml.schema import validate
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
-from dbbstation.trace.cut import lost_on_turn, unusable_on_turn
+from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
 from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 
 if TYPE_CHECKING:
@@ -192,6 +192,19 @@ class SessionFolder(SessionDetails):
         unusable = unusable_on_turn(recording, self.circle(run))
         what = too_many_lost(lost, kept, self.plan.largest_loss_percent, unusable)
         return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
+
+    def unusable(self, run: RunEntry) -> str:
+        """Return why no figures of a run can be worked out, by its file alone; empty where they can."""
+        try:
+            recording = self.load(run).recording
+            if lost := self.loss(run, recording):
+                return lost[0].what
+            cut(recording, self.circle(run))
+        except InputError as error:
+            return error.problems[0].what
+        except TraceError as error:
+            return str(error)
+        return ""
 
     def _implausible(self, run: RunEntry, recording: Recording) -> list[Problem]:
         """Units that the file itself cannot tell: only the planned circle says how long and how far."""

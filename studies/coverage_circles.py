@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.stats import binom
 
 from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis, analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import Budget, SetUpKnowledge, budgets, pair_budgets
@@ -19,6 +20,7 @@ from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.tolerated import sizes_of
 from dbbstation.trace.circle import RawCircle
+from studies.coverage_rows import LEAST, MOST
 from studies.kept_draws import drawn
 from tests.plant.noise import Noise
 from tests.plant.serial import Axis, SerialMachine
@@ -46,6 +48,24 @@ KINDS = ("perfect", "as large as noise", "worn machine")
 
 FILTERS = (Filter.UPR_15, Filter.UPR_50, Filter.UPR_150)
 GAUSSIAN = "G, Gaussian filters"
+SURE = "printed without U"
+
+CHANCE = 1e-4
+"""Chance at which a row that is as promised counts as not."""
+
+_NOISE_OR_FORM = (
+    "U holds that all of the spectrum is noise and that only its end is; intervals of small ranges reach to zero"
+)
+REASONS = {
+    **dict.fromkeys(
+        ("G", "G(LS)", "G(b)", "G(b)(LS)", "H", GAUSSIAN, "G, 30 UPR", "G(LS), 30 UPR"),
+        _NOISE_OR_FORM,
+    ),
+    "reversal spike": "U holds spikes of all lengths that may be",
+    "cyclic error": "seen from a wave that noise shows in one of a thousand scans",
+    "cyclic error, not seen: below": "the bound is that of the strongest of all waves that are tried",
+}
+"""Why more than 97 % of the intervals of a figure hold the truth."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +122,8 @@ def coverage_of_circles(
             count["inside"] += inside
             count["draws"] += 1
         progress(number + 1)
-    return {"draws": draws, "rows": counts}
+    found = {"draws": draws, "rows": counts, "reasons": REASONS}
+    return found | {"faults": faults_of(found)}
 
 
 def _numbered(cells: Sequence[Cell], seed: int, number: int) -> list[tuple[str, bool]]:
@@ -112,6 +133,21 @@ def _numbered(cells: Sequence[Cell], seed: int, number: int) -> list[tuple[str, 
 
 def _kind(seed: int) -> str:
     return KINDS[seed % len(KINDS)]
+
+
+def faults_of(found: dict[str, Any]) -> list[str]:
+    """Return the rows that are not as promised beyond chance: too few inside, or too many and no reason beside it."""
+    faults = []
+    for figure, row in found["rows"].items():
+        inside, of = pooled(row)
+        if SURE in figure:
+            if inside < of:
+                faults.append(f"{figure}: {of - inside} of {of} are not")
+        elif binom.cdf(inside, of, LEAST) < CHANCE:
+            faults.append(f"{figure}: only {100 * inside / of:.1f} % inside")
+        elif binom.sf(inside - 1, of, MOST) < CHANCE and figure not in REASONS:
+            faults.append(f"{figure}: {100 * inside / of:.1f} % inside, and no reason beside it")
+    return faults
 
 
 def pooled(row: dict[str, Any], noise: str = "", kind: str = "") -> tuple[int, int]:
@@ -189,7 +225,7 @@ def _of_one(read: CircleAnalysis, true: CircleAnalysis, known: SetUpKnowledge, s
         yield _row(quantity), _holds(budget, _truth(true, quantity))
     for quantity in sorted(ABSOLUTE - {Quantity.D}):
         nothing = budgets(read, UNKNOWN, [quantity])[quantity]
-        yield f"{_row(quantity)}, bar not known: printed without U", nothing.u_um is None
+        yield f"{_row(quantity)}, bar not known: {SURE}", nothing.u_um is None
     chosen = FILTERS[seed % len(FILTERS)]
     budget = budgets(refiltered(read, chosen), known, [Quantity.G])[Quantity.G]
     yield GAUSSIAN, _holds(budget, refiltered(true, chosen).g_um)

@@ -44,6 +44,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
       dbbstation session list 2026-11-20-hexapod-7 --json
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json, print_table
+    from dbbstation.counting import repeats_in_order
     from dbbstation.files.recordings.session import read_session
 
     read = read_session(folder)
@@ -62,7 +63,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
                 "counts": None if run.counts is None else run.counts.data(),
                 "file": run.path.relative_to(read.folder).as_posix(),
             }
-            for run in read.runs
+            for run in repeats_in_order(read.runs)
         ]
         print_json({"session": read.name, "runs": runs, "missing": missing})
         return
@@ -75,7 +76,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
             "" if run.counts is None else run.counts.text,
             run.reason,
         ]
-        for run in read.runs
+        for run in repeats_in_order(read.runs)
     ]
     print_table(["run", "started", "mounting", "state", "samples", "why"], rows)
     echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")

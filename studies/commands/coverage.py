@@ -147,10 +147,15 @@ def _circles(draws: int, seed: int, keep: Path | None, *, as_json: bool) -> dict
             name,
             *(percent(pooled(row, noise=noise)) for noise in noises),
             *(percent(pooled(row, kind=kind)) for kind in KINDS),
+            percent(pooled(row)),
+            pooled(row)[1],
+            found["reasons"].get(name, ""),
         ]
         for name, row in found["rows"].items()
     ]
-    print_table(["figure", *noises, *KINDS], rows)
+    print_table(["figure", *noises, *KINDS, "all", "values", "why more than 97 %"], rows)
+    for fault in found["faults"]:
+        click.echo(f"NOT as promised: {fault}")
     return found
 
 

@@ -199,3 +199,31 @@ def test_on_a_terminal_the_reason_is_asked_for(capsys, folder, half_lost, monkey
     assert code == 0
     assert "lost" in err
     assert read_session(folder).runs[1].reason == "feed-in only was lost"
+
+
+def test_repeats_are_listed_as_they_are_counted(capsys, folder):
+    """A list of files sorted by name has a-ccw-10 before a-ccw-2."""
+    entry, *others = read_session(folder).runs
+    named = f"{entry.test}, direction: {entry.direction}"
+    numbers = (1, 10, 2)
+    lines = []
+    for repeat in numbers:
+        path = entry.path.with_name(f"{entry.test}-{entry.direction}-{repeat}.csv")
+        path.write_text(re.sub(r"(repeat\W+)1\b", rf"\g<1>{repeat}", entry.path.read_text(), count=1))
+        lines.append(f"  - {{test: {named}, repeat: {repeat}, file: runs/{path.name}, state: accepted}}")
+    text = "format: dbb-session/1\nmachine: machine.yaml\nplan: plan.yaml\nruns:\n" + "\n".join(lines) + "\n"
+    (folder / "session.yaml").write_text(text, encoding="utf-8")
+    for other in others:
+        other.path.unlink()
+    seal_session(folder)
+    told = json.loads(run(capsys, "list", folder, "--json")[1])
+    assert [one["repeat"] for one in told["runs"]] == [1, 2, 10]
+    assert [one.repeat for one in read_session(folder).in_state(RunState.ACCEPTED)] == [1, 2, 10]
+    assert main_circles(capsys, folder) == ["1", "2", "10"]
+
+
+def main_circles(capsys, folder):
+    with pytest.raises(SystemExit):
+        main(["circles", str(folder)])
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    return [row[2] for row in rows if len(row) > 3 and row[1] in {"ccw", "cw"}]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.counting import natural, repeats_in_order
 from dbbstation.errors import InputError, Problem, TraceError
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
@@ -92,8 +93,8 @@ class SessionFolder(SessionDetails):
         return tuple(path.relative_to(self.folder).as_posix() for path in paths)  # type: ignore[return-value]  # two of them
 
     def in_state(self, *states: RunState) -> tuple[RunEntry, ...]:
-        """Return the runs in one of these states."""
-        return tuple(run for run in self.runs if run.state in states)
+        """Return the runs in one of these states; repeats of a circle as they are counted."""
+        return repeats_in_order(run for run in self.runs if run.state in states)
 
     def circle(self, run: RunEntry) -> Circle:
         """Return the circle that a run was commanded, its centre as programmed."""
@@ -335,7 +336,7 @@ def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Pr
     """Runs that were being recorded when the station died before it could note them."""
     listed = {run.path.name for run in entries}
     found = []
-    for path in sorted(folder.glob(f"runs/*.csv{PART}")):
+    for path in sorted(folder.glob(f"runs/*.csv{PART}"), key=lambda one: natural(one.name)):
         entry = None if path.name in listed else part_entry(path)
         if entry is None or path.name in listed:
             continue
@@ -351,7 +352,8 @@ def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Pr
 def unlisted_sealed(session: SessionFolder) -> tuple[Path, ...]:
     """Return the sealed runs in a session's folder that its session file does not list."""
     listed = {run.path.name for run in session.runs}
-    return tuple(path for path in sorted((session.folder / "runs").glob("*.csv")) if path.name not in listed)
+    inside = sorted((session.folder / "runs").glob("*.csv"), key=lambda one: natural(one.name))
+    return tuple(path for path in inside if path.name not in listed)
 
 
 def part_entry(path: Path) -> RunEntry | None:

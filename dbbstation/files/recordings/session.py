@@ -36,6 +36,7 @@ from dbbstation.files.recordings.session_set_up import check_set_up_errors, moun
 from dbbstation.files.recordings.session_store import REBUILD, document_in_force, log_faults
 from dbbstation.files.source_text import read_bytes, unreadable
 from dbbstation.files.yaml.schema import validate
+from dbbstation.plan.bar import UNKNOWN_BAR_MM
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
 from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
@@ -118,7 +119,9 @@ class SessionFolder(SessionDetails):
         """
         ball = self.plan.tests[run.test].ball
         mounted = mounted_name(self.plan, run.test, run.mounting)
-        long_mm, uncertainty_mm = (0.0, 0.0) if self.bar is None else self.bar.reads_long_mm(self.bar_temp_c(logged))
+        long_mm, uncertainty_mm = (
+            (0.0, UNKNOWN_BAR_MM) if self.bar is None else self.bar.reads_long_mm(self.bar_temp_c(logged))
+        )
         readings = (r for r in self.set_up_errors if mounted_name(self.plan, r.test, r.mounting) == mounted)
         return Setup(
             session=self.name,

@@ -79,6 +79,8 @@ class DrawnPath:
         theta_deg: its middle, rising, shape (s,) [deg].
         sigma_um: standard deviation of one sample's noise [µm].
         least: share of that which noise has where all of its spectrum is as low as at its end.
+        order: samples by angle, shape (m,).
+        starts: where each sector begins among them, shape (s,).
     """
 
     form_um: NDArray[np.float64]
@@ -87,6 +89,12 @@ class DrawnPath:
     theta_deg: NDArray[np.float64]
     sigma_um: float
     least: float
+    order: NDArray[np.int64]
+    starts: NDArray[np.int64]
+
+    def with_form(self, form_um: NDArray[np.float64]) -> DrawnPath:
+        """Return the same noise beside another form, of samples in time order, shape (n,) [µm]."""
+        return replace(self, form_um=_means(form_um, self.order, self.starts))
 
 
 def drawn_path(
@@ -121,15 +129,21 @@ def drawn_path(
         noise = drawn_noise(apart, passed, DRAWS // BLOCKS, rng)[:, order]
         highest.append(np.maximum.reduceat(noise, starts, axis=1))
         lowest.append(np.minimum.reduceat(noise, starts, axis=1))
-    sizes = np.diff(np.append(starts, len(order)))
     return DrawnPath(
-        form_um=np.add.reduceat(apart.form_um[order], starts) / sizes,
+        form_um=_means(apart.form_um, order, starts),
         highest_um=np.concatenate(highest),
         lowest_um=np.concatenate(lowest),
         theta_deg=middle_deg,
         sigma_um=float(np.sqrt((2.0 * power.sum() - power[0]) / count)),
         least=_least_share(apart.power_um2, passed),
+        order=order,
+        starts=starts,
     )
+
+
+def _means(values: NDArray[np.float64], order: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Means over sectors, shape (s,)."""
+    return np.asarray(np.add.reduceat(values[order], starts) / np.diff(np.append(starts, len(order))))
 
 
 def _least_share(power_um2: NDArray[np.float64], passed: NDArray[np.float64]) -> float:

@@ -17,6 +17,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.counting import natural
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -95,7 +97,7 @@ class InputError(StationError):
     """A file's content is wrong; every fault found is kept, and the first of very many are listed."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems = tuple(sorted(problems))
+        self.problems = tuple(sorted(problems, key=lambda one: (natural(one.file), one)))
         lines = [str(problem) for problem in self.problems[:MOST_LISTED]]
         if len(self.problems) > MOST_LISTED:
             lines.append(f"and {len(self.problems) - MOST_LISTED} more faults")

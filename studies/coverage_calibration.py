@@ -20,7 +20,7 @@ from dbbstation.model.uncertainty import predicted_poses
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
 from studies.coverage_rows import row_of
-from studies.fleet import over_machines
+from studies.kept_draws import drawn
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.noise import Noise
@@ -80,6 +80,9 @@ CASES = (
     Case("raised bars, gravity fitted", raised=True, tolerance=False, gravity=True),
 )
 
+Figures = dict[str, tuple[list[float], list[float | None]]]
+"""Found less true values of one draw and their stated standard uncertainties, by figure; None where none is stated."""
+
 FIGURES = (
     "strut lengths",
     "base joints X",
@@ -91,30 +94,45 @@ FIGURES = (
 
 
 def coverage_of_calibration(
-    cases: Sequence[Case], seeds: Sequence[int], progress: Callable[[int], None] = lambda _done: None
+    cases: Sequence[Case],
+    seeds: range,
+    progress: Callable[[int], None] = lambda _done: None,
+    keep: Path | None = None,
 ) -> list[Row]:
     """Draw machines, record, calibrate, predict, and compare with what was drawn.
 
     Args:
-        cases: circumstances; each sees all machines.
+        cases: circumstances; each sees all machines, and they take turns.
         seeds: of the machines.
         progress: called with how many sessions are done.
+        keep: file of the draws; None where none are kept.
     """
-    rows, done = [], 0
-    for case in cases:
-        drawn = []
-        for one in over_machines(partial(_drawn, case), seeds):
-            drawn.append(one)
-            done += 1
-            progress(done)
+    what = f"calibrations, {'; '.join(case.name for case in cases)}, from seed {seeds.start}"
+    results = drawn(partial(_numbered, tuple(cases), seeds.start), range(len(seeds) * len(cases)), keep, what)
+    by_case: list[list[Figures]] = [[] for _ in cases]
+    for number, result in enumerate(results):
+        by_case[number % len(cases)].append(result)
+        progress(number + 1)
+    rows = []
+    for case, found in zip(cases, by_case, strict=True):
         for figure in FIGURES:
-            if figure not in drawn[0]:
+            if figure not in found[0]:
                 continue
-            off, u = (np.array([one[figure][k] for one in drawn]) for k in (0, 1))
+            # JSON has no NaN: what is not stated is null there.
+            off, u = (np.array([one[figure][k] for one in found], dtype=np.float64) for k in (0, 1))
             reason = OF_A_FORMULA if case.gravity and (figure == "compliance" or "predicted" in figure) else ""
             unit, scale = ("µm/kN", 1.0) if figure == "compliance" else ("µm", 1e3)
             rows.append(row_of(case.name, figure, scale * off, scale * u, unit, reason))
     return rows
+
+
+def _numbered(cases: Sequence[Case], seed: int, number: int) -> Figures:
+    """One draw by its number: cases take turns with each seed."""
+    found = _drawn(cases[number % len(cases)], seed + number // len(cases))
+    return {
+        figure: (off.tolist(), [None if np.isnan(one) else float(one) for one in u])
+        for figure, (off, u) in found.items()
+    }
 
 
 def _drawn(case: Case, seed: int) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:

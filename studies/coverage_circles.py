@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.stats import binom
 
 from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis, analyse, analyse_pair, refiltered
 from dbbstation.circles.budget import Budget, SetUpKnowledge, budgets, pair_budgets
@@ -20,12 +20,14 @@ from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.tolerated import sizes_of
 from dbbstation.trace.circle import RawCircle
-from studies.fleet import over_machines
+from studies.coverage_rows import LEAST, MOST
+from studies.kept_draws import drawn
 from tests.plant.noise import Noise
 from tests.plant.serial import Axis, SerialMachine
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
 
 COVERAGE_FACTOR = 2.0
 """k of U = k u, as it is printed."""
@@ -46,6 +48,24 @@ KINDS = ("perfect", "as large as noise", "worn machine")
 
 FILTERS = (Filter.UPR_15, Filter.UPR_50, Filter.UPR_150)
 GAUSSIAN = "G, Gaussian filters"
+SURE = "printed without U"
+
+CHANCE = 1e-4
+"""Chance at which a row that is as promised counts as not."""
+
+_NOISE_OR_FORM = (
+    "U holds that all of the spectrum is noise and that only its end is; intervals of small ranges reach to zero"
+)
+REASONS = {
+    **dict.fromkeys(
+        ("G", "G(LS)", "G(b)", "G(b)(LS)", "H", GAUSSIAN, "G, 30 UPR", "G(LS), 30 UPR"),
+        _NOISE_OR_FORM,
+    ),
+    "reversal spike": "U holds spikes of all lengths that may be",
+    "cyclic error": "seen from a wave that noise shows in one of a thousand scans",
+    "cyclic error, not seen: below": "the bound is that of the strongest of all waves that are tried",
+}
+"""Why more than 97 % of the intervals of a figure hold the truth."""
 
 
 @dataclass(frozen=True)
@@ -66,15 +86,21 @@ class Cell:
         white, correlated = COLOURS[self.colour]
         return Noise(self.level_um * white, self.level_um * correlated, 0.8)
 
+    @property
+    def name(self) -> str:
+        """As it stands in a table."""
+        return f"{self.colour} {self.level_um:g} µm"
+
 
 CELLS = tuple(Cell(level, colour) for colour in COLOURS for level in LEVELS_UM)
 
-Hits = dict[tuple[str, str], list[bool]]
-"""Whether intervals held the truth, by row and kind of circle."""
-
 
 def coverage_of_circles(
-    draws: int, seed: int, progress: Callable[[int], None], cells: Sequence[Cell] = CELLS
+    draws: int,
+    seed: int,
+    progress: Callable[[int], None],
+    cells: Sequence[Cell] = CELLS,
+    keep: Path | None = None,
 ) -> dict[str, Any]:
     """Draw circles, and count how often U about each figure contains the truth.
 
@@ -82,21 +108,46 @@ def coverage_of_circles(
         draws: for each noise; the three kinds of circles take turns.
         seed: of the first draw.
         progress: called with how many draws are done.
-        cells: noises.
+        cells: noises; they take turns too, so that a study that is cut short has as many of each.
+        keep: file of the draws; None where none are kept.
     """
-    rows: dict[str, dict[str, Any]] = {}
-    done = 0
-    for cell in cells:
-        hits: Hits = defaultdict(list)
-        for one in over_machines(partial(_drawn, cell), range(seed, seed + draws)):
-            for row, inside in one:
-                hits[row].append(inside)
-            done += 1
-            progress(done)
-        for (figure, kind), held in hits.items():
-            by_noise = rows.setdefault(figure, {}).setdefault(f"{cell.colour} {cell.level_um:g} µm", {})
-            by_noise[kind] = {"inside": sum(held), "draws": len(held)}
-    return {"draws": draws, "rows": rows}
+    counts: dict[str, dict[str, Any]] = {}
+    what = f"figures of circles, {', '.join(cell.name for cell in cells)}, from seed {seed}"
+    results = drawn(partial(_numbered, tuple(cells), seed), range(draws * len(cells)), keep, what)
+    for number, result in enumerate(results):
+        cell, kind = cells[number % len(cells)], _kind(seed + number // len(cells))
+        for figure, inside in result:
+            row = counts.setdefault(figure, {}).setdefault(cell.name, {})
+            count = row.setdefault(kind, {"inside": 0, "draws": 0})
+            count["inside"] += inside
+            count["draws"] += 1
+        progress(number + 1)
+    found = {"draws": draws, "rows": counts, "reasons": REASONS}
+    return found | {"faults": faults_of(found)}
+
+
+def _numbered(cells: Sequence[Cell], seed: int, number: int) -> list[tuple[str, bool]]:
+    """One draw by its number: noises take turns with each seed."""
+    return _drawn(cells[number % len(cells)], seed + number // len(cells))
+
+
+def _kind(seed: int) -> str:
+    return KINDS[seed % len(KINDS)]
+
+
+def faults_of(found: dict[str, Any]) -> list[str]:
+    """Return the rows that are not as promised beyond chance: too few inside, or too many and no reason beside it."""
+    faults = []
+    for figure, row in found["rows"].items():
+        inside, of = pooled(row)
+        if SURE in figure:
+            if inside < of:
+                faults.append(f"{figure}: {of - inside} of {of} are not")
+        elif binom.cdf(inside, of, LEAST) < CHANCE:
+            faults.append(f"{figure}: only {100 * inside / of:.1f} % inside")
+        elif binom.sf(inside - 1, of, MOST) < CHANCE and figure not in REASONS:
+            faults.append(f"{figure}: {100 * inside / of:.1f} % inside, and no reason beside it")
+    return faults
 
 
 def pooled(row: dict[str, Any], noise: str = "", kind: str = "") -> tuple[int, int]:
@@ -110,11 +161,10 @@ def pooled(row: dict[str, Any], noise: str = "", kind: str = "") -> tuple[int, i
     return sum(c["inside"] for c in chosen), sum(c["draws"] for c in chosen)
 
 
-def _drawn(cell: Cell, seed: int) -> list[tuple[tuple[str, str], bool]]:
+def _drawn(cell: Cell, seed: int) -> list[tuple[str, bool]]:
     """One machine: its circle in both directions, noise and errors of bar and ball drawn; rows and whether they hold."""
     rng = np.random.default_rng([seed, int(1000 * cell.level_um), len(cell.colour)])
-    kind = KINDS[seed % len(KINDS)]
-    size = dict(zip(KINDS, (0.0, 0.3 * cell.level_um, 1.0), strict=True))[kind]
+    size = dict(zip(KINDS, (0.0, 0.3 * cell.level_um, 1.0), strict=True))[_kind(seed)]
     machine = _machine(rng, size)
     centre_mm = 0.02 * size * rng.standard_normal(2)
     radius_um = 5.0 * size * rng.standard_normal()
@@ -137,8 +187,7 @@ def _drawn(cell: Cell, seed: int) -> list[tuple[tuple[str, str], bool]]:
         u_ball_z_um=U_BALL_UM,
     )
     found = [*_of_one(read[0], true[0], known, seed), *_of_both(analyse_pair(*read), analyse_pair(*true), known)]
-    found += _of_look(read, machine)
-    return [((figure, kind), inside) for figure, inside in found]
+    return [(figure, bool(inside)) for figure, inside in (*found, *_of_look(read, machine))]
 
 
 def _machine(rng: np.random.Generator, size: float) -> SerialMachine:
@@ -176,7 +225,7 @@ def _of_one(read: CircleAnalysis, true: CircleAnalysis, known: SetUpKnowledge, s
         yield _row(quantity), _holds(budget, _truth(true, quantity))
     for quantity in sorted(ABSOLUTE - {Quantity.D}):
         nothing = budgets(read, UNKNOWN, [quantity])[quantity]
-        yield f"{_row(quantity)}, bar not known: printed without U", nothing.u_um is None
+        yield f"{_row(quantity)}, bar not known: {SURE}", nothing.u_um is None
     chosen = FILTERS[seed % len(FILTERS)]
     budget = budgets(refiltered(read, chosen), known, [Quantity.G])[Quantity.G]
     yield GAUSSIAN, _holds(budget, refiltered(true, chosen).g_um)

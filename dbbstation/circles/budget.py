@@ -134,11 +134,7 @@ def budget_of(one: CircleAnalysis, quantity: Quantity, known: SetUpKnowledge) ->
 def _range(one: CircleAnalysis, quantity: Quantity, known: SetUpKnowledge) -> Budget:
     """Budget of an extreme of the path, or of the difference of two."""
     along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
-    two = np.sqrt(2.0) if quantity in {Quantity.G, Quantity.G_LS} else 1.0
-    terms = {
-        Cause.RESOLUTION: two * along * one.noise.resolution_um / ROUNDING,
-        Cause.CLOSURE: two * _closure_um(one) / ROUNDING,
-    }
+    terms = _of_extremes(one, 1 if quantity in ABSOLUTE else 2)
     missing, why = NOT_STATED, ""
     if quantity in ABSOLUTE:
         length = _length_terms(one, known, along)
@@ -150,6 +146,16 @@ def _range(one: CircleAnalysis, quantity: Quantity, known: SetUpKnowledge) -> Bu
         return Budget(quantity, terms, missing, read, read, TOO_FEW)
     terms[Cause.NOISE] = float(np.hypot(found.u_um, terms.get(Cause.NOISE, 0.0)))
     return Budget(quantity, terms, missing, found.value_um, found.as_read_um, why)
+
+
+def _of_extremes(one: CircleAnalysis, extremes: int) -> dict[Cause, float]:
+    """Terms that one extreme of the path has, or the difference of two, whatever its noise."""
+    along = one.raw.circle.bar_mm / one.raw.circle.radius_mm
+    root = float(np.sqrt(extremes))
+    return {
+        Cause.RESOLUTION: root * along * one.noise.resolution_um / ROUNDING,
+        Cause.CLOSURE: root * _closure_um(one) / ROUNDING,
+    }
 
 
 def _as_read(one: CircleAnalysis) -> dict[Quantity, float]:
@@ -189,7 +195,7 @@ def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[Quantity, Bu
 
 
 def _pair_range(pair: PairAnalysis, quantity: Quantity) -> Budget:
-    each = [_range(one, Quantity.G, SetUpKnowledge()).terms_um for one in (pair.one, pair.other)]
+    each = [_of_extremes(one, 2) for one in (pair.one, pair.other)]
     turned = float(np.hypot(pair.one.raw.start_uncertainty_deg, pair.other.raw.start_uncertainty_deg))
     terms = {
         cause: float(np.sqrt(np.mean([terms[cause] ** 2 for terms in each])))

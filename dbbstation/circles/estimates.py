@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
@@ -17,7 +18,7 @@ from dbbstation.circles.extremes import (
     least_of,
     range_of,
 )
-from dbbstation.circles.form import FormAndNoise, form_and_noise
+from dbbstation.circles.form import form_and_noise
 from dbbstation.circles.path import path_of
 from dbbstation.circles.quantity import Quantity
 from dbbstation.circles.strip import strip_widths
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
+    from dbbstation.circles.form import FormAndNoise
     from dbbstation.circles.path import Filter
 
 CLEAR = 2.0
@@ -49,12 +51,12 @@ def estimate_of(one: CircleAnalysis, quantity: Quantity) -> Estimate | None:
 
 
 _FOUND: WeakKeyDictionary[CircleAnalysis, dict[Quantity, Estimate]] = WeakKeyDictionary()
-_DRAWN: WeakKeyDictionary[CircleAnalysis, DrawnPath] = WeakKeyDictionary()
+_DRAWN: WeakKeyDictionary[CircleAnalysis, tuple[NDArray[np.float64], DrawnPath]] = WeakKeyDictionary()
 """Worked out once: tables, budgets and tolerances ask for them."""
 
 
 def _estimate(one: CircleAnalysis, quantity: Quantity) -> Estimate:
-    drawn = _drawn(one)
+    _, drawn = _drawn(one)
     radius_um, deviation_um = one.radius_error_um, 1e3 * one.path.least_squares.deviation_mm
     match quantity:
         case Quantity.G:
@@ -77,19 +79,18 @@ def _apart(one: CircleAnalysis) -> FormAndNoise:
         return form_and_noise(one.residual_um)
     ramp_um = one.closure.height_um * one.raw.phi_deg / FULL_TURN_DEG
     apart = form_and_noise(one.residual_um - ramp_um)
-    return FormAndNoise(apart.form_um + ramp_um, apart.power_um2)
+    return replace(apart, form_um=apart.form_um + ramp_um)
 
 
-def _drawn(one: CircleAnalysis) -> DrawnPath:
+def _drawn(one: CircleAnalysis) -> tuple[NDArray[np.float64], DrawnPath]:
+    """Form by samples, shape (n,) [µm], and drawn noise of a circle: each direction has draws of its own, as both stand beside each other in a pair."""
     if one not in _DRAWN:
         apart = _apart(one)
-        _DRAWN[one] = _path(_filtered(apart.form_um, one.chosen), apart, one, 0)
+        form_um = _filtered(apart.form_um, one.chosen)
+        passed = one.chosen.passed(np.arange(len(form_um) // 2 + 1.0))
+        seed = int(one.raw.circle.direction.sign > 0)
+        _DRAWN[one] = form_um, drawn_path(replace(apart, form_um=form_um), one.path.theta_deg, passed, seed)
     return _DRAWN[one]
-
-
-def _path(form_um: NDArray[np.float64], apart: FormAndNoise, one: CircleAnalysis, seed: int) -> DrawnPath:
-    passed = one.chosen.passed(np.arange(len(form_um) // 2 + 1.0))
-    return drawn_path(FormAndNoise(form_um, apart.power_um2), one.path.theta_deg, passed, seed)
 
 
 def pair_estimate(pair: PairAnalysis, quantity: Quantity) -> Estimate | None:
@@ -113,16 +114,16 @@ _OF_PAIRS: WeakKeyDictionary[PairAnalysis, dict[Quantity, Estimate]] = WeakKeyDi
 def _pair_estimate(pair: PairAnalysis, quantity: Quantity) -> Estimate:
     if quantity is Quantity.H:
         return _hysteresis(pair)
-    drawn = []
+    paths = []
     split = np.split(1e3 * pair.together.least_squares.deviation_mm, [len(pair.one.raw)])
-    for seed, (one, deviation_um) in enumerate(zip((pair.one, pair.other), split, strict=True)):
-        apart = _apart(one)
+    for one, deviation_um in zip((pair.one, pair.other), split, strict=True):
+        form_um, drawn = _drawn(one)
         # Seen from the circle of both, radius and centre of each are form.
         beside_um = deviation_um - 1e3 * one.path.least_squares.deviation_mm
-        drawn.append(_path(_filtered(apart.form_um, one.chosen) + beside_um, apart, one, seed))
+        paths.append(drawn.with_form(form_um + beside_um))
     if quantity is Quantity.G_BOTH:
-        return estimated(drawn, strip_widths, pair.g_um)
-    return estimated(drawn, range_of, pair.g_least_squares_um)
+        return estimated(paths, strip_widths, pair.g_um)
+    return estimated(paths, range_of, pair.g_least_squares_um)
 
 
 def _filtered(form_um: NDArray[np.float64], chosen: Filter) -> NDArray[np.float64]:
@@ -140,5 +141,5 @@ def _hysteresis(pair: PairAnalysis) -> Estimate:
     apart = form_and_noise(1e3 * (radii[0] - radii[1]))
     chosen = pair.one.chosen
     passed = chosen.passed(np.arange(len(theta_deg) // 2 + 1.0))
-    own = FormAndNoise(_filtered(apart.form_um, chosen), apart.power_um2)
+    own = replace(apart, form_um=_filtered(apart.form_um, chosen))
     return estimated([drawn_path(own, theta_deg, passed, 2)], farthest_of, pair.h_um)

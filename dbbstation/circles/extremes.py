@@ -79,6 +79,8 @@ class DrawnPath:
         theta_deg: its middle, rising, shape (s,) [deg].
         sigma_um: standard deviation of one sample's noise [µm].
         least: share of that which noise has where all of its spectrum is as low as at its end.
+        order: samples by angle, shape (m,).
+        starts: where each sector begins among them, shape (s,).
     """
 
     form_um: NDArray[np.float64]
@@ -87,6 +89,12 @@ class DrawnPath:
     theta_deg: NDArray[np.float64]
     sigma_um: float
     least: float
+    order: NDArray[np.int64]
+    starts: NDArray[np.int64]
+
+    def with_form(self, form_um: NDArray[np.float64]) -> DrawnPath:
+        """Return the same noise beside another form, of samples in time order, shape (n,) [µm]."""
+        return replace(self, form_um=_means(form_um, self.order, self.starts))
 
 
 def drawn_path(
@@ -118,18 +126,24 @@ def drawn_path(
     rng = np.random.default_rng([SEED, seed])
     highest, lowest = [], []
     for _ in range(BLOCKS):  # long recordings would take much memory at once
-        noise = drawn_noise(power, count, DRAWS // BLOCKS, rng)[:, order]
+        noise = drawn_noise(apart, passed, DRAWS // BLOCKS, rng)[:, order]
         highest.append(np.maximum.reduceat(noise, starts, axis=1))
         lowest.append(np.minimum.reduceat(noise, starts, axis=1))
-    sizes = np.diff(np.append(starts, len(order)))
     return DrawnPath(
-        form_um=np.add.reduceat(apart.form_um[order], starts) / sizes,
+        form_um=_means(apart.form_um, order, starts),
         highest_um=np.concatenate(highest),
         lowest_um=np.concatenate(lowest),
         theta_deg=middle_deg,
         sigma_um=float(np.sqrt((2.0 * power.sum() - power[0]) / count)),
         least=_least_share(apart.power_um2, passed),
+        order=order,
+        starts=starts,
     )
+
+
+def _means(values: NDArray[np.float64], order: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Means over sectors, shape (s,)."""
+    return np.asarray(np.add.reduceat(values[order], starts) / np.diff(np.append(starts, len(order))))
 
 
 def _least_share(power_um2: NDArray[np.float64], passed: NDArray[np.float64]) -> float:
@@ -198,16 +212,19 @@ class _Interval:
 def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: float) -> _Interval:
     """Hold what was read against paths of several sizes with drawn noise; arguments as of `estimated`."""
     angles = np.unique(np.concatenate([path.theta_deg for path in paths]))
-    place = [np.searchsorted(angles, path.theta_deg) for path in paths]
+    forms = [_at(angles, path.theta_deg, path.form_um[None, :], np.nan)[0] for path in paths]
+    highest = [_at(angles, path.theta_deg, path.highest_um, -np.inf) for path in paths]
+    lowest = [_at(angles, path.theta_deg, path.lowest_um, np.inf) for path in paths]
 
     def at(size: float, *, noisy: bool) -> NDArray[np.float64]:
-        draws = DRAWS if noisy else 1
-        outer, inner = np.full((draws, len(angles)), -np.inf), np.full((draws, len(angles)), np.inf)
-        for path, where in zip(paths, place, strict=True):
-            high = size * path.form_um + (path.highest_um if noisy else 0.0)
-            low = size * path.form_um + (path.lowest_um if noisy else 0.0)
-            outer[:, where], inner[:, where] = np.maximum(outer[:, where], high), np.minimum(inner[:, where], low)
-        return statistic(outer, inner, angles)
+        each = [
+            (size * form + (high if noisy else 0.0), size * form + (low if noisy else 0.0))
+            for form, high, low in zip(forms, highest, lowest, strict=True)
+        ]
+        outer, inner = each[0]
+        for high, low in each[1:]:
+            outer, inner = np.fmax(outer, high), np.fmin(inner, low)
+        return statistic(np.atleast_2d(outer), np.atleast_2d(inner), angles)
 
     of_form = float(at(1.0, noisy=False)[0])
     if not of_form > 0.0:
@@ -226,13 +243,21 @@ def _interval(paths: Sequence[DrawnPath], statistic: Statistic, as_read_um: floa
     sizes = np.array(sorted(tried))
     shown = np.array([tried[size] for size in sizes])
     mean, spread = shown.mean(axis=1), shown.std(axis=1)
-    # Extremes are skewed, alike at all sizes: their percentiles are those of all draws together.
-    ends = np.quantile((shown - mean[:, None]) / spread[:, None], [0.975, 0.025])
-    value, low, high = (
-        float(np.interp(as_read_um, np.maximum.accumulate(mean + end * spread), sizes)) for end in (0.0, *ends)
-    )
+    curves = (mean, *np.quantile(shown, [0.975, 0.025], axis=1))
+    value, low, high = (float(np.interp(as_read_um, np.maximum.accumulate(curve), sizes)) for curve in curves)
     # No interval is shorter than what the readings' own scatter makes of it.
     return _Interval(value, low, high, 0.5 * float(np.interp(value, sizes, spread)))
+
+
+def _at(
+    angles: NDArray[np.float64], theta_deg: NDArray[np.float64], values: NDArray[np.float64], elsewhere: float
+) -> NDArray[np.float64]:
+    """Values of a path at the angles of all paths, shape (draws, angles)."""
+    if len(angles) == len(theta_deg):
+        return values
+    spread = np.full((len(values), len(angles)), elsewhere)
+    spread[:, np.searchsorted(angles, theta_deg)] = values
+    return spread
 
 
 def range_of(

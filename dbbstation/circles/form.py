@@ -26,10 +26,14 @@ class FormAndNoise:
     Attributes:
         form_um: its form, noise taken off as far as the spectrum tells both apart, shape (n,) [µm].
         power_um2: of the noise by line 0, 1, ... n // 2: the variance that white noise of the same power would have [µm²].
+        continued: how many of these lines were not seen: their power is continued from those above.
+        freedom: degrees of freedom of the power of these.
     """
 
     form_um: NDArray[np.float64]
     power_um2: NDArray[np.float64]
+    continued: int
+    freedom: float
 
 
 def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
@@ -52,14 +56,14 @@ def form_and_noise(deviation_um: NDArray[np.float64]) -> FormAndNoise:
     floor, standing = _floor(power[low + 1 :])
     spectrum = noise_spectrum(2.0 * floor[: high - low], low, 2.0)
     noise = np.concatenate([spectrum.power, _averaged(floor)])
-    share = np.maximum(1.0 - noise / np.maximum(power, np.finfo(float).tiny), 0.0)
+    share = np.maximum(power - noise, 0.0) / np.maximum(power, np.finfo(float).tiny)
     share[: low + 1] *= power[: low + 1] > STANDS_OUT * spectrum.power
     share[0] = 1.0  # a mean is no noise where the radius is known to less than a sample's noise
     share[low + 1 :] *= standing
     if low > 1 and not (share[2:].any() or sharp.any()):
         strongest = 2 + int(np.argmax(power[2 : low + 1] / np.maximum(noise[2 : low + 1], np.finfo(float).tiny)))
         share[strongest] = 1.0  # nothing stands out: what form there may be most likely has this one
-    return FormAndNoise(np.fft.irfft(share * lines, count) + sharp, noise)
+    return FormAndNoise(np.fft.irfft(share * lines, count) + sharp, noise, low + 1, spectrum.freedom)
 
 
 STANDS_OUT = 3.0
@@ -118,18 +122,24 @@ def _averaged(power: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def drawn_noise(
-    power_um2: NDArray[np.float64], count: int, draws: int, rng: np.random.Generator
+    apart: FormAndNoise, passed: NDArray[np.float64], draws: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Draw noise of a spectrum, shape (draws, count) [µm].
+    """Draw noise that the readings may have, shape (draws, n) [µm].
+
+    How strong it is at low undulations is known to so many degrees of freedom only: each draw has a power of its own there, as a
+    flat prior of its logarithm makes it [scaled inverse chi-square; Gelman et al., Bayesian Data Analysis, sec. 2.6].
 
     Args:
-        power_um2: by line, shape (count // 2 + 1,).
-        count: samples of a turn.
+        apart: a series taken apart.
+        passed: share of the amplitude that a filter lets pass, by line, shape (n // 2 + 1,).
         draws: how many.
         rng: generator.
     """
-    parts = rng.standard_normal((2, draws, len(power_um2)))
-    lines = (parts[0] + 1j * parts[1]) * np.sqrt(0.5 * count * power_um2)
+    count = len(apart.form_um)
+    parts = rng.standard_normal((2, draws, len(passed)))
+    lines = (parts[0] + 1j * parts[1]) * (np.sqrt(0.5 * count * apart.power_um2) * passed)
     whole = [0, -1] if count % 2 == 0 else [0]
     lines[:, whole] = np.sqrt(2.0) * lines[:, whole].real
+    strength = np.sqrt(apart.freedom / rng.chisquare(apart.freedom, draws))
+    lines[:, : apart.continued] *= strength[:, None]
     return np.asarray(np.fft.irfft(lines, count, axis=1))

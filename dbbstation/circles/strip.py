@@ -33,22 +33,25 @@ def strip_widths(
     """
     theta = np.radians(theta_deg)
     waves = np.vstack([np.ones(len(theta)), np.cos(theta), np.sin(theta)])
-    draws = np.arange(len(outer))
     points = _first_points(outer, inner, theta_deg)
     signs = np.array([1.0, -1.0, 1.0, -1.0])
     width = np.full(len(outer), np.inf)
+    going = np.arange(len(outer))  # draws whose bounds are still apart
     for _ in range(MOST_ROUNDS):
-        heights = np.where(signs > 0.0, outer[draws[:, None], points], inner[draws[:, None], points])
-        columns = np.concatenate([waves.T[points], np.broadcast_to(signs, (len(draws), 4))[:, :, None]], axis=2)
+        rows = np.arange(len(going))
+        heights = np.where(signs > 0.0, outer[rows[:, None], points], inner[rows[:, None], points])
+        columns = np.concatenate([waves.T[points], np.broadcast_to(signs, (len(rows), 4))[:, :, None]], axis=2)
         found = np.linalg.solve(columns, heights[:, :, None])[:, :, 0]
         circle = found[:, :3] @ waves
         above, below = outer - circle, circle - inner
         highest, lowest = above.argmax(axis=1), below.argmax(axis=1)
-        out, into = above[draws, highest], below[draws, lowest]
-        width = np.minimum(width, out + into)
-        if np.all(width - 2.0 * found[:, 3] <= REACHED * width):
+        out, into = above[rows, highest], below[rows, lowest]
+        width[going] = np.minimum(width[going], out + into)
+        apart = width[going] - 2.0 * found[:, 3] > REACHED * width[going]
+        if not apart.any():
             break
-        points = _exchanged(points, np.where(out > into, highest, lowest), out > into)
+        points = _exchanged(points, np.where(out > into, highest, lowest), out > into)[apart]
+        going, outer, inner = going[apart], outer[apart], inner[apart]
     return width
 
 

@@ -117,6 +117,7 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
         "G",
         "U",
         "G(LS)",
+        "U",
         "Fmax",
         "U",
         "Fmin",
@@ -142,7 +143,7 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
             [
                 *name,
                 *_figure(run, "G", run["g_um"]),
-                _figure(run, "G(LS)", run["g_least_squares_um"])[0],
+                *_figure(run, "G(LS)", run["g_least_squares_um"]),
                 *_figure(run, "Fmax", run["f_um"]["max"]),
                 *_figure(run, "Fmin", run["f_um"]["min"]),
                 *_figure(run, "X", run["centre_um"]["x"]),
@@ -165,13 +166,13 @@ def _print(summary: Mapping[str, Any], *, several: bool) -> None:
                     pair["test"],
                     pair["repeat"],
                     *_figure(pair, "G(b)", pair["g_um"]),
-                    _figure(pair, "G(b)(LS)", pair["g_least_squares_um"])[0],
+                    *_figure(pair, "G(b)(LS)", pair["g_least_squares_um"]),
                     *_figure(pair, "D", pair["d_um"]),
                     *_figure(pair, "H", pair["h_um"]),
                     pair["h_deg"],
                 ]
             )
-        print_table([*head, *["test", "n", "G(b)", "U", "G(b)(LS)", "D", "U", "H", "U"], "at [deg]"], rows)
+        print_table([*head, *["test", "n", "G(b)", "U", "G(b)(LS)", "U", "D", "U", "H", "U"], "at [deg]"], rows)
     echo("\nWhat noise adds to G, F and H is taken off; --budget says how much that is.")
     _print_why_not([*summary["runs"], *summary["pairs"]])
 

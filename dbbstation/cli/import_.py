@@ -142,6 +142,7 @@ def _read(
 
     from dbbstation.cli.mapping_options import chosen_mapping, read_tables
     from dbbstation.cli.provenance import provenance
+    from dbbstation.counting import repeats_in_order
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.recordings.entries import Note
@@ -163,6 +164,8 @@ def _read(
     for path, table in tables.items():
         runs += reader.read(table, told.get(path) or _asked_run(asker, reader, table, planned))
     reader.check()
+    places = {(one.run.test, one.run.direction, one.run.repeat): one for one in runs}
+    runs = [places[one.test, one.direction, one.repeat] for one in repeats_in_order(one.run for one in runs)]
     statements = [*_statements(mapping, runs, _unknown(options)), *reader.left_out]
     now = datetime.now(UTC).replace(microsecond=0)
     notes = tuple(Note(now, f"imported: {text}") for text in statements)

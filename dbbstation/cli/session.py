@@ -44,6 +44,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
       dbbstation session list 2026-11-20-hexapod-7 --json
     """  # noqa: D301 (click reads the escape)
     from dbbstation.cli.output import print_json, print_table
+    from dbbstation.counting import repeats_in_order
     from dbbstation.files.recordings.session import read_session
 
     read = read_session(folder)
@@ -62,7 +63,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
                 "counts": None if run.counts is None else run.counts.data(),
                 "file": run.path.relative_to(read.folder).as_posix(),
             }
-            for run in read.runs
+            for run in repeats_in_order(read.runs)
         ]
         print_json({"session": read.name, "runs": runs, "missing": missing})
         return
@@ -75,7 +76,7 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
             "" if run.counts is None else run.counts.text,
             run.reason,
         ]
-        for run in read.runs
+        for run in repeats_in_order(read.runs)
     ]
     print_table(["run", "started", "mounting", "state", "samples", "why"], rows)
     echo(f"no accepted run: {', '.join(missing)}" if missing else "every test of the plan has an accepted run")
@@ -84,15 +85,20 @@ def list_runs(folder: Path, *, as_json: bool) -> None:
 @session.command()
 @_FOLDER
 @_RUN
+@click.option("--reason", help="Why, where the run cannot be used as it is; it stands in the session file and its log.")
 @_JSON
-def accept(folder: Path, run: str, *, as_json: bool) -> None:
+def accept(folder: Path, run: str, *, reason: str | None, as_json: bool) -> None:
     """Accept a run that was rejected or not judged, such as a-ccw-2.
+
+    A run that lost more samples than the plan allows, or whose recording shows no circle, is accepted with a reason only. On a
+    terminal it is asked for.
 
     \b
     Examples:
       dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2
+      dbbstation session accept 2026-11-20-hexapod-7 a-ccw-2 --reason "lost samples lie before the turn"
     """  # noqa: D301 (click reads the escape)
-    _tell(run, _judged(folder, run, accepted=True), as_json=as_json)
+    _tell(run, _judged(folder, run, accepted=True, reason=(reason or "").strip()), as_json=as_json)
 
 
 @session.command()
@@ -321,6 +327,7 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
     import difflib
 
     from dbbstation.errors import InputError, Problem
+    from dbbstation.files.recordings.entries import RunState
     from dbbstation.files.recordings.lock import PATIENCE_S
     from dbbstation.files.recordings.session_writer import SessionWriter
 
@@ -330,4 +337,28 @@ def _judged(folder: Path, run: str, *, accepted: bool, reason: str = "") -> RunE
             near = difflib.get_close_matches(run, entries, n=1, cutoff=0.6)
             remedy = f"did you mean {near[0]}?" if near else "`dbbstation session list` names them"
             raise InputError([Problem(str(folder), 0, 0, f"the session has no run {run}", remedy)])
-        return writer.judge(entries[run], accepted=accepted, reason=reason)
+        entry = entries[run]
+        if accepted and not reason and entry.state is not RunState.RECORDING:
+            reason = _reason_for(run, writer.session.unusable(entry))
+        return writer.judge(entry, accepted=accepted, reason=reason)
+
+
+def _reason_for(run: str, unusable: str) -> str:
+    """Ask why a run is accepted that cannot be used; empty for one that can.
+
+    Raises:
+        click.UsageError: nobody can answer.
+    """
+    from dbbstation.cli.asking import on_terminal
+
+    if not unusable:
+        return ""
+    if not on_terminal():
+        raise click.UsageError(
+            f"{run}: {unusable}\nsay with --reason why it is to be accepted: whoever reads the session later will ask"
+        )
+    echo(f"{run}: {unusable}", err=True)
+    while True:
+        answer = str(click.prompt("why is it to be accepted", err=True)).strip()
+        if answer:
+            return answer

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_left
 from itertools import pairwise
 from typing import TYPE_CHECKING
+
+from dbbstation.counting import natural
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
 MOSTLY = 0.8
 """Share of a machine's sessions whose names must stand in the order of their dates before names are taken for a second witness of
 the order. Names that were given at random agree on about 2 / sqrt(n) of n [Logan and Shepp 1977]: a third of 36."""
-
-_NUMBER = re.compile(r"(\d+)")
 
 
 def date_faults(sessions: Sequence[SessionFigures], now: datetime) -> list[str]:
@@ -55,12 +54,6 @@ def date_faults(sessions: Sequence[SessionFigures], now: datetime) -> list[str]:
 def moment_words(moment: datetime | None) -> str:
     """Return a moment in words."""
     return "–" if moment is None else f"{moment:%Y-%m-%d %H:%M}"
-
-
-def natural(name: str) -> tuple[tuple[int, int, str], ...]:
-    """Return a key that sorts names with numbers as people count: `w9` before `w10`."""
-    parts = (part for part in _NUMBER.split(name) if part)
-    return tuple((0, int(part), "") if part.isdecimal() else (1, 0, part) for part in parts)
 
 
 def by_time(session: SessionFigures) -> tuple[float, tuple[tuple[int, int, str], ...]]:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import nnls
 from scipy.special import fdtrc
 
 if TYPE_CHECKING:
@@ -298,16 +297,16 @@ def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Sp
     flat = Spectrum(np.full(low + 1, white), freedom * len(squares))
     if not white > 0.0:
         return flat
+    seen, below = _shape(harmonic), _shape(np.arange(low + 1.0))
+    heights = _fitted(mean, seen)
     powers, likely, variances = [], [], []
-    for corner in CORNERS:
-        seen, below = _shape(harmonic, corner), _shape(np.arange(low + 1.0), corner)
-        height = _fitted(mean, seen)
-        power = height @ below
+    for height, above, under in zip(heights, seen, below, strict=True):
+        power = height @ under
         powers.append(power)
-        likely.append(_likelihood(mean, height @ seen, freedom))
+        likely.append(_likelihood(mean, height @ above, freedom))
         # What floor and height leave uncertain in the low mean, by the information of the likelihood.
-        information = 0.5 * freedom * (seen / (height @ seen)) @ (seen / (height @ seen)).T
-        wanted = (below / power).mean(axis=1)
+        information = 0.5 * freedom * (above / (height @ above)) @ (above / (height @ above)).T
+        wanted = (under / power).mean(axis=1)
         variances.append(float(wanted @ np.linalg.pinv(information) @ wanted))
     if max(likely) - _likelihood(mean, np.full(len(mean), white), freedom) < WORTH:
         return flat
@@ -319,19 +318,50 @@ def noise_spectrum(squares: NDArray[np.float64], low: int, freedom: float) -> Sp
     return Spectrum(power, 2.0 / max(float(weight @ variances) + between, 2.0 / flat.freedom))
 
 
-def _shape(harmonic: NDArray[np.float64], corner: float) -> NDArray[np.float64]:
-    """Floor and first-order process of unit height, shape (2, h)."""
-    return np.vstack([np.ones(len(harmonic)), 1.0 / (1.0 + (harmonic / corner) ** 2)])
+def _shape(harmonic: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Floor and first-order process of unit height, of each corner, shape (corners, 2, h)."""
+    process = 1.0 / (1.0 + (harmonic / CORNERS[:, None]) ** 2)
+    return np.stack([np.ones_like(process), process], axis=1)
 
 
-def _fitted(mean: NDArray[np.float64], shape: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Floor and height, not negative, of greatest likelihood, by reweighted least squares, shape (2,)."""
-    power = np.full(len(mean), mean.mean())
+def _fitted(mean: NDArray[np.float64], shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Floor and height, not negative, of greatest likelihood, by reweighted least squares, shape (corners, 2)."""
+    power = np.full((len(shapes), len(mean)), mean.mean())
     for _ in range(_ROUNDS):
-        found, _ = nnls((shape / power).T, mean / power)
-        power = np.maximum(found @ shape, _SMALLEST_SHARE * mean.mean())
-    return np.asarray(found, dtype=np.float64)
+        found = _not_negative(shapes / power[:, None, :], mean / power)
+        power = np.maximum(np.einsum("cs,csh->ch", found, shapes), _SMALLEST_SHARE * mean.mean())
+    return found
 
+
+def _not_negative(rows: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least squares by two columns at a time, none negative, shape (corners, 2).
+
+    Where the solution has a negative part, the best one lies on an edge: one column alone.
+
+    Args:
+        rows: the two columns of each problem, shape (corners, 2, h).
+        values: what they are to sum up to, shape (corners, h).
+    """
+    normal = np.einsum("cih,cjh->cij", rows, rows)
+    right = np.einsum("cih,ch->ci", rows, values)
+    squares = np.einsum("cii->ci", normal)
+    alone = np.maximum(right, 0.0) / squares
+    better = np.argmax(alone * right, axis=1)
+    edge = np.where(np.arange(2) == better[:, None], alone, 0.0)
+    both = np.stack(
+        [
+            right[:, 0] * squares[:, 1] - right[:, 1] * normal[:, 0, 1],
+            right[:, 1] * squares[:, 0] - right[:, 0] * normal[:, 0, 1],
+        ],
+        axis=1,
+    )
+    determinant = squares.prod(axis=1) - normal[:, 0, 1] ** 2
+    inside = (determinant > _SINGULAR * squares.prod(axis=1)) & np.all(both > 0.0, axis=1)
+    return np.where(inside[:, None], both / np.where(inside, determinant, 1.0)[:, None], edge)
+
+
+_SINGULAR = 1e-12
+"""Share of the product of squares below which the determinant of two columns has no digit left."""
 
 _ROUNDS = 6
 _SMALLEST_SHARE = 1e-6

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.fft import next_fast_len
 
+from dbbstation.inference.harmonics import bands, noise_spectrum
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -54,6 +56,40 @@ def noise_of(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> N
     until = int(negative[0]) if len(negative) else len(pairs)
     return Noise(sigma, max(1.0, 1.0 + 2.0 * float(pairs[:until].sum())))
 
+
+def noise_of_turns(residuals: Sequence[NDArray[np.float64]], freedom_used: float) -> Noise:
+    """Noise from what a fit leaves of whole turns.
+
+    What a model lacks is smooth along a turn: read off the autocorrelation, it would pass for noise that remembers. What a fit takes out
+    is smooth too, and noise that remembers would seem to remember less. Both leave the harmonics above the low ones alone, so that
+    the noise is read there and continued below (`dbbstation.inference.harmonics`). What is left beyond noise counts as if it were
+    white.
+
+    Args:
+        residuals: one array per turn, in time order, about equally spaced.
+        freedom_used: degrees of freedom that the fit spent, on smooth columns.
+    """
+    count = sum(len(residual) for residual in residuals)
+    square = sum(float(residual @ residual) for residual in residuals)
+    turns = [residual for residual in residuals if len(residual) >= FEWEST_SAMPLES]
+    white = Noise(float(np.sqrt(square / max(count - freedom_used, 1.0))), 1.0)
+    if not turns or not square > 0.0:
+        return white
+    low, high = bands(min(map(len, turns)))
+    lines = [np.abs(np.fft.rfft(turn)) ** 2 / len(turn) for turn in turns]
+    squares = 2.0 * np.sum([power[low + 1 : high + 1] for power in lines], axis=0)
+    below = noise_spectrum(squares, low, 2.0 * len(turns)).power
+    above = float(np.mean(np.concatenate([power[low + 1 :] for power in lines])))
+    share = 2.0 * (low + 0.5) / float(np.mean([len(turn) for turn in turns]))
+    of_noise = share * float(below.mean()) + (1.0 - share) * above
+    # Smooth columns take the low harmonics' power out of the sum of squares.
+    spent = freedom_used * float(below[0]) / max(of_noise, np.finfo(float).tiny)
+    variance = square / max(count - spent, 1.0)
+    return Noise(float(np.sqrt(variance)), 1.0 + (float(below[0]) - of_noise) / variance)
+
+
+FEWEST_SAMPLES = 60
+"""Samples of a turn from which its low harmonics are five at least: the form of a circle that a machine's geometry bends has few more."""
 
 _LAGS = 201
 """Lags looked at, in samples; longer correlations are structure that a model should name, not noise."""

@@ -20,6 +20,9 @@ EXPANSION_UNCERTAINTY = 0.05
 """Standard uncertainty of a stated coefficient of expansion, as its share: of steel, from 11.5 µm/(m K), catalogues differ by 1 either
 way, which is 0.58 as a rectangular distribution."""
 
+UNKNOWN_BAR_MM = 0.1
+"""Stated size of the error of a bar that nobody put on a calibrator: more than any calibrator leaves [mm]."""
+
 USUAL_READINGS = 200
 """Readings on the calibrator that are averaged: of a display twenty seconds."""
 

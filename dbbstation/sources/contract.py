@@ -102,7 +102,8 @@ class Setup:
         fixed_ball_mm: centre of the fixed ball as the CMM knows it, machine frame, shape (3,) [mm].
         mounting_repeatability_mm: of the holder, one standard deviation, for all axes or each, shape (3,) [mm].
         ball_uncertainty_mm: of the CMM, one standard deviation per axis [mm].
-        bar_uncertainty_mm: of the bar's calibrated length, one standard deviation [mm].
+        bar_uncertainty_mm: of the bar's calibrated length, one standard deviation; of a bar that nobody calibrated more than any
+            calibrator leaves [mm].
         bar_reads_long_mm: reading less true distance, as calibrator and temperature let expect it: part of every reading,
             and never taken off one [mm].
         place_known: False for a ball that was put up under the spindle: `fixed_ball_mm` is where the machine was told

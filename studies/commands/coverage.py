@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -31,8 +32,15 @@ PLANS = {"elevated": "table2-elevated", "level": "table2"}
     type=click.IntRange(min=3),
     help=f"Draws for each row of a table; {SESSIONS} sessions of calibration, {CIRCLES} circles of each of six noises if not given.",
 )
+@click.option(
+    "--keep",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder of the draws: a study that was interrupted goes on there.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
-def coverage(*, machines: int, plan: str | None, seed: int, part: str | None, draws: int | None, as_json: bool) -> None:
+def coverage(
+    *, machines: int, plan: str | None, seed: int, part: str | None, draws: int | None, keep: Path | None, as_json: bool
+) -> None:
     r"""Calibrate many random machines and count how often the 95 % intervals contain the truth.
 
     On the plan with five raised bars all 24 parameters; on the level plan those combinations that level bars see, on
@@ -50,7 +58,7 @@ def coverage(*, machines: int, plan: str | None, seed: int, part: str | None, dr
       dbbstation study coverage
       dbbstation study coverage --part calibration --draws 20
       dbbstation study coverage --machines 100 --plan elevated --json
-      dbbstation study coverage --part circles --draws 300
+      dbbstation study coverage --part circles --draws 1000 --keep draws
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import progress_bar
@@ -69,15 +77,23 @@ def coverage(*, machines: int, plan: str | None, seed: int, part: str | None, dr
         if not as_json:
             _print(name, found[name])
     if plan is None and part in {None, "calibration"}:
-        rows = _calibration(draws or SESSIONS, seed)
+        rows = _calibration(draws or SESSIONS, seed, _file(keep, "calibration"))
         found["calibration"] = [row.plain() for row in rows]
         found["faults"] = [row.fault for row in rows if row.fault]
         if not as_json:
             _print_rows(rows)
     if plan is None and part in {None, "circles"}:
-        found["circles"] = _circles(draws or CIRCLES, seed, as_json=as_json)
+        found["circles"] = _circles(draws or CIRCLES, seed, _file(keep, "circles"), as_json=as_json)
     if as_json:
         print_json(found)
+
+
+def _file(keep: Path | None, part: str) -> Path | None:
+    """File of the draws of a part."""
+    if keep is None:
+        return None
+    keep.mkdir(parents=True, exist_ok=True)
+    return keep / f"{part}.jsonl"
 
 
 def _plans(plan: str | None, part: str | None) -> list[str]:
@@ -86,12 +102,12 @@ def _plans(plan: str | None, part: str | None) -> list[str]:
     return sorted(PLANS) if plan is None else [plan]
 
 
-def _calibration(draws: int, seed: int) -> list[Row]:
+def _calibration(draws: int, seed: int, keep: Path | None) -> list[Row]:
     from dbbstation.cli.progress import progress_bar
     from studies.coverage_calibration import CASES, coverage_of_calibration
 
     with progress_bar("sessions", draws * len(CASES)) as advance:
-        return coverage_of_calibration(CASES, range(seed, seed + draws), advance)
+        return coverage_of_calibration(CASES, range(seed, seed + draws), advance, keep)
 
 
 def _print_rows(rows: list[Row]) -> None:
@@ -110,17 +126,17 @@ def _print_rows(rows: list[Row]) -> None:
             click.echo(f"NOT as promised: {row.fault}")
 
 
-def _circles(draws: int, seed: int, *, as_json: bool) -> dict[str, Any]:
+def _circles(draws: int, seed: int, keep: Path | None, *, as_json: bool) -> dict[str, Any]:
     """Draw circles, and print how often U about each figure contains the truth."""
     from dbbstation.cli.output import print_table
     from dbbstation.cli.progress import progress_bar
     from studies.coverage_circles import CELLS, KINDS, coverage_of_circles, pooled
 
     with progress_bar("circles", draws * len(CELLS)) as advance:
-        found = coverage_of_circles(draws, seed, advance)
+        found = coverage_of_circles(draws, seed, advance, keep=keep)
     if as_json:
         return found
-    noises = [f"{cell.colour} {cell.level_um:g} µm" for cell in CELLS]
+    noises = [cell.name for cell in CELLS]
 
     def percent(counts: tuple[int, int]) -> str:
         return "-" if not counts[1] else f"{100 * counts[0] / counts[1]:.1f}"
@@ -131,10 +147,15 @@ def _circles(draws: int, seed: int, *, as_json: bool) -> dict[str, Any]:
             name,
             *(percent(pooled(row, noise=noise)) for noise in noises),
             *(percent(pooled(row, kind=kind)) for kind in KINDS),
+            percent(pooled(row)),
+            pooled(row)[1],
+            found["reasons"].get(name, ""),
         ]
         for name, row in found["rows"].items()
     ]
-    print_table(["figure", *noises, *KINDS], rows)
+    print_table(["figure", *noises, *KINDS, "all", "values", "why more than 97 %"], rows)
+    for fault in found["faults"]:
+        click.echo(f"NOT as promised: {fault}")
     return found
 
 

@@ -161,3 +161,69 @@ def test_no_session_there(capsys, tmp_path):
     assert code == 1
     assert "session.yaml" in err
     assert "Traceback" not in err
+
+
+@pytest.fixture
+def half_lost(folder):
+    """Name of a run that has every other stretch of ten samples only."""
+    entry = read_session(folder).runs[1]
+    lines = entry.path.read_text().splitlines(keepends=True)
+    first = next(k for k, line in enumerate(lines) if line[:1].isdigit())
+    kept = [line for k, line in enumerate(lines[first:]) if k // 10 % 2 == 0]
+    entry.path.write_text("".join(lines[:first] + kept))
+    file = folder / "session.yaml"
+    file.write_text(re.sub(r", sha256: [0-9a-f]{64}", "", file.read_text(encoding="utf-8")), encoding="utf-8")
+    seal_session(folder)
+    return f"{entry.test}-{entry.direction}-{entry.repeat}"
+
+
+def test_a_run_that_cannot_be_used_is_accepted_with_a_reason_only(capsys, folder, half_lost):
+    before = (folder / "session.yaml").read_bytes()
+    code, out, err = run(capsys, "accept", folder, half_lost)
+    assert (code, out) == (2, "")
+    assert "say with --reason why" in err
+    assert "lost" in err
+    assert (folder / "session.yaml").read_bytes() == before
+    code, out, err = run(capsys, "accept", folder, half_lost, "--reason", " gauge was slow ")
+    assert (code, out, err) == (0, f"{half_lost}: accepted (gauge was slow)\n", "")
+    assert read_session(folder).runs[1].reason == "gauge was slow"
+    events = json.loads(run(capsys, "log", folder, "--json")[1])["events"]
+    assert (events[-1]["what"], events[-1]["about"]) == ("accepted", f"{half_lost}: gauge was slow")
+
+
+def test_on_a_terminal_the_reason_is_asked_for(capsys, folder, half_lost, monkeypatch):
+    answers = iter(["  ", "feed-in only was lost"])
+    monkeypatch.setattr("dbbstation.cli.asking.on_terminal", lambda: True)
+    monkeypatch.setattr("click.prompt", lambda *_args, **_kwargs: next(answers))
+    code, _, err = run(capsys, "accept", folder, half_lost)
+    assert code == 0
+    assert "lost" in err
+    assert read_session(folder).runs[1].reason == "feed-in only was lost"
+
+
+def test_repeats_are_listed_as_they_are_counted(capsys, folder):
+    """A list of files sorted by name has a-ccw-10 before a-ccw-2."""
+    entry, *others = read_session(folder).runs
+    named = f"{entry.test}, direction: {entry.direction}"
+    numbers = (1, 10, 2)
+    lines = []
+    for repeat in numbers:
+        path = entry.path.with_name(f"{entry.test}-{entry.direction}-{repeat}.csv")
+        path.write_text(re.sub(r"(repeat\W+)1\b", rf"\g<1>{repeat}", entry.path.read_text(), count=1))
+        lines.append(f"  - {{test: {named}, repeat: {repeat}, file: runs/{path.name}, state: accepted}}")
+    text = "format: dbb-session/1\nmachine: machine.yaml\nplan: plan.yaml\nruns:\n" + "\n".join(lines) + "\n"
+    (folder / "session.yaml").write_text(text, encoding="utf-8")
+    for other in others:
+        other.path.unlink()
+    seal_session(folder)
+    told = json.loads(run(capsys, "list", folder, "--json")[1])
+    assert [one["repeat"] for one in told["runs"]] == [1, 2, 10]
+    assert [one.repeat for one in read_session(folder).in_state(RunState.ACCEPTED)] == [1, 2, 10]
+    assert main_circles(capsys, folder) == ["1", "2", "10"]
+
+
+def main_circles(capsys, folder):
+    with pytest.raises(SystemExit):
+        main(["circles", str(folder)])
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    return [row[2] for row in rows if len(row) > 3 and row[1] in {"ccw", "cw"}]

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from dbbstation.history.order import date_faults, natural
+from dbbstation.history.order import date_faults
 from dbbstation.history.record import SessionFigures
 
 NOW = datetime(2026, 11, 23, tzinfo=UTC)
@@ -22,10 +22,6 @@ def sessions(*weeks, names=None):
 
 def test_dates_in_the_order_of_names_are_right():
     assert date_faults(sessions(*range(12)), NOW) == []
-
-
-def test_names_count_as_people_do():
-    assert sorted(["w10", "w9", "w9a", "a"], key=natural) == ["a", "w9", "w9a", "w10"]
 
 
 @pytest.mark.parametrize("wrong", [-3, 5])

@@ -14,7 +14,7 @@ from dbbstation.calibration.fit.nodes import Nodes, nodes_of, smooth
 from dbbstation.calibration.fit.prescription import Name, names_of, prescribed
 from dbbstation.calibration.layout import Layout, lay_out
 from dbbstation.errors import CalibrationError
-from dbbstation.inference.noise import Noise, noise_of
+from dbbstation.inference.noise import Noise, noise_of_turns
 from dbbstation.inference.square_root import Block, Solution, compress, lost_directions, solve, unseen_combinations
 from dbbstation.machine.compiled import in_parallel
 from dbbstation.sources.contract import Need, Owner
@@ -195,7 +195,7 @@ def calibrate(
         blocks, left = linearise(layout, runs, x)
         blocks += current_blocks(layout, channel, x)
         if steps < NOISE_STEPS:
-            noise = noise_of(left, solution.freedom_used)
+            noise = noise_of_turns(left, solution.freedom_used)
     else:
         raise CalibrationError(
             f"the fit still moves, {change:.2g} times more than it should after {MOST_STEPS} steps",
@@ -370,7 +370,8 @@ def _settled(
     for _ in range(3):
         solution = solve(blocks, layout.known, sigma * np.sqrt(noise.correlation_samples), held)
         square = (solution.chi2 - solution.stated_chi2) * sigma**2 * noise.correlation_samples
-        sigma = float(np.sqrt(max(square, 0.0) / max(count - solution.freedom_used, 1.0)))
+        spent = solution.freedom_used * noise.correlation_samples  # of smooth columns: they take out slow noise
+        sigma = float(np.sqrt(max(square, 0.0) / max(count - spent, 1.0)))
         sigma = max(sigma, SMALLEST_NOISE_MM)
     return solution, Noise(sigma, noise.correlation_samples)
 

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri, ndtr
 
-from dbbstation.calibration.checks.scatter import LEAST_STATED_MM, UNKNOWN_MM, Seat, seats_of
+from dbbstation.calibration.checks.scatter import UNKNOWN_MM, Seat, seats_of
 from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Kind, Outlier
 from dbbstation.calibration.outliers.run_remainder import left_of, shift_of
 from dbbstation.errors import CalibrationError
+from dbbstation.plan.bar import UNKNOWN_BAR_MM
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,9 +30,6 @@ _TAIL = 2.0 * float(ndtr(-SIGMAS))
 
 SAME_SIGMAS = 3.0
 """Two puttings-up of a ball that differ by less stand at the same wrong place."""
-
-UNKNOWN_BAR_MM = LEAST_STATED_MM
-"""Stated size of the error of a bar that nobody set on a calibrator: no scatter that anybody states [mm]."""
 
 
 def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) -> Step | None:

@@ -100,7 +100,7 @@ class RunEntry:
         repeat: counts the runs of this test and direction, from 1.
         mounting: counts how often a ball was put up; None: one mounting per test.
         state: how far it has come.
-        reason: why it was rejected; empty otherwise.
+        reason: why it was rejected, or accepted although its recording shows no circle; empty otherwise.
         started: when the first sample was taken; None where not noted.
         path: of its file.
         sha256: of its file; empty while recording.

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.errors import InputError, Problem
+from dbbstation.counting import natural, repeats_in_order
+from dbbstation.errors import InputError, Problem, TraceError
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.quantities import Quantity
@@ -36,9 +37,10 @@ from dbbstation.files.recordings.session_set_up import check_set_up_errors, moun
 from dbbstation.files.recordings.session_store import REBUILD, document_in_force, log_faults
 from dbbstation.files.source_text import read_bytes, unreadable
 from dbbstation.files.yaml.schema import validate
+from dbbstation.plan.bar import UNKNOWN_BAR_MM
 from dbbstation.plan.circle import Direction
 from dbbstation.sources.contract import Setup
-from dbbstation.trace.cut import lost_on_turn, unusable_on_turn
+from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
 from dbbstation.trace.loss import AFTER_LOSS, too_many_lost
 
 if TYPE_CHECKING:
@@ -93,8 +95,8 @@ class SessionFolder(SessionDetails):
         return tuple(path.relative_to(self.folder).as_posix() for path in paths)  # type: ignore[return-value]  # two of them
 
     def in_state(self, *states: RunState) -> tuple[RunEntry, ...]:
-        """Return the runs in one of these states."""
-        return tuple(run for run in self.runs if run.state in states)
+        """Return the runs in one of these states; repeats of a circle as they are counted."""
+        return repeats_in_order(run for run in self.runs if run.state in states)
 
     def circle(self, run: RunEntry) -> Circle:
         """Return the circle that a run was commanded, its centre as programmed."""
@@ -118,7 +120,9 @@ class SessionFolder(SessionDetails):
         """
         ball = self.plan.tests[run.test].ball
         mounted = mounted_name(self.plan, run.test, run.mounting)
-        long_mm, uncertainty_mm = (0.0, 0.0) if self.bar is None else self.bar.reads_long_mm(self.bar_temp_c(logged))
+        long_mm, uncertainty_mm = (
+            (0.0, UNKNOWN_BAR_MM) if self.bar is None else self.bar.reads_long_mm(self.bar_temp_c(logged))
+        )
         readings = (r for r in self.set_up_errors if mounted_name(self.plan, r.test, r.mounting) == mounted)
         return Setup(
             session=self.name,
@@ -193,6 +197,19 @@ class SessionFolder(SessionDetails):
         unusable = unusable_on_turn(recording, self.circle(run))
         what = too_many_lost(lost, kept, self.plan.largest_loss_percent, unusable)
         return [Problem(str(run.path), 0, 0, what, AFTER_LOSS)] if what else []
+
+    def unusable(self, run: RunEntry) -> str:
+        """Return why no figures of a run can be worked out, by its file alone; empty where they can."""
+        try:
+            recording = self.load(run).recording
+            if lost := self.loss(run, recording):
+                return lost[0].what
+            cut(recording, self.circle(run))
+        except InputError as error:
+            return error.problems[0].what
+        except TraceError as error:
+            return str(error)
+        return ""
 
     def _implausible(self, run: RunEntry, recording: Recording) -> list[Problem]:
         """Units that the file itself cannot tell: only the planned circle says how long and how far."""
@@ -334,7 +351,7 @@ def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Pr
     """Runs that were being recorded when the station died before it could note them."""
     listed = {run.path.name for run in entries}
     found = []
-    for path in sorted(folder.glob(f"runs/*.csv{PART}")):
+    for path in sorted(folder.glob(f"runs/*.csv{PART}"), key=lambda one: natural(one.name)):
         entry = None if path.name in listed else part_entry(path)
         if entry is None or path.name in listed:
             continue
@@ -350,7 +367,8 @@ def _unlisted(folder: Path, entries: list[RunEntry], plan: Plan, faults: list[Pr
 def unlisted_sealed(session: SessionFolder) -> tuple[Path, ...]:
     """Return the sealed runs in a session's folder that its session file does not list."""
     listed = {run.path.name for run in session.runs}
-    return tuple(path for path in sorted((session.folder / "runs").glob("*.csv")) if path.name not in listed)
+    inside = sorted((session.folder / "runs").glob("*.csv"), key=lambda one: natural(one.name))
+    return tuple(path for path in inside if path.name not in listed)
 
 
 def part_entry(path: Path) -> RunEntry | None:

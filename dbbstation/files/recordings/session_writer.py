@@ -222,13 +222,18 @@ class SessionWriter:
     def judge(self, run: RunEntry, *, accepted: bool, reason: str = "") -> RunEntry:
         """Note a sealed run as `accepted` or `rejected`.
 
+        Args:
+            run: which.
+            accepted: whether it counts.
+            reason: why; empty where a usable run is accepted.
+
         Raises:
             OutputError: the run is not complete, or the disk refuses.
         """
         if run.state is RunState.RECORDING:
             raise OutputError("a run that is not complete cannot be judged", where=run.label, remedy="run it again")
         state = RunState.ACCEPTED if accepted else RunState.REJECTED
-        judged = self._put(replace(run, state=state, reason="" if accepted else reason))
+        judged = self._put(replace(run, state=state, reason=reason))
         self._write(state.value)
         return judged
 

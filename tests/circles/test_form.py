@@ -1,0 +1,18 @@
+"""Form and noise of a series, where a line of its spectrum is empty."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dbbstation.circles.form import form_and_noise
+
+
+def test_an_empty_line_is_no_form_and_no_warning(rng):
+    """A mean of zero to the last bit: its power was divided by, and the shell showed an overflow."""
+    deviation_um = np.round(rng.standard_normal(360) * 1024.0) / 1024.0
+    deviation_um[-1] = -deviation_um[:-1].sum()
+    deviation_um[-1] = np.clip(deviation_um[-1], -3.0, 3.0)
+    deviation_um[-2] -= deviation_um.sum()
+    apart = form_and_noise(deviation_um)
+    assert np.isfinite(apart.form_um).all()
+    assert np.abs(np.fft.rfft(apart.form_um)[0]) < 1e-9

@@ -262,7 +262,9 @@ class Bank:
             tried, spread = most_probable_variance(powers, even, np.column_stack([surely, np.square(size[kept])]), odds)
             if tried < cost:
                 cost, best, name = tried, spread, candidate
-        return np.asarray(np.sqrt(best / np.mean(best))), name
+        # What is always there is so in the quietest rows as well.
+        least = self.channel.least_noise / self.noise.innovation if name else 0.0
+        return np.maximum(np.sqrt(best / np.mean(best)), least), name
 
     def _colour_of(
         self, left: NDArray[np.float64], draws: NDArray[np.float64], stretches: Sequence[slice], level: Coloured

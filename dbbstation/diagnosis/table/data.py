@@ -116,7 +116,7 @@ class Table:
             time=time,
             time_unit=time_unit,
             simulated=simulated,
-            least_noise=float(np.hypot(_rounding(self.measured), _rounding(self.simulated))),
+            least_noise=_rounding(self.measured),
             noise_follows=tuple(_sizes_of_noise(follows, time, self.blocks)),
         )
 

@@ -148,12 +148,12 @@ class Planner:
         both = np.maximum((ramp_s[:-1] + ramp_s[1:]) / 2.0 - lost, 0.0)
         saved: NDArray[np.float64] = np.where(limited[:-1] & limited[1:], np.fmin(ramp, blended), both)
         # Between a move that turns and one that does not, that one slows down with half its acceleration as well, which is a ramp
-        # of v/2a more. Where it is long they overlap, an arc as one move; a chord is too short for it.
+        # of v/2a more. They overlap over the way in which the shorter of the two, an arc as one move, gets up to speed: a chord hardly.
         move = moves_of(toolpath)
         move_mm: NDArray[np.float64] = np.bincount(move, weights=toolpath.tip_mm)[move[rows]].astype(np.float64)
         slower = np.minimum(speed[:-1], speed[1:])
-        is_long = self.reached_mm_s(move_mm) >= speed
-        overlap = np.where(is_long[:-1] & is_long[1:], np.fmin(2.0 * slower / a, blended), 0.0)
+        alone = np.minimum(speed, self.reached_mm_s(move_mm))
+        overlap = np.fmin(2.0 * np.minimum(alone[:-1], alone[1:]) ** 2 / (a * slower), blended)
         mixed = overlap - np.where(limited[:-1], speed[1:], speed[:-1]) / (2.0 * a)
         return np.where(limited[:-1] != limited[1:], mixed, saved)
 

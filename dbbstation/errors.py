@@ -87,10 +87,21 @@ class StationError(Exception):
         self.remedy = remedy
         super().__init__(what, where, remedy)
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Let it come whole from another process: that would call the class with `args`, which have no names there."""
+        return _as_it_was, (type(self), self.args, self.__dict__)
+
     def __str__(self) -> str:
         """Return `where: what; remedy` on one line."""
         text = f"{self.where}: {self.what}" if self.where else self.what
         return f"{text}; {self.remedy}" if self.remedy else text
+
+
+def _as_it_was(kind: type[StationError], args: tuple[object, ...], state: dict[str, object]) -> StationError:
+    error = kind.__new__(kind)
+    error.args = args
+    error.__dict__.update(state)
+    return error
 
 
 class InputError(StationError):

@@ -15,6 +15,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, calibrate
 from dbbstation.calibration.reporting.summary import identified_model
+from dbbstation.errors import CalibrationError
 from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.model.uncertainty import predicted_poses
 from dbbstation.recorded import load_sessions
@@ -111,7 +112,8 @@ def coverage_of_calibration(
     results = drawn(partial(_numbered, tuple(cases), seeds.start), range(len(seeds) * len(cases)), keep, what)
     by_case: list[list[Figures]] = [[] for _ in cases]
     for number, result in enumerate(results):
-        by_case[number % len(cases)].append(result)
+        if result:
+            by_case[number % len(cases)].append(result)
         progress(number + 1)
     rows = []
     for case, found in zip(cases, by_case, strict=True):
@@ -127,8 +129,11 @@ def coverage_of_calibration(
 
 
 def _numbered(cases: Sequence[Case], seed: int, number: int) -> Figures:
-    """One draw by its number: cases take turns with each seed."""
-    found = _drawn(cases[number % len(cases)], seed + number // len(cases))
+    """One draw by its number: cases take turns with each seed; empty where the fit says that it found no end, and states nothing."""
+    try:
+        found = _drawn(cases[number % len(cases)], seed + number // len(cases))
+    except CalibrationError:
+        return {}
     return {
         figure: (off.tolist(), [None if np.isnan(one) else float(one) for one in u])
         for figure, (off, u) in found.items()

@@ -39,7 +39,7 @@ def _strange_test(calibration: Calibration) -> list[int]:
 
     Both directions filed under the wrong test bend the whole fit and hardly stand out of it.
     """
-    if max(map(rms_um, calibration.residual_mm)) < LEAST_UM:
+    if rms_um(np.concatenate(calibration.residual_mm)) < LEAST_UM:
         return []
     noise = max(fine_noise_mm(calibration), 1e-3 * LEAST_UM / STANDS_OUT)
     known, held = calibration.layout.known, calibration.solution.held

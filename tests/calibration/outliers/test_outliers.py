@@ -164,8 +164,8 @@ def test_a_test_done_in_the_wrong_bore_is_recognised(recorded, sound):
         k = number(recorded, "b", direction)
         runs[k] = filed(runs[k], runs[number(recorded, "g", direction)])
     calibration, found = robust(recorded, runs)
-    assert [(o.kind, o.test) for o in found] == [(Kind.WRONG_PLACE, "b")]
-    assert "test g" in found[0].text
+    assert {(o.kind, o.test) for o in found} == {(Kind.WRONG_PLACE, "b")}  # both directions at once, or one by one
+    assert all("test g" in o.text for o in found)
     assert pull(calibration, sound) < 2.5
 
 

@@ -34,6 +34,9 @@ LONGEST_SHARE = 1.0 / 3.0
 LONGEST_DELAY_SHARE = 0.1
 """Share of the longest block that the longest dead time is: the rows before it say nothing about it."""
 
+MOST_STARTS = 5
+"""Runs that have a start each. Of more, all are taken to begin alike: a law has no more columns than it has use for."""
+
 LATE = 0.1
 """Probability that an effect that follows a variable does so late enough to be seen, by either of both ways: a linear effect over what
 changes slowly is as late as one likes, and is called linear."""
@@ -75,7 +78,7 @@ def memory_laws(
     for family, parameter, columns, grid in kinds:
         for variable in usable if grid else ():
             gain = size / variable.half_range
-            starts = len(blocks) if family is Family.MEMORY else 0
+            starts = _starts(blocks) if family is Family.MEMORY else 0
             own = (0.0,) * starts
             found.append(
                 Law(
@@ -122,14 +125,19 @@ def _grid(shortest: float, longest: float) -> tuple[float, ...]:
 def _lag(
     variable: Variable, time: NDArray[np.float64], blocks: Sequence[slice], point: tuple[float, ...]
 ) -> NDArray[np.float64]:
-    """Late value, late less present value, and what fades from the start of each block, shape (n, 2 + blocks)."""
-    found = np.zeros((len(time), 2 + len(blocks)))
+    """Late value, late less present value, and what fades from the start of each block, shape (n, 2 + starts)."""
+    starts = _starts(blocks)
+    found = np.zeros((len(time), 2 + starts))
     for k, rows in enumerate(blocks):
         values, at = variable.travel(rows), time[rows]
         found[rows, 1] = lagging(values, at, point[0])
         found[rows, 0] = values - _middle(variable) + found[rows, 1]
-        found[rows, 2 + k] = np.exp(-(at - at[0]) / point[0])
+        found[rows, 2 + (k if starts > 1 else 0)] = np.exp(-(at - at[0]) / point[0])
     return found
+
+
+def _starts(blocks: Sequence[slice]) -> int:
+    return len(blocks) if len(blocks) <= MOST_STARTS else 1
 
 
 def _delay(

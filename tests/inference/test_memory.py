@@ -47,6 +47,17 @@ def test_each_block_begins_by_itself():
     assert shifted[50] == values[50]
 
 
+def test_many_runs_begin_alike():
+    time = np.tile(np.arange(40.0), 7)
+    values = np.sin(np.tile(np.arange(40.0), 7) / 9.0)
+    blocks = tuple(slice(40 * k, 40 * k + 40) for k in range(7))
+    memory = memory_laws([Variable("x", "mm", Kind.LENGTH, values)], time, "s", blocks, 1.0, "mm")[0]
+    columns = memory.columns((4.0,))
+    assert columns.shape == (280, 3)
+    assert columns[:, 2] == pytest.approx(np.tile(np.exp(-np.arange(40.0) / 4.0), 7))
+    assert len(memory.plausible) == 3
+
+
 def test_what_stands_still_or_jumps_has_no_memory(rng):
     time = np.arange(60.0)
     poses = Variable("pose", "mm", Kind.LENGTH, rng.uniform(0.0, 100.0, 60))

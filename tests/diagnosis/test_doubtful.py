@@ -23,9 +23,9 @@ NAMES = ("gravity", "thermal-frame", "thermal-struts", "bar-drift")
 
 @pytest.mark.slow
 def test_a_drift_of_nobody_knows_what_is_named_by_nobody_and_not_modelled(tmp_path):
-    """A frame that warms by a hundredth of a kelvin: three causes share the probability, and none of them has half of it."""
+    """A frame that warms by thirteen thousandths of a kelvin: three causes share the probability, and none of them has half of it."""
     kinematics = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
-    faint = ThermalFrame(Warming(0.01, time_constant_s=600.0))
+    faint = ThermalFrame(Warming(0.0133, time_constant_s=600.0))
     record(tmp_path / "s", seed=200, mechanisms=[kinematics, Gravity(), faint], rate_hz=10.0)
     recorded = load_sessions([tmp_path / "s"])
     sources = sources_named(NAMES)

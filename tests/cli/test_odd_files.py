@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import re
 import shutil
@@ -122,7 +123,8 @@ def test_a_direction_without_a_circle_leaves_a_row_of_its_own(session):
     outcome = call("circles", session, "--findings", "--budget")
     assert outcome.code == 0, outcome.err
     row = next(line.split() for line in outcome.out.splitlines() if line.startswith("a") and " cw " in line)
-    assert row == ["a", "cw", "2", *["-"] * 15]
+    assert row[:3] == ["a", "cw", "2"]
+    assert set(row[3:]) == {"-"}
 
 
 def test_half_a_surrogate_pair_is_no_character(tmp_path):
@@ -185,8 +187,10 @@ NO_UTF8 = os.fsdecode(b"\xfc")
 
 
 @pytest.fixture
-def named_otherwise(tmp_path):
+def named_otherwise(tmp_path, monkeypatch):
     """Files and a session whose names are not in UTF-8."""
+    # What is logged of them would be sent in UTF-8 from the process of the test to that of the report.
+    monkeypatch.setattr(logging.root.manager, "disable", logging.CRITICAL)
     shop = tmp_path / f"shop{NO_UTF8}"
     shop.mkdir()
     try:

@@ -349,16 +349,17 @@ def _reason_for(run: str, unusable: str) -> str:
     Raises:
         click.UsageError: nobody can answer.
     """
-    from dbbstation.cli.asking import on_terminal
+    from dbbstation.cli.asking import Asker
 
     if not unusable:
         return ""
-    if not on_terminal():
+    asker = Asker()
+    if not asker.terminal:
         raise click.UsageError(
             f"{run}: {unusable}\nsay with --reason why it is to be accepted: whoever reads the session later will ask"
         )
     echo(f"{run}: {unusable}", err=True)
     while True:
-        answer = str(click.prompt("why is it to be accepted", err=True)).strip()
+        answer = asker.text("why is it to be accepted", "--reason").strip()
         if answer:
             return answer

@@ -12,6 +12,8 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.stats import rice
 
 from dbbstation.cli import DONE, FAILED
 from dbbstation.digits import with_uncertainty
@@ -211,19 +213,25 @@ def test_the_first_page_holds_circles_against_the_tolerances(session, written, t
     assert written[1]["verdict"]["kind"] == "none"
 
 
+def shown_in_the_median(centre_um, u_um):
+    """Length of a centre offset whose measured lengths are of Rice's distribution with this one as its median."""
+    length = np.hypot(*centre_um)
+    u = np.hypot(*(centre_um / length * u_um))
+    if rice.cdf(length / u, 0.0) <= 0.5:
+        return 0.0
+    return u * brentq(lambda true: rice.cdf(length / u, true) - 0.5, 0.0, length / u + 3.0, xtol=1e-12)
+
+
 def test_before_and_now_stand_side_by_side_as_measured(session, better, tmp_path):
     out = tmp_path / "both.html"
     outcome = call("report", better, "--before", session, "--out", out, "--json")
     assert outcome.code == DONE, outcome.err
-    # A centre offset is longer by its noise than the true one: the sum of both variances is taken off its square.
+    # The offset of which half of all measured ones are shorter than this one: they are longer by their noise.
     centres = {
         name: [
-            np.sqrt(
-                max(
-                    np.hypot(run["centre_um"]["x"], run["centre_um"]["y"]) ** 2
-                    - sum(run["uncertainty"][axis]["u_um"] ** 2 for axis in "XY"),
-                    0.0,
-                )
+            shown_in_the_median(
+                np.array([run["centre_um"]["x"], run["centre_um"]["y"]]),
+                np.array([run["uncertainty"][axis]["u_um"] for axis in "XY"]),
             )
             for run in call("circles", folder, "--json").data["runs"]
         ]

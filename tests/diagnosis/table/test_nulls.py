@@ -13,7 +13,9 @@ TABLES = 4
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", NOISES)
 def test_noise_has_no_name(kind):
-    assert sum(bool(named_in(kind, 5000 + k)[0]) for k in range(TABLES)) < 2
+    # Averaged noise takes ten times as long as others.
+    tables = TABLES // 2 if kind == "low-passed" else TABLES
+    assert sum(bool(named_in(kind, 5000 + k)[0]) for k in range(tables)) < 2
 
 
 @pytest.mark.slow

@@ -205,7 +205,8 @@ class Bank:
             trust, tails = self.trust, np.inf
             if self.long_tails:
                 trust, tails = most_probable_tails(left[:, 0] / self.trust / self.noise.innovation)
-            uneven = max(float(np.abs(new / old - 1.0).max(initial=0.0)) for new, old in self._changes(spread, trust))
+            changes = ((spread, self.spread), (trust, self.trust))
+            uneven = max(float(np.abs(new / old - 1.0).max(initial=0.0)) for new, old in changes)
             if self.channel.time is not None and not white and innovation > least:
                 found = self._colour_of(left, draws, stretches, found)
             self._take(found, spread, trust)
@@ -213,11 +214,6 @@ class Bank:
             if alike(found, before) and uneven < SETTLED:
                 break
         return self.noise
-
-    def _changes(
-        self, spread: NDArray[np.float64], trust: NDArray[np.float64]
-    ) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64]], ...]:
-        return (spread, self.spread), (trust, self.trust)
 
     def log_likelihood(self) -> float:
         """Log likelihood of the kept rows under the base and this noise alone, but for what is the same for every noise.
@@ -366,14 +362,14 @@ class Bank:
         own = self._add(np.hstack([exact, slack]))
         width = exact.shape[1]
         sd = np.concatenate([spacings, np.full(slack.shape[1] - len(tangents), law.form_uncertainty)])
-        used = amplitudes != 0.0
-        at = max(float(np.sqrt(np.mean(np.square(amplitudes[used] / law.plausible_at(nonlinear)[used])))), 1e-12)
+        used, plausible = amplitudes != 0.0, law.plausible_of(exact)
+        at = max(float(np.sqrt(np.mean(np.square(amplitudes[used] / plausible[used])))), 1e-12)
         points = float(np.prod([len(grid) for grid in law.grids]))
         # A tangent covers about as much of the range of a nonlinear parameter as 2.5 points of its grid.
         weight = -float(np.log(max(points / 2.5 ** len(law.grids), 1.0)))
         variants = tuple(
             replace(variant, slack=own[width:], slack_sd=sd, slack_at=at)
-            for variant in _forms(law, own[:width], nonlinear, weight)
+            for variant in _forms(law, own[:width], plausible, nonlinear, weight)
         )
         self._of_laws[name] = replace(self._of_laws[name], variants=variants)
 
@@ -391,9 +387,11 @@ class Bank:
     def _on_a_grid(self, law: Law) -> tuple[Variant, ...]:
         points = list(product(*law.grids))
         weight = -float(np.log(len(points)))
-        return tuple(
-            variant for point in points for variant in _forms(law, self._add(law.columns(point)), point, weight)
-        )
+        found: list[Variant] = []
+        for point in points:
+            samples = law.columns(point)
+            found += _forms(law, self._add(samples), law.plausible_of(samples), point, weight)
+        return tuple(found)
 
     def _cause(self, pattern: Pattern, own: NDArray[np.int64], plausible: float) -> Cause:
         size = np.full(len(own), plausible)
@@ -429,9 +427,14 @@ class Bank:
         return self._columns.add(self.whitened(samples))
 
 
-def _forms(law: Law, columns: NDArray[np.int64], nonlinear: tuple[float, ...], log_weight: float) -> list[Variant]:
+def _forms(
+    law: Law,
+    columns: NDArray[np.int64],
+    plausible: NDArray[np.float64],
+    nonlinear: tuple[float, ...],
+    log_weight: float,
+) -> list[Variant]:
     """Forms of a law at one point: its choices where it has them, else all its amplitudes, whose columns these are."""
-    plausible = law.plausible_at(nonlinear)
     if not law.choices:
         return [Variant(columns, plausible, nonlinear, log_weight=log_weight, positive=law.positive)]
     return [

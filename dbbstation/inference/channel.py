@@ -87,7 +87,8 @@ class Law:
             exactly; None where the effect is proportional to the amplitudes.
         choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
             from the others. None may be combined with `positive`.
-        sizes: usual size of each amplitude at values of the nonlinear parameters, shape (p,); None: `plausible` at all of them.
+        reach: largest effect of each amplitude, one standard deviation, whatever the nonlinear parameters are, in the unit of the
+            residual; None: amplitudes have their `plausible` size at all of them.
         family: of patterns that it belongs to; None for physics of a client.
         variables: that it follows, where it belongs to a family.
     """
@@ -105,13 +106,15 @@ class Law:
     log_odds: float = NAMED_ODDS
     at: Callable[[tuple[float, ...], NDArray[np.float64]], NDArray[np.float64]] | None = None
     choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
-    sizes: Callable[[tuple[float, ...]], NDArray[np.float64]] | None = None
+    reach: float | None = None
     family: Family | None = None
     variables: tuple[Variable, ...] = ()
 
-    def plausible_at(self, point: tuple[float, ...]) -> NDArray[np.float64]:
-        """Usual size of each amplitude at values of the nonlinear parameters, shape (p,)."""
-        return self.plausible if self.sizes is None else self.sizes(point)
+    def plausible_of(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Usual size of each amplitude, shape (p,), whose columns are these, shape (n, p)."""
+        if self.reach is None:
+            return self.plausible
+        return np.asarray(self.reach / np.maximum(np.abs(samples).max(axis=0), 1e-300))
 
 
 @dataclass(frozen=True, eq=False)

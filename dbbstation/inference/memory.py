@@ -16,7 +16,7 @@ from dbbstation.inference.patterns import Family, log_odds
 from dbbstation.inference.variables import Kind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -79,34 +79,26 @@ def memory_laws(
         for variable in usable if grid else ():
             gain = size / variable.half_range
             starts = _starts(blocks) if family is Family.MEMORY else 0
-            own = (0.0,) * starts
             found.append(
                 Law(
                     name=f"{family} of {variable.name}",
                     columns=partial(columns, variable, time, blocks),
-                    plausible=np.array([gain, gain, *(size for _ in own)]),
+                    plausible=np.array([gain, gain, *[size] * starts]),
                     parameters=("gain", "gain", *(f"start {k + 1}" for k in range(starts)), parameter),
                     units=(
                         *(f"{unit}/{variable.unit}" if variable.unit else unit for _ in range(2)),
-                        *(unit for _ in own),
+                        *[unit] * starts,
                         time_unit,
                     ),
                     grids=(grid,),
                     log_odds=log_odds(len(usable)) + float(np.log(LATE / len(kinds))),
                     choices=_choices(2 + starts),
-                    sizes=partial(_sizes, partial(columns, variable, time, blocks), size),
+                    reach=size,
                     family=family,
                     variables=(variable,),
                 )
             )
     return found
-
-
-def _sizes(
-    columns: Callable[[tuple[float, ...]], NDArray[np.float64]], size: float, point: tuple[float, ...]
-) -> NDArray[np.float64]:
-    """Amplitudes at which each column reaches as far as any effect does, shape (p,)."""
-    return np.asarray(size / np.maximum(np.abs(columns(point)).max(axis=0), 1e-300))
 
 
 def _choices(width: int) -> tuple[tuple[tuple[int, ...], float, str], ...]:

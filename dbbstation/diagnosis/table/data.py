@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 REFITTED = 2.0
 """What refitting a parameter changes the simulated value by, one standard deviation, over what that was off by as simulated [rms].
-One to three give the same names; see docs/mismatch.md."""
+How other values change the answers was not measured."""
 
 OFFSET = "offset"
 """Name of the base column that is the same for all rows."""

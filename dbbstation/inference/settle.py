@@ -129,12 +129,12 @@ def _known_as(settled: Settled, known: Sequence[Settled]) -> Settled:
 
 
 def _meets(one: Settled, other: Settled) -> bool:
-    """Whether two comparisons came to the same: causes of the same kind that do the same, beside the same noise."""
+    """Whether a comparison goes on as another did: causes of the same kind do the same, so that the noise beside them is the same."""
     kinds = [sorted(each.bank.kind_of(name) for name in each.best.names) for each in (one, other)]
-    if kinds[0] != kinds[1] or not alike(one.noise, other.noise) or one.bank.tails != other.bank.tails:
+    if kinds[0] != kinds[1] or one.bank.long_tails != other.bank.long_tails:
         return False
     apart = one.predicted() - other.predicted()
-    return float(np.sqrt(np.mean(np.square(apart)))) < SETTLED * one.noise.sigma
+    return float(np.sqrt(np.mean(np.square(apart)))) < SETTLED * other.noise.sigma
 
 
 @dataclass(frozen=True)

@@ -263,10 +263,10 @@ def test_nominal_circles_stay_on_their_path(linuxcnc, table2, crooked, feed, mm_
 
 @pytest.mark.parametrize("counts_to", [0, 300_000])
 def test_an_interpreter_that_falls_behind_is_noticed(counts_to):
-    """29 µm beside the path and 1.07 times as long, where this was not looked for. Here it counts between two moves."""
-    lines = [f"G1 X{0.2 * k:.1f} A{1e-4 * math.sin(0.3 * k):.7f}" for k in range(1, 400)]
+    """29 µm beside the path and 1.07 times as long, where this was not looked for. Here it counts, 1000 moves ahead of the planner."""
+    lines = [f"G1 X{0.2 * k:.1f} A{1e-4 * math.sin(0.3 * k):.7f}" for k in range(1, 1600)]
     counting = ["#1 = 0", f"o1 while [#1 LT {counts_to}]", "#1 = [#1 + 1]", "o1 endwhile"]
-    text = ["G21 G90 G64", "G1 X0 Y0 Z-1000 A0 B0 C0 F6000", *lines[:200], *counting, *lines[200:], "M2"]
+    text = ["G21 G90 G64", "G1 X0 Y0 Z-1000 A0 B0 C0 F1000", *lines[:1500], *counting, *lines[1500:], "M2"]
     if counts_to:
         with pytest.raises(BehindError):
             run_once("\n".join(text), 1000.0, FASTER)

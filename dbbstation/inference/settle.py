@@ -120,7 +120,7 @@ def _from(
     settled = _settled(bank, options, progress, members, refused, known)
     if any(settled is one for one in known):
         return replace(settled, beginning=beginning)
-    return replace(settled, beginning=beginning, log_probability=_log_probability(bank, settled.best.members))
+    return replace(settled, beginning=beginning, log_probability=log_probability(bank, settled.best.members))
 
 
 def _known_as(settled: Settled, known: Sequence[Settled]) -> Settled:
@@ -223,7 +223,7 @@ def _settled(
         if looking:
             looked.add(posterior.best.names)
             # Looks that go on finding other places for the same do not make it more probable.
-            before, most_probable = most_probable, max(most_probable, _log_probability(bank, best))
+            before, most_probable = most_probable, max(most_probable, log_probability(bank, best))
             if most_probable < before + BETTER:
                 break
         looking = look
@@ -264,7 +264,7 @@ def _looked(
         most_looks: looks at the most.
         in_time: look for steps and pulses in time, too.
     """
-    before = _log_probability(bank, members)
+    before = log_probability(bank, members)
     for number in range(most_looks):
         known = set(bank.patterns)
         new = bank.add(seen(bank, members, in_time=in_time))
@@ -277,7 +277,7 @@ def _looked(
         # What is taken in makes the noise less, and less noise lets in more: together they must be more probable than before.
         if bank.measures_beside_members:
             bank.measure(more)
-        after = _log_probability(bank, more)
+        after = log_probability(bank, more)
         if not taken & fresh or after <= before:
             bank.drop(fresh)
             bank.measure(members)
@@ -309,7 +309,7 @@ def _looked_about(
     return best, starts
 
 
-def _log_probability(bank: Bank, members: Sequence[Member]) -> float:
+def log_probability(bank: Bank, members: Sequence[Member]) -> float:
     """Of the noise that there is and members together, but for what is the same for all of a channel."""
     odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
     own = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     metavar="HZ",
     help="Bandwidth in which force and model are compared [default: chosen from the recording].",
 )
+@click.option(
+    "--no-held-out", is_flag=True, help="Skip the check on parts that causes were not chosen from: much faster."
+)
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write what was compared here, as CSV.")
 @figure_option("Draw force and friction here")
 @click.option("--force", is_flag=True, help="Overwrite these files.")
@@ -37,6 +40,7 @@ def drive(
     force_per_ampere: float | None,
     sources: str | None,
     cutoff_hz: float | None,
+    no_held_out: bool,
     out: Path | None,
     figure: Path | None,
     force: bool,
@@ -45,8 +49,8 @@ def drive(
     r"""Identify one strut drive from position and force, and find the physics that mass and viscous friction leave out.
 
     The recording is a CSV file with the columns t_s, position_mm and force_n, or motor_current_a. Record strokes to and
-    fro at several speeds. Several recordings of one drive are taken together. Verdicts: identified, ambiguous, ruled-out,
-    not-testable.
+    fro at several speeds. Several recordings of one drive are taken together. Verdicts: identified, happened, does-not-predict,
+    ambiguous, not-testable, ruled-out.
 
     \b
     Examples:
@@ -76,7 +80,7 @@ def drive(
         say(f"note: {warning}")
     raw = [file.recording(force_per_ampere) for file in files]
     with stage_bar("identification", STAGES) as progress:
-        found = identify(raw, named, cutoff_hz, progress)
+        found = identify(raw, named, cutoff_hz, progress, hold_out=not no_held_out)
     summary = drive_summary(found)
     if out is not None:
         write_table(out, compared_csv(found.table()), provenance(), force=force)
@@ -94,11 +98,12 @@ def drive(
         _print(summary)
 
 
-STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-back stretch": 90}
+STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-out part": 40, "held-back stretch": 98}
 """Stages of an identification, and the share of its time that has passed by then [%]."""
 
 
 def _print(summary: Mapping[str, Any]) -> None:
+    _print_if_worse(summary["held_out"])
     if summary["mismatch"]:
         echo(
             f"Mass and viscous friction leave {summary['misfit_rms_n']:.3g} N rms beyond noise "
@@ -144,6 +149,15 @@ def _print(summary: Mapping[str, Any]) -> None:
     echo(f"band up to {signals['cutoff_hz']:.3g} Hz, {signals['samples_compared']} samples compared")
 
 
+def _print_if_worse(held: Mapping[str, Any] | str) -> None:
+    """Say first of all that the model does not predict, where it does not."""
+    if not isinstance(held, str) and held["worse"]:
+        echo(
+            f"Everything found predicts held-out parts worse than mass and friction alone: {held['corrected_rms_n']:.3g} N rms against "
+            f"{held['reference_rms_n']:.3g} N. Nothing is identified."
+        )
+
+
 def _print_locations(locations: Sequence[Mapping[str, Any]]) -> None:
     for location in locations[:5]:
         echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
@@ -167,7 +181,7 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
         ["cause", "verdict", "probability", "log Bayes factor", "concealed (R²)", "not distinguished from"], rows
     )
     for source in sources:
-        if source["verdict"] in {"identified", "ambiguous"}:
+        if source["verdict"] in {"identified", "happened", "does-not-predict", "ambiguous"}:
             echo()
             _print_parts(source)
             echo(f"  {source['text']}")

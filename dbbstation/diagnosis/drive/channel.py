@@ -98,6 +98,8 @@ def drive_channel(
     simple = [form for source in sources for form in source.forms(recordings.scale) if not form.shapes]
     straight = np.hstack([motion, *(recordings.compared(lambda s, f=form: f.columns(s, ())) for form in simple)])  # type: ignore[misc]
     curves = tuple(_beyond(straight, _curves(recordings)))
+    if len(recordings.blocks) > 1:
+        curves = (*curves, _of_files(recordings))
     scale, shortest = _first_look(recordings, np.hstack([straight, *(p.samples for p in curves)]))
     of_law: dict[str, tuple[DriveSource, Form]] = {}
     laws = []
@@ -152,6 +154,14 @@ def _beyond(straight: NDArray[np.float64], patterns: Iterator[Pattern]) -> Itera
         parts = ((range(rest.shape[1]), "beside what has a name"), (range(rest.shape[1], every), "whole"))
         choices = tuple((tuple(columns), float(np.log(1.0 / len(parts))), label) for columns, label in parts)
         yield replace(pattern, samples=np.hstack([rest, pattern.samples]), choices=choices)
+
+
+def _of_files(recordings: Recordings) -> Pattern:
+    """A zero of the force of its own for each recording, or for one of them."""
+    samples = np.zeros((len(recordings.force_n), len(recordings.blocks)))
+    for k, rows in enumerate(recordings.blocks):
+        samples[rows, k] = 1.0
+    return Pattern(Family.BLOCKS, (), samples)
 
 
 def _axes(columns: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -36,6 +36,7 @@ class Scale:
         cutoff_hz: of the band in which force and model are compared.
         sample_s: from one recorded sample to the next, of the slowest recording [s].
         reverses: some recording changes its direction of travel.
+        both_ways: enough samples are travelled in each direction to say how these differ.
         waves_per_m: waves over the position that what is left by everything smooth follows best, strongest first [1/m].
         waves_tried: how many independent waves these were picked from.
     """
@@ -49,6 +50,7 @@ class Scale:
     cutoff_hz: float
     sample_s: float
     reverses: bool
+    both_ways: bool
     waves_per_m: tuple[float, ...] = ()
     waves_tried: float = 1.0
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.diagnosis.drive.channel import MASS, VISCOUS, drive_channel
-from dbbstation.diagnosis.drive.fit import DriveFit, fit, log_possible, with_method
+from dbbstation.diagnosis.drive.fit import DriveFit, fit, log_possible, measured
 from dbbstation.inference.hypotheses import LIKELY, Posterior
 from dbbstation.inference.settle import settle
 
@@ -85,7 +85,7 @@ def explain(recordings: Recordings, sources: Sequence[DriveSource], progress: Ca
             )
             continue
         break
-    after = with_method(drive, settled, after)
+    after = measured(drive, settled, settled.best.members)
     return Explained(drive, settled, first, after, {**refused, **settled.refused}, dropped)
 
 

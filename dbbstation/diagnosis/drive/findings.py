@@ -10,8 +10,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.diagnosis.drive.held_out import HeldOut
     from dbbstation.diagnosis.drive.recordings import Recordings
-    from dbbstation.inference.verdict import Value, Verdict
+    from dbbstation.inference.verdict import Gains, Value, Verdict
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,10 @@ class DriveFinding:
         rest_n: of what the base leaves of it [N].
         parameters: as fitted; for a cause that was not, best amplitudes, whose uncertainty says how much could hide.
         parts: where it is there more than once (waves, pulses, forms), each with its numbers.
-        text: one or two sentences for people.
+        text: sentences for people.
+        at_end: names of parameters that lie at the end of the values that are tried.
+        complement: stretches of time that explain as much in the place of `parts`.
+        gains: what it brought in held-out parts; None: not asked for.
     """
 
     name: str
@@ -56,6 +60,24 @@ class DriveFinding:
     parameters: dict[str, Value]
     parts: tuple[Part, ...]
     text: str
+    at_end: tuple[str, ...] = ()
+    complement: Complement | None = None
+    gains: Gains | None = None
+
+
+@dataclass(frozen=True)
+class Complement:
+    """The other way to read pulses of one size: the opposite force in the rest of the time, and a constant load.
+
+    Attributes:
+        force_n: in these stretches.
+        t_s: first and last time of each [s].
+        pulses: how many pulses are of that size.
+    """
+
+    force_n: Value
+    t_s: tuple[tuple[float, float], ...]
+    pulses: int
 
 
 @dataclass(frozen=True)
@@ -191,6 +213,7 @@ class DriveDiagnosis:
         rest: what is left.
         rest_locations: where, largest share first.
         cannot_tell: sentences.
+        held_out: predictions of parts that took no part; None: not asked for.
         curve: friction against speed.
     """
 
@@ -214,6 +237,7 @@ class DriveDiagnosis:
     rest_locations: tuple[DriveLocation, ...]
     cannot_tell: tuple[str, ...]
     curve: Curve
+    held_out: HeldOut | None = None
 
     @property
     def recordings(self) -> Recordings:

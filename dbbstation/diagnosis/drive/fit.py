@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse.linalg import spsolve_triangular
 from scipy.special import log_ndtr
 
 from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS
 from dbbstation.inference.settle import moved
-from dbbstation.inference.verdict import Value
+from dbbstation.inference.verdict import OUT, Value
 
 if TYPE_CHECKING:
     from collections.abc import Container, Sequence
@@ -92,6 +93,15 @@ class DriveFit:
             found[p.name] = Value(shaped[k], float(sigma[width + k]) if laid_out else float(law.grids[k][-1]), p.unit)
         return found
 
+    def at_end(self, name: str) -> dict[str, tuple[float, float]]:
+        """Numbers of a law that lie at the end of the values that are tried, with the first and the last of these."""
+        law = next(law for law in self.drive.channel.laws if law.name == name)
+        _, form = self.drive.of_law[name]
+        found = self.parameters(name)
+        grids = {p.name: law.grids[k] for k, p in enumerate(form.shapes)}
+        ends = {shape: (grid[0], grid[-1]) for shape, grid in grids.items() if len(grid) > 1}
+        return {k: (low, high) for k, (low, high) in ends.items() if not low < found[k].value < high}
+
     def all_values(self) -> dict[str, float]:
         """Values of all parameters of base and laws by name."""
         found = {name: value.value for name, value in self.base.items()}
@@ -141,6 +151,15 @@ def fit(
     return DriveFit(drive, tuple(members), samples, values, covariance)
 
 
+def solved_on(
+    drive: DriveChannel, settled: Settled, members: Sequence[Member]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values of base and members, shape (k,), fitted to the rows that a comparison kept, and all columns over all rows, shape (m, k)."""
+    samples = np.hstack([drive.channel.base.samples, *(settled.bank.samples(member.columns) for member in members)])
+    white = settled.bank.whitened(np.column_stack([samples, drive.channel.residual]))
+    return _solved(white, _prior_sd(drive, members), settled.noise.innovation)[0], samples
+
+
 def _prior_sd(drive: DriveChannel, members: Sequence[Member]) -> NDArray[np.float64]:
     """Prior standard deviations of base and members, shape (k,)."""
     return np.concatenate([np.full(len(drive.channel.base.names), np.inf), *(member.sd for member in members)])
@@ -160,25 +179,80 @@ def _solved(
     return root @ (u.T @ target), noise**2 * (root @ root.T)
 
 
-def with_method(drive: DriveChannel, settled: Settled, fitted: DriveFit) -> DriveFit:
+def measured(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> DriveFit:
+    """Fit base and members for values that are told, with uncertainties that no model of the noise makes too small.
+
+    Rows made white say most if all that is left is noise. They weigh how the force changes from row to row, though, and there laws of
+    friction are least exact: what is wrong beside reversals then moves the values. Ordinary least squares in the band, as is the
+    practice of the field, suffer less from that. Where both differ by more than noise could make them differ, something other than noise
+    is left, and the latter are taken [Hausman, Specification tests in econometrics, Econometrica 46 (1978) 1251, sec. 2]; their covariance
+    is that of noise as it is coloured [Huber, Proc. 5th Berkeley Symp. 1 (1967) 221].
+    """
+    bank, sd = settled.bank, _prior_sd(drive, members)
+    white = fit(drive, settled, members)
+    rows = np.column_stack([white.samples, drive.channel.residual])
+    # Against priors a row counts as much as its noise lets it say of anything slow.
+    counted = settled.noise.effective
+    values, covariance = _solved(rows, sd, counted)
+    covariance = covariance @ _information(settled, white.samples, sd, counted) @ covariance
+    plain = replace(white, values=values, covariance=0.5 * (covariance + covariance.T))
+    if _differ_by(white, plain) > OUT:
+        return _widened(settled, plain, rows, sd, counted)
+    return _widened(settled, white, bank.whitened(rows), sd, settled.noise.innovation)
+
+
+def _differ_by(efficient: DriveFit, plain: DriveFit) -> float:
+    """Standard deviations of their difference by which values of base and laws differ, at the most, noise being what it is taken for.
+
+    The variance of the difference from an efficient estimate is the difference of the variances [Hausman 1978, corollary 2.6].
+    """
+    told = list(range(len(efficient.drive.channel.base.names)))
+    for member in efficient.members:
+        if member.cause.name in efficient.drive.of_law:
+            own = efficient.columns_of(member.cause.name)
+            told += range(own.start, own.stop)
+    every = np.diag(plain.covariance) - np.diag(efficient.covariance)
+    known = [k for k in told if every[k] > RANK * plain.covariance[k, k]]
+    apart = np.abs(plain.values - efficient.values)[known] / np.sqrt(every[known])
+    return float(apart.max(initial=0.0))
+
+
+def _widened(
+    settled: Settled, fitted: DriveFit, rows: NDArray[np.float64], sd: NDArray[np.float64], noise: float
+) -> DriveFit:
     """The same fit with uncertainties that are no smaller than how its values move when stretches are left out, or the band halved.
 
     What no formula says stays the same over a stretch: noise alone would call the values surer than they are. [Efron and Stein,
     The jackknife estimate of variance, Ann. Statist. 9 (1981) 586, eq. 1.5]
     """
-    stretch = np.arange(len(fitted.samples)) * STRETCHES // len(fitted.samples)
-    every = np.array([fit(drive, settled, fitted.members, stretch != k).values for k in range(STRETCHES)])
-    moved = (STRETCHES - 1.0) / STRETCHES * np.sum((every - every.mean(axis=0)) ** 2, axis=0)
+    stretch = np.arange(len(rows)) * STRETCHES // len(rows)
+    every = np.array([_solved(rows[stretch != k], sd, noise)[0] for k in range(STRETCHES)])
+    moves = (STRETCHES - 1.0) / STRETCHES * np.sum((every - every.mean(axis=0)) ** 2, axis=0)
     # Where a stretch alone shows a pulse, leaving it out says nothing.
     everywhere = np.array([np.any(fitted.samples[stretch != k] != 0.0, axis=0) for k in range(STRETCHES)]).all(axis=0)
     variance = np.maximum(np.diag(fitted.covariance), 1e-300)
-    wider = np.sqrt(np.where(everywhere, np.maximum(moved / variance, 1.0), 1.0))
+    wider = np.sqrt(np.where(everywhere, np.maximum(moves / variance, 1.0), 1.0))
     # A value may lie anywhere between those of the two bands, and as far on the other side.
     slow = _in_half_the_band(settled, fitted)
     wider = np.sqrt(
         wider**2 + np.maximum((slow.values - fitted.values) ** 2 - np.diag(slow.covariance), 0.0) / 3.0 / variance
     )
     return replace(fitted, covariance=fitted.covariance * np.outer(wider, wider))
+
+
+def _information(
+    settled: Settled, samples: NDArray[np.float64], sd: NDArray[np.float64], counted: float
+) -> NDArray[np.float64]:
+    """Covariance of what columns take up of noise as it is coloured, and of what their priors say, shape (k, k).
+
+    Rows are divided by the square of the noise that they were `counted` with.
+    """
+    bank = settled.bank
+    taken = samples
+    if bank.whitening is not None:
+        # Noise is innovation times the inverse of the whitening, of which this is the transpose.
+        taken = np.asarray(spsolve_triangular(bank.whitening.T.tocsr(), samples, lower=False))
+    return np.asarray((settled.noise.innovation / counted**2) ** 2 * taken.T @ taken + np.diag(1.0 / sd**2))
 
 
 def _in_half_the_band(settled: Settled, fitted: DriveFit) -> DriveFit:
@@ -215,7 +289,7 @@ def base_values(drive: DriveChannel, settled: Settled, best: DriveFit) -> dict[s
     likely: list[tuple[float, Hypothesis]] = [
         (posterior.probability_of(h.names.__eq__), h) for h in posterior.hypotheses[:MOST]
     ]
-    fits = [(p, fit(drive, settled, h.members).base) for p, h in likely if p > LIKELY and h is not settled.best]
+    fits = [(p, measured(drive, settled, h.members).base) for p, h in likely if p > LIKELY and h is not settled.best]
     found = {}
     for name, value in best.base.items():
         between = sum(p * (base[name].value - value.value) ** 2 for p, base in fits)

@@ -11,6 +11,7 @@ from dbbstation.diagnosis.drive.channel import BASE_UNITS, MASS, METHOD_SHARE, V
 from dbbstation.diagnosis.drive.explain import explain
 from dbbstation.diagnosis.drive.findings import Curve, DriveDiagnosis, DriveFinding, Number, Rest, Step
 from dbbstation.diagnosis.drive.fit import DriveFit, base_values, fit
+from dbbstation.diagnosis.drive.held_out import held_out
 from dbbstation.diagnosis.drive.limits import VAGUE, Limits, limits_of, mass_is_known, sentences
 from dbbstation.diagnosis.drive.locate import locate
 from dbbstation.diagnosis.drive.recordings import recordings_of
@@ -45,6 +46,8 @@ def identify(
     sources: Sequence[DriveSource],
     cutoff_hz: float | None = None,
     progress: Callable[[str], None] = lambda _: None,
+    *,
+    hold_out: bool = False,
 ) -> DriveDiagnosis:
     """Identify a drive and find what a model of mass and viscous friction leaves out.
 
@@ -53,6 +56,7 @@ def identify(
         sources: causes to look for.
         cutoff_hz: of the band in which force and model are compared; chosen from the data if None.
         progress: called with what is being done.
+        hold_out: ask what causes bring in parts that they were not chosen from; takes as long again, or twice.
 
     Raises:
         CalibrationError: the recordings cannot carry an identification at all.
@@ -64,7 +68,8 @@ def identify(
         explained = explain(put_together, sources, progress)
     before, after = explained.before, explained.after
     limits = limits_of(explained)
-    verdicts = Verdicts(explained, several_speeds=limits.several_speeds)
+    held = held_out(explained.drive, progress) if hold_out else None
+    verdicts = Verdicts(explained, several_speeds=limits.several_speeds, held=held)
     values = base_values(explained.drive, explained.settled, after)
     known = {
         MASS: mass_is_known(limits, values.get(MASS)),
@@ -108,6 +113,7 @@ def identify(
         else (),
         cannot_tell=sentences(limits, explained, known),
         curve=_curve(explained),
+        held_out=held,
     )
 
 
@@ -219,7 +225,7 @@ def _with_weight(finding: DriveFinding, values: dict[str, Value]) -> DriveFindin
     mass = values.get(MASS)
     load = finding.parameters.get("load_n")
     if (
-        finding.verdict not in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS}
+        finding.verdict not in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.DOES_NOT_PREDICT}
         or load is None
         or mass is None
         or mass.value <= 0.0
@@ -251,6 +257,7 @@ def _curve(explained: Explained) -> Curve:
         measured_m=middle,
         position_m=middle,
         speed_m_s=speed,
+        way=np.sign(speed),
         acceleration_m_s2=still,
         force_n=still,
     )

@@ -29,7 +29,7 @@ class Limits:
     Attributes:
         accelerates: beyond the noise of the acceleration.
         several_speeds: so that Coulomb friction of its usual size would be distinguished from viscous friction.
-        reverses: so that friction and constant load look different.
+        reverses: it travels both ways, so that friction and constant load look different.
     """
 
     accelerates: bool
@@ -56,7 +56,7 @@ def limits_of(explained: Explained) -> Limits:
     return Limits(
         accelerates=float(np.sqrt(np.mean(acceleration**2))) > ACCELERATES * noise,
         several_speeds=bool(seen >= OUT),
-        reverses=recordings.scale.reverses,
+        reverses=recordings.scale.both_ways,
     )
 
 
@@ -87,8 +87,11 @@ def sentences(limits: Limits, explained: Explained, known: dict[str, bool]) -> t
             "small. Record at more speeds, and faster ones."
         )
     if not limits.reverses:
+        recordings = explained.drive.recordings
+        share = f"only {100.0 * recordings.least_way:.2g} % of the samples are travelled in the other direction"
+        why = share if recordings.least_way > 0.0 else "the drive never reverses"
         sentences.append(
-            "Coulomb friction and a constant load cannot be distinguished, nor friction of the two directions: the drive "
-            "never reverses. What is known is their sum in this direction. Record to and fro."
+            "Coulomb friction and a constant load cannot be distinguished, nor friction of the two directions: "
+            f"{why}. What is known is their sum in this direction. Record to and fro."
         )
     return tuple(sentences)

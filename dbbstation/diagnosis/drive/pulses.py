@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import betaincc, betaln, expit
+from scipy.stats import chi2
 
-from dbbstation.diagnosis.drive.findings import Part
+from dbbstation.diagnosis.drive.findings import Complement, Part
 from dbbstation.diagnosis.drive.fit import fit
 from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.curves import Stretches
@@ -25,6 +26,15 @@ if TYPE_CHECKING:
 
 APART = 4.0
 """Standard uncertainties by which levels of a force in time must differ to be two: one in 15,000 by chance."""
+
+
+MOST_PUSHES = 8
+"""Stretches of time of sizes of their own, at the most: each has three numbers that nothing but the residual says, and with more of them
+they can follow whatever a law leaves."""
+
+
+ONE_SIZE = 0.999
+"""Probability up to which pushes of one size scatter as little as that."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +89,58 @@ def _at_turns(recordings: Recordings, times: NDArray[np.float64]) -> NDArray[np.
         at = one.kept[0] + np.round((times[own] - begins) * one.rate_hz).astype(np.int64)
         found[own] = one.turns[np.clip(at, 0, len(one.t_s) - 1)]
     return found
+
+
+def distinct_pushes(parts: Sequence[Part]) -> int:
+    """How many pushes stretches of time are, those of one size counted once: a machine that pushes again pushes as hard.
+
+    Args:
+        parts: that `pulse_parts` found.
+    """
+    return len(parts) - max(len(equal_pushes(parts)) - 1, 0)
+
+
+def equal_pushes(parts: Sequence[Part]) -> list[Part]:
+    """The most stretches of time that can be of one size together, by chi-square about their weighted mean, in their order."""
+    order = sorted(range(len(parts)), key=lambda k: parts[k].parameters["force_n"].value)
+    sizes = [parts[k].parameters["force_n"] for k in order]
+    best: range = range(0)
+    for first in range(len(sizes)):
+        while (stop := first + len(best) + 1) <= len(sizes) and _of_one_size(sizes[first:stop]):
+            best = range(first, stop)
+    return [parts[k] for k in sorted(order[k] for k in best)]
+
+
+def _of_one_size(sizes: Sequence[Value]) -> bool:
+    mean = pooled(sizes).value
+    squares = sum(((one.value - mean) / one.uncertainty) ** 2 for one in sizes)
+    return len(sizes) < 2 or squares <= float(chi2.ppf(ONE_SIZE, len(sizes) - 1))  # noqa: PLR2004 - one agrees with itself
+
+
+def complement_of(parts: Sequence[Part], first_s: float, last_s: float) -> Complement | None:
+    """The stretches between pulses of one size, with the opposite force; None where there are not two such pulses.
+
+    Args:
+        parts: that `pulse_parts` found.
+        first_s: begin of the recordings [s].
+        last_s: their end [s].
+    """
+    equal = [part for part in equal_pushes(parts) if part.t_s is not None]
+    if len(equal) < 2:  # noqa: PLR2004 - one pulse and the rest of the time say nothing of each other
+        return None
+    size = pooled([part.parameters["force_n"] for part in equal])
+    edges = [first_s, *(t for part in equal for t in part.t_s or ()), last_s]
+    between = tuple((a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a)
+    return Complement(Value(-size.value, size.uncertainty, size.unit), between, len(equal))
+
+
+def pooled(sizes: Sequence[Value]) -> Value:
+    """Weighted mean of sizes, with the larger of the uncertainties from theirs and from their scatter [ISO 13528; Birge 1932]."""
+    values, sigmas = (np.array([getattr(one, name) for one in sizes]) for name in ("value", "uncertainty"))
+    weights = 1.0 / np.square(sigmas)
+    mean = float(weights @ values / weights.sum())
+    scatter = float(weights @ np.square(values - mean)) / max(len(values) - 1, 1)
+    return Value(mean, float(np.sqrt(max(scatter, 1.0) / weights.sum())), sizes[0].unit)
 
 
 def pulse_parts(explained: Explained, names: Sequence[str]) -> list[Part]:

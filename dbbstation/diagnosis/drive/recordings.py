@@ -29,6 +29,10 @@ AGAINST = 0.3
 """Correlation with the speed, less than nothing, from which on a wrong sign shows: a tenth of the force's square. Less is what a
 delay of one channel does to a drive that has hardly any friction."""
 
+EACH_WAY = 0.05
+"""Share of the samples that must be travelled in each direction for what differs by direction to be said: with fewer it is said of a
+stop, an overshoot, or what filters make of these."""
+
 POWER_STRETCHES = 16
 """Stretches of all samples that the scatter of the power is read from."""
 
@@ -114,7 +118,14 @@ class Recordings:
             cutoff_hz=self.signals[0].cutoff_hz,
             sample_s=1.0 / min(s.rate_hz for s in self.signals),
             reverses=any(len(s.reversals) > 0 for s in self.signals),
+            both_ways=self.least_way >= EACH_WAY,
         )
+
+    @cached_property
+    def least_way(self) -> float:
+        """Share of the samples compared that are travelled in the direction that has fewer of them."""
+        way = self.at(lambda s: s.direction)
+        return float(min(np.mean(way > 0.0), np.mean(way < 0.0)))
 
     @cached_property
     def samples_apart_s(self) -> float:

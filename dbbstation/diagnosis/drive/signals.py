@@ -35,6 +35,7 @@ from dbbstation.diagnosis.drive.moving import (
 )
 from dbbstation.diagnosis.drive.sampling import evenly_sampled
 from dbbstation.diagnosis.drive.stuck import stuck_samples
+from dbbstation.diagnosis.drive.travel import resolution_of, retreat_m, turning_points, ways
 from dbbstation.errors import CalibrationError
 
 if TYPE_CHECKING:
@@ -96,6 +97,7 @@ class Signals:
         acceleration_noise_m_s2: root mean square that the position's noise alone puts into the acceleration there.
         position_noise_m: standard deviation of the measured position [m].
         standing_m_s: speed below which the drive counts as standing [m/s].
+        way: direction in which it travels between turning points, +1 or -1, shape (n,).
         weight: of every sample, zero where nothing is known of its force, shape (n,).
         kept: indices of the samples that are compared, shape (m,).
         notes: what was done to the recording, sentences.
@@ -112,6 +114,7 @@ class Signals:
     acceleration_noise_m_s2: float
     position_noise_m: float
     standing_m_s: float
+    way: NDArray[np.float64]
     weight: NDArray[np.float64]
     kept: NDArray[np.int64]
     notes: tuple[str, ...]
@@ -134,13 +137,16 @@ class Signals:
 
     @cached_property
     def direction(self) -> NDArray[np.float64]:
-        """Sign of the speed, shape (n,); zero where the drive stands: what ringing filters make of rest has no direction."""
-        return np.where(np.abs(self.speed_m_s) > self.standing_m_s, np.sign(self.speed_m_s), 0.0)
+        """Direction of travel, shape (n,); zero where the drive stands: what ringing filters make of rest has no direction.
+
+        A speed against the way that the drive travels is noise.
+        """
+        return np.where(self.speed_m_s * self.way > self.standing_m_s, self.way, 0.0)
 
     @cached_property
     def reversals(self) -> NDArray[np.int64]:
         """Samples at which the direction of travel changes; a stop without a change is none."""
-        moving = np.flatnonzero(np.abs(self.speed_m_s) > self.standing_m_s)
+        moving = np.flatnonzero(self.direction != 0.0)
         turned = np.flatnonzero(np.diff(self.direction[moving]) != 0.0)
         return (moving[turned] + moving[turned + 1]) // 2
 
@@ -207,7 +213,10 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
     half = half_window(noise_m, rate, standing_m_s / SURE_SIGMA, max(step // 2, 1))
     standing_m_s = max(standing_m_s, SURE_SIGMA * speed_noise_m_s(noise_m, rate, half))
     place, speed = (savgol_filter(position, 2 * half + 1, 2, deriv=k, delta=1.0 / rate) for k in (0, 1))
-    standing = np.abs(speed) <= standing_m_s
+    wobble_m = float(np.sqrt(np.mean((position - smooth) ** 2)))
+    retreat = retreat_m(max(noise_m, wobble_m), 1e-3 * resolution_of(recording.position_mm))
+    way = ways(place, turning_points(place, retreat))
+    standing = speed * way <= standing_m_s
     stuck, stuck_notes = stuck_samples(even.force_n, even.t_s, ~standing, recording.name)
     notes += [*stuck_notes, *_rests(standing, even.force_n, rate, step)]
     turned = speed[1:] * speed[:-1] < 0.0  # a quick reversal passes through standstill between two samples
@@ -236,6 +245,7 @@ def signals_of(recording: DriveRecording, cutoff_hz: float | None = None) -> Sig
         acceleration_noise_m_s2=float(np.sqrt(_acceleration_noise(floor, cutoff))),
         position_noise_m=noise_m,
         standing_m_s=standing_m_s,
+        way=way,
         weight=weight,
         kept=kept,
         notes=tuple(notes),

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         Number,
         Step,
     )
+    from dbbstation.diagnosis.drive.held_out import HeldOut
     from dbbstation.inference.verdict import Value
 
 
@@ -83,6 +84,7 @@ def drive_summary(diagnosis: DriveDiagnosis) -> dict[str, Any]:
             "locations": [_location(location, rest.variable or "") for location in diagnosis.rest_locations],
         },
         "cannot_tell": list(diagnosis.cannot_tell),
+        "held_out": _held_out(diagnosis.held_out),
         "signals": {
             "recordings": len(recordings.signals),
             "samples": sum(len(one.t_s) for one in recordings.signals),
@@ -167,5 +169,30 @@ def _source(finding: DriveFinding) -> dict[str, Any]:
             }
             for part in finding.parts
         ],
+        "at_end": list(finding.at_end),
+        "complement": None
+        if finding.complement is None
+        else {
+            "force_n": _values({"force_n": finding.complement.force_n})["force_n"],
+            "t_s": [list(stretch) for stretch in finding.complement.t_s],
+        },
+        "held_out": NOT_TESTED
+        if finding.gains is None
+        else {"with_gain": finding.gains.with_gain, "predicts": finding.gains.predicts},
         "text": finding.text,
+    }
+
+
+NOT_TESTED = "not-tested"
+"""Held-out parts were not asked for."""
+
+
+def _held_out(held: HeldOut | None) -> dict[str, Any] | str:
+    if held is None:
+        return NOT_TESTED
+    return {
+        "parts": held.parts,
+        "reference_rms_n": held.reference_n,
+        "corrected_rms_n": held.corrected_n,
+        "worse": held.is_worse,
     }

@@ -10,22 +10,25 @@ import numpy as np
 
 from dbbstation.diagnosis.drive.channel import METHOD_SHARE
 from dbbstation.diagnosis.drive.findings import DriveFinding, Effect, Part
-from dbbstation.diagnosis.drive.pulses import edges_of, pulse_parts
+from dbbstation.diagnosis.drive.naming import COGGING, COULOMB, TRANSIENT, acts, source_of
+from dbbstation.diagnosis.drive.noise_rival import probability_beside_noise
+from dbbstation.diagnosis.drive.pulses import MOST_PUSHES, complement_of, distinct_pushes, edges_of, pulse_parts
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.read_off import read_off
-from dbbstation.inference.verdict import OUT, SURE, Value, Verdict
+from dbbstation.inference.stretches import SHORTEST
+from dbbstation.inference.verdict import OUT, SURE, Gains, Value, Verdict, claim
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dbbstation.diagnosis.drive.contract import DriveSource
     from dbbstation.diagnosis.drive.explain import Explained
+    from dbbstation.diagnosis.drive.findings import Complement
+    from dbbstation.diagnosis.drive.held_out import HeldOut
     from dbbstation.inference.read_off import Finding
 
-ORDER = (Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT)
 CLAIMS = frozenset({Verdict.IDENTIFIED, Verdict.AMBIGUOUS})
-COULOMB, COGGING, TRANSIENT = "coulomb-friction", "cogging", "transient-force"
-"""Causes of which more is said than what their laws say: what one speed tells, waves over the position, stretches of time."""
+PREDICTS = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED})
 
 
 class Verdicts:
@@ -34,9 +37,11 @@ class Verdicts:
     Args:
         explained: what the comparison came to.
         several_speeds: the recordings tell Coulomb friction from viscous friction.
+        held: predictions of held-out parts; None: not asked for.
     """
 
-    def __init__(self, explained: Explained, *, several_speeds: bool) -> None:
+    def __init__(self, explained: Explained, *, several_speeds: bool, held: HeldOut | None = None) -> None:
+        self._held = held
         self._explained, self._drive, self._several = explained, explained.drive, several_speeds
         self._raw = read_off(explained.settled)
         self._source_of = {f.name: self._source(f) for f in self._raw}
@@ -46,7 +51,7 @@ class Verdicts:
     def findings(self) -> tuple[DriveFinding, ...]:
         """One per source, best first."""
         found = [self._finding(source) for source in self._drive.sources.values()]
-        return tuple(sorted(found, key=lambda f: (ORDER.index(f.verdict), -f.gain)))
+        return tuple(sorted(found, key=lambda f: (f.verdict.rank, -f.gain)))
 
     @property
     def named(self) -> list[str]:
@@ -73,7 +78,7 @@ class Verdicts:
         since its size differs between parts of the recording or nothing decides on it, is fitted beside the others as forces without
         a name are, and does not predict.
         """
-        sure = {f.name for f in self.findings() if f.verdict is Verdict.IDENTIFIED or f.ambiguous_with}
+        sure = {f.name for f in self.findings() if f.verdict in PREDICTS or f.ambiguous_with}
         return [name for name in self.named if self.source_of(name) in sure]
 
     def source_of(self, name: str) -> str:
@@ -84,7 +89,16 @@ class Verdicts:
         """Forces without a name that are there, largest first."""
         found = []
         for one in self._raw:
-            if self._source_of[one.name] or one.verdict is not Verdict.IDENTIFIED or not one.spans:
+            if self._source_of[one.name] or one.verdict is not Verdict.IDENTIFIED:
+                continue
+            if one.family is Family.BLOCKS:
+                which = 1.0 + float(np.argmax(one.blocks))
+                text = f"offset of {one.label}" if one.label else "offset of each recording"
+                found.append(
+                    Effect(text, "recording", one.probability, one.rms, which, which, "(number of the recording)")
+                )
+                continue
+            if not one.spans:
                 continue
             span = one.spans[0]
             turns = one.family in {Family.BY_DIRECTION, Family.PULSES_BY_DIRECTION}
@@ -94,13 +108,7 @@ class Verdicts:
 
     def _source(self, finding: Finding) -> str:
         """Name of the source that a finding belongs to; empty where it has none."""
-        if finding.name in self._drive.of_law:
-            return self._drive.of_law[finding.name][0].name
-        if finding.family is Family.PULSES:
-            return TRANSIENT if TRANSIENT in self._drive.sources else ""
-        if finding.family is Family.WAVE and finding.variables == ("position",):
-            return COGGING if COGGING in self._drive.sources else ""
-        return ""
+        return source_of(self._drive, self._explained.settled.bank.patterns, finding.name)
 
     def _finding(self, source: DriveSource) -> DriveFinding:
         own = self._of[source.name]
@@ -109,7 +117,8 @@ class Verdicts:
         if there and source.name == COULOMB and not self._several:
             alike = (*alike, "viscous friction")
         if there:
-            verdict = Verdict.AMBIGUOUS if alike else min((f.verdict for f in there), key=ORDER.index)
+            sure = not alike and any(f.verdict is Verdict.IDENTIFIED for f in there)
+            verdict = self._claimed(source.name) if sure else Verdict.AMBIGUOUS
             text = self._text(source, verdict, alike, there)
         else:
             verdict, text = self._absent(source, own)
@@ -121,10 +130,18 @@ class Verdicts:
                     f"This recording cannot tell it from {', '.join(alike)}. {source.texts.confirm}",
                 )
         best = max(there or own, key=lambda f: f.log_factor, default=None)
+        ends = self._at_end(there)
+        text = " ".join(
+            [
+                text,
+                *(f"{name} is at the end of what is tried, {span}: it may lie beyond." for name, span in ends.items()),
+            ]
+        )
         pulses = [f for f in there if f.family is Family.PULSES]
         pushed = max((f.probability for f in pulses), default=0.0)
         parts = tuple(part for f in there if f not in pulses for part in self._parts(f))
-        parts += self._pulses if pulses else ()
+        complement = self._complement if pulses and distinct_pushes(self._pulses) <= MOST_PUSHES else None
+        parts += self._pulses if pulses and distinct_pushes(self._pulses) <= MOST_PUSHES else ()
         parameters = self._values(best) if best is not None else {}
         if len(there) > 1 and best is not None and best.family is None:
             parameters = {k: v for f in reversed(there) for k, v in self._values(f).items()}
@@ -139,8 +156,24 @@ class Verdicts:
             rest_n=best.rms if best is not None else 0.0,
             parameters=parameters,
             parts=parts,
-            text=text,
+            text=text if complement is None else f"{text} {_in_words(complement)}",
+            at_end=tuple(ends),
+            complement=complement,
+            gains=None if self._held is None else self._held.gains.get(source.name, Gains(())),
         )
+
+    def _claimed(self, source: str) -> Verdict:
+        """Verdict of what is sure by its probability and its standard deviations."""
+        if self._held is None:
+            return claim(SURE, OUT, acts(source), None)
+        gains = self._held.gains.get(source, Gains(()))
+        return claim(SURE, OUT, acts(source), gains, worse=self._held.is_worse)
+
+    def _at_end(self, there: Sequence[Finding]) -> dict[str, str]:
+        """Numbers of laws that lie at the end of what is tried, and what that is."""
+        laws = [f.name for f in there if f.name in self._drive.of_law and self._is_member(f)]
+        ends = [(name, span) for law in laws for name, span in self._explained.after.at_end(law).items()]
+        return {name: f"{low:.3g} to {high:.3g}" for name, (low, high) in ends}
 
     def _as_sure_as_it_is(self, finding: Finding) -> Finding:
         """A finding whose values are known as well as stretches and bands agree on them: noise alone would call them surer."""
@@ -161,16 +194,38 @@ class Verdicts:
         return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
 
     def _as_sure_as_its_edges(self, finding: Finding) -> Finding:
-        """Stretches of time, which begin and end with the motion where a law is wrong and no force comes from elsewhere."""
+        """Stretches of time that are few, are no noise, and do not begin and end with the motion as where a law is wrong."""
+        if not self._pulses:
+            why = "None of its stretches stands out of those beside it."
+            return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
+        shortest = SHORTEST * self._drive.recordings.samples_apart_s
+        if all(part.parameters["duration_s"].value < shortest for part in self._pulses):
+            why = f"It is shorter than {SHORTEST} samples of the band, {shortest:.2g} s: one sample that is off looks the same."
+            return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
+        sizes = distinct_pushes(self._pulses)
+        if sizes > MOST_PUSHES:
+            why = (
+                f"{len(self._pulses)} stretches of time would be needed, {sizes} of them of sizes of their own: a law that is wrong is more "
+                "likely than so many pushes, and none of them is told."
+            )
+            return replace(finding, verdict=Verdict.AMBIGUOUS, text=why)
         edges = edges_of(self._drive.recordings, self._pulses)
         probability = finding.probability * edges.pushed
         if probability >= SURE:
-            return replace(finding, probability=probability)
+            probability *= self._beside_noise
+            if probability >= SURE:
+                return replace(finding, probability=probability)
+            why = "Noise whose neighbours resemble each other explains it as well."
+            return replace(finding, verdict=Verdict.AMBIGUOUS, probability=probability, text=why)
         why = (
             f"{edges.at_turns} of {edges.count} beginnings and ends are where the drive starts, stops or reverses, which it does "
             f"in {100.0 * edges.share:.0f} % of the time: friction or inertia that no law describes there is as likely."
         )
         return replace(finding, verdict=Verdict.AMBIGUOUS, probability=probability, text=why)
+
+    @cached_property
+    def _beside_noise(self) -> float:
+        return probability_beside_noise(self._explained.settled)
 
     @cached_property
     def _pulses(self) -> tuple[Part, ...]:
@@ -179,6 +234,11 @@ class Verdicts:
             f.name for f in self._raw if f.family is Family.PULSES and f.verdict in CLAIMS and f.name in self.named
         ]
         return tuple(pulse_parts(self._explained, names)) if names else ()
+
+    @cached_property
+    def _complement(self) -> Complement | None:
+        time = self._drive.recordings.time_s
+        return complement_of(self._pulses, float(time[0]), float(time[-1]))
 
     def _is_member(self, finding: Finding) -> bool:
         return finding.name in self._explained.settled.best.names
@@ -214,9 +274,19 @@ class Verdicts:
     def _text(self, source: DriveSource, verdict: Verdict, alike: Sequence[str], there: Sequence[Finding]) -> str:
         if verdict is Verdict.IDENTIFIED:
             return f"{source.texts.what} {source.texts.confirm}"
+        if verdict is Verdict.HAPPENED:
+            return f"{source.texts.what} It happened here; no other samples can test it. {source.texts.confirm}"
+        if verdict is Verdict.DOES_NOT_PREDICT:
+            return f"It is there in these samples and {self._brings_nothing(source.name)}. {source.texts.confirm}"
         if alike:
             return f"This recording cannot tell it from {', '.join(alike)}. {source.texts.confirm}"
         return f"{there[0].text or 'This recording does not decide it.'} {source.texts.confirm}"
+
+    def _brings_nothing(self, source: str) -> str:
+        if self._held is not None and self._held.is_worse:
+            return "everything together predicts held-out parts worse than mass and friction do"
+        gains = Gains(()) if self._held is None else self._held.gains.get(source, Gains(()))
+        return f"brings too little where it was not fitted: something in {gains.with_gain} of {self._held.parts if self._held else 0} held-out parts"
 
     def _absent(self, source: DriveSource, own: Sequence[Finding]) -> tuple[Verdict, str]:
         """Verdict on what is not in the model, and why."""
@@ -243,8 +313,13 @@ class Verdicts:
             return f"What it would explain, {faint[0].rms:.2g} N rms, is less than filters and differences leave of a perfect drive."
         if source.name == COULOMB and not self._several:
             return "One speed tells the sum of Coulomb and viscous friction, and no more."
-        if not own and source.name not in {COGGING, TRANSIENT} and not scale.reverses and not source.forms(scale):
-            return "The drive never reverses here, and only a reversal would show it."
+        if not own and source.name not in {COGGING, TRANSIENT} and not scale.both_ways and not source.forms(scale):
+            share = self._drive.recordings.least_way
+            if share == 0.0:
+                return "The drive never reverses here, and only a reversal would show it."
+            return (
+                f"Only {100.0 * share:.2g} % of the samples are travelled in the other direction, too few to show it."
+            )
         return ""
 
     def _no_cogging(self, own: Sequence[Finding]) -> tuple[Verdict, str]:
@@ -297,3 +372,12 @@ class Verdicts:
         if finding.name in self._drive.of_law:
             return [Part(self._drive.of_law[finding.name][1].label, self._values(finding))]
         return [Part(finding.name, dict(finding.values))]
+
+
+def _in_words(complement: Complement) -> str:
+    """What else pulses of one size may be."""
+    size = complement.force_n
+    return (
+        f"{complement.pulses} of them are of one size: {-size.value:+.3g} ± {size.uncertainty:.2g} N in these, or {size.value:+.3g} N in the "
+        "stretches between them and a constant load beside it: no recording says which."
+    )

@@ -46,7 +46,7 @@ def test_coulomb_friction_is_named_first_and_its_asymmetry_next(summary):
 
 def test_the_values_are_those_that_are_published(summary):
     mass = summary["parameters"]["mass_kg"]
-    assert abs(mass["value"] - 95.1) < 3.0 * mass["uncertainty"]
+    assert abs(mass["value"] - 95.1) < 2.0 * mass["uncertainty"]
     coulomb = next(s for s in summary["sources"] if s["name"] == "coulomb-friction")["parameters"]["coulomb_n"]
     assert coulomb["value"] == pytest.approx(20.4, rel=0.1)
     assert summary["parameters"]["viscous_n_s_m"]["value"] == pytest.approx(203.0, rel=0.05)

@@ -38,7 +38,7 @@ class FrictionAsymmetry(DriveSource):
 
     def forms(self, scale: Scale) -> tuple[Form, ...]:
         """Coulomb part and viscous part; a drive may have both."""
-        if not scale.reverses:
+        if not scale.both_ways:
             return ()
         dry = Parameter("coulomb_asymmetry_n", "N", 0.2 * scale.force_n, "half of forwards minus backwards")
         wet = Parameter(

@@ -48,7 +48,7 @@ class LostMotion(DriveSource):
 
     def forms(self, scale: Scale) -> tuple[Form, ...]:
         """One amplitude, the play, and the way over which the load comes back."""
-        if not scale.reverses:
+        if not (scale.reverses and scale.both_ways):
             return ()
         size = Parameter("lost_n", "N", 0.5 * scale.force_n, "force that is missing within the play", positive=True)
         gap = Parameter("gap_mm", "mm", 1e3 * 0.03 * scale.travel_m, "play")

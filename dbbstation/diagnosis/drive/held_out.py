@@ -1,0 +1,101 @@
+"""What causes bring in parts of the recordings that took no part in choosing or fitting them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.drive.fit import solved_on
+from dbbstation.diagnosis.drive.moving import within
+from dbbstation.diagnosis.drive.naming import COULOMB, source_of
+from dbbstation.inference.folds import parts_of
+from dbbstation.inference.settle import settle
+from dbbstation.inference.verdict import Gains, is_worse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.drive.channel import DriveChannel
+    from dbbstation.inference.model_comparison import Member
+    from dbbstation.inference.settled import Settled
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Predictions of parts that were held out, everything chosen anew without each of them.
+
+    Attributes:
+        gains: of each source that was chosen without some part, by name, in N².
+        parts: how many were held out.
+        reference_n: root mean square error of the law of mass, viscous and Coulomb friction [N].
+        corrected_n: of everything that was chosen, but for what happens in time [N].
+    """
+
+    gains: dict[str, Gains]
+    parts: int
+    reference_n: float
+    corrected_n: float
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether everything together predicts worse than mass and friction alone."""
+        return is_worse(self.corrected_n, self.reference_n)
+
+
+def held_out(drive: DriveChannel, progress: Callable[[str], None]) -> HeldOut:
+    """Hold back parts in turn, whole recordings from five on, else ten stretches, and predict them.
+
+    Samples as far from a part as the low-pass reaches take no part either: they contain some of its force.
+
+    Args:
+        drive: channel with the laws that can be.
+        progress: called with what is being done.
+    """
+    channel = drive.channel
+    parts = parts_of(channel)
+    gap = int(np.ceil(GAP_PERIODS / drive.scale.cutoff_hz / drive.recordings.samples_apart_s))
+    brought: dict[str, list[float]] = {source: [0.0] * len(parts) for source in drive.sources}
+    reference = corrected = 0.0
+    for number, (_, rows) in enumerate(parts):
+        progress(f"held-out part {number + 1} of {len(parts)}")
+        kept = channel.without(within(rows, gap))
+        settled = settle(kept, most_expanded=0, most_looks=1, thorough=False, rivals=False)
+        chosen = settled.best.members
+
+        def error(members: Sequence[Member], settled: Settled = settled, rows: NDArray[np.bool_] = rows) -> float:
+            return float(np.sum(_left(drive, settled, members)[rows] ** 2))
+
+        whole = error(chosen)
+        corrected += whole
+        reference += error([m for m in chosen if source_of(drive, settled.bank.patterns, m.cause.name) == COULOMB])
+        for source in {source_of(drive, settled.bank.patterns, m.cause.name) for m in chosen} - {""}:
+            others = [m for m in chosen if source_of(drive, settled.bank.patterns, m.cause.name) != source]
+            brought[source][number] = error(others) - whole
+    count = len(channel.residual)
+    gains = {source: Gains(tuple(each)) for source, each in brought.items() if any(each)}
+    return HeldOut(gains, len(parts), float(np.sqrt(reference / count)), float(np.sqrt(corrected / count)))
+
+
+GAP_PERIODS = 0.5
+"""Periods of the cut-off about a part that are left out beside it: the impulse response of the low-pass is a tenth beyond."""
+
+
+def _left(drive: DriveChannel, settled: Settled, members: Sequence[Member]) -> NDArray[np.float64]:
+    """What predictions leave of all samples, fitted to those that were kept, shape (m,) [N].
+
+    What members do in time they were fitted for, and predict nothing with: it says nothing of other times.
+    """
+    values, columns = solved_on(drive, settled, members)
+    first = drive.channel.base.samples.shape[1]
+    used = np.ones(len(values), dtype=bool)
+    for member in members:
+        width = len(member.columns)
+        pattern = settled.bank.patterns.get(member.cause.name)
+        if pattern is not None and any(variable.name == "time" for variable in pattern.variables):
+            used[first : first + width] = False
+        first += width
+    return np.asarray(drive.channel.residual - columns[:, used] @ values[used], dtype=np.float64)

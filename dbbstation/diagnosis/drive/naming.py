@@ -1,0 +1,44 @@
+"""Which cause a member of a hypothesis belongs to, and when it acts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.inference.patterns import Family
+from dbbstation.inference.verdict import Acts
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.diagnosis.drive.channel import DriveChannel
+    from dbbstation.inference.patterns import Pattern
+
+COULOMB, COGGING, TRANSIENT = "coulomb-friction", "cogging", "transient-force"
+"""Causes of which more is said than what their laws say: what one speed tells, waves over the position, stretches of time."""
+
+DRIFT = "friction-drift"
+
+
+def source_of(drive: DriveChannel, patterns: Mapping[str, Pattern], name: str) -> str:
+    """Name of the source that a member belongs to; empty where it has none.
+
+    Args:
+        drive: that was compared.
+        patterns: of the comparison, by name.
+        name: of the member.
+    """
+    if name in drive.of_law:
+        return drive.of_law[name][0].name
+    pattern = patterns.get(name)
+    if pattern is None:
+        return ""
+    if pattern.family is Family.PULSES:
+        return TRANSIENT if TRANSIENT in drive.sources else ""
+    if pattern.family is Family.WAVE and [variable.name for variable in pattern.variables] == ["position"]:
+        return COGGING if COGGING in drive.sources else ""
+    return ""
+
+
+def acts(source: str) -> Acts:
+    """When a cause acts: a force in time and friction that drifts happen once, laws of the motion whenever the drive moves."""
+    return Acts.ONCE if source in {TRANSIENT, DRIFT} else Acts.ALWAYS

@@ -246,6 +246,7 @@ MOST_LEADING = 4
 def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
     from dbbstation.cli.output import print_table
 
+    tested = any(f["gains"] for f in there)
     rows = [
         [
             f["name"],
@@ -254,10 +255,12 @@ def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
             f"{f['log_bayes_factor']:.0f}",
             f"{f['rms']:.2g}",
             f"{100 * f['confounded']:.0f} %",
+            *([_gained(f)] if tested else []),
         ]
         for f in there
     ]
-    print_table(["effect", "verdict", "probability", "log Bayes factor", f"{unit} rms".strip(), "concealed"], rows)
+    head = ["effect", "verdict", "probability", "log Bayes factor", f"{unit} rms".strip(), "concealed"]
+    print_table([*head, *(["parts with a gain"] if tested else [])], rows)
     for f in there:
         if f["verdict"] == "ambiguous" and len(there) > MOST_TOLD:
             continue
@@ -266,6 +269,12 @@ def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
         if values and len(f["values"]) <= MOST_VALUES:
             echo(f"  {values}")
         echo(f"  {f['text']}")
+
+
+def _gained(finding: Mapping[str, Any]) -> str:
+    """In how many held-out parts an effect brought something; nothing where that decides nothing."""
+    gains = finding["gains"]
+    return f"{gains['with_gain']} of {len(gains['parts'])}" if gains and finding["acts"] == "always" else ""
 
 
 SURELY_FOUND = ("identified", "happened", "does-not-predict")

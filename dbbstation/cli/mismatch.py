@@ -163,7 +163,12 @@ def _corrected(tabulated: Tabulated, found: Mismatch) -> str:
 def _print(summary: Mapping[str, Any]) -> None:
     from dbbstation.cli.output import print_table
 
-    unit = summary["unit"]
+    unit, held_out = summary["unit"], summary["held_out_rms"]
+    if held_out and held_out["worse"]:
+        echo(
+            f"Held-out rows are predicted worse than as simulated: {held_out['after']:.3g} corrected, {held_out['as_simulated']:.3g} "
+            f"{unit} rms as simulated. Nothing is identified.\n".replace("  ", " ")
+        )
     print_table(
         ["variable", "kind", "unit", "from", "to"],
         [
@@ -173,7 +178,7 @@ def _print(summary: Mapping[str, Any]) -> None:
     )
     echo()
     _print_whether(summary)
-    there = [f for f in summary["findings"] if f["verdict"] == "identified"]
+    there = [f for f in summary["findings"] if f["verdict"] in SURELY_FOUND]
     equivalent = {name for f in there for name in f["equivalent"]}
     likely = [f for f in summary["findings"] if f["verdict"] == "ambiguous" and f["probability"] >= LIKELY]
     likely = [f for f in likely if f["name"] not in equivalent]
@@ -181,14 +186,16 @@ def _print(summary: Mapping[str, Any]) -> None:
     if there:
         echo()
         _print_findings(there, unit)
+    _print_cancelling(summary)
     _print_parameters(summary)
-    held_out = summary["held_out_rms"]
     if held_out:
         echo(
             f"\nheld-out error: {held_out['as_simulated']:.3g} as simulated, {held_out['before']:.3g} refitted, "
             f"{held_out['after']:.3g} {unit} rms corrected; over {len(held_out['folds'])} parts, everything chosen anew "
             "without each of them"
         )
+    elif any(f["verdict"] == "identified" for f in there):
+        echo("\nheld-out parts were not asked for: whether what is identified predicts other rows was not tested.")
     echo()
     _print_left(summary)
     for verdict in ("not-testable", "ruled-out"):
@@ -239,6 +246,7 @@ MOST_LEADING = 4
 def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
     from dbbstation.cli.output import print_table
 
+    tested = any(f["gains"] for f in there)
     rows = [
         [
             f["name"],
@@ -247,10 +255,12 @@ def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
             f"{f['log_bayes_factor']:.0f}",
             f"{f['rms']:.2g}",
             f"{100 * f['confounded']:.0f} %",
+            *([_gained(f)] if tested else []),
         ]
         for f in there
     ]
-    print_table(["effect", "verdict", "probability", "log Bayes factor", f"{unit} rms".strip(), "concealed"], rows)
+    head = ["effect", "verdict", "probability", "log Bayes factor", f"{unit} rms".strip(), "concealed"]
+    print_table([*head, *(["parts with a gain"] if tested else [])], rows)
     for f in there:
         if f["verdict"] == "ambiguous" and len(there) > MOST_TOLD:
             continue
@@ -261,6 +271,15 @@ def _print_findings(there: Sequence[Mapping[str, Any]], unit: str) -> None:
         echo(f"  {f['text']}")
 
 
+def _gained(finding: Mapping[str, Any]) -> str:
+    """In how many held-out parts an effect brought something; nothing where that decides nothing."""
+    gains = finding["gains"]
+    return f"{gains['with_gain']} of {len(gains['parts'])}" if gains and finding["acts"] == "always" else ""
+
+
+SURELY_FOUND = ("identified", "happened", "does-not-predict")
+"""Verdicts of effects that these rows show for sure."""
+
 LIKELY = 0.5
 """Probability from which on an effect that is not certain is printed; all of them are in the JSON."""
 
@@ -269,6 +288,13 @@ MOST_TOLD = 12
 
 MOST_VALUES = 6
 """Values of an effect that are printed; those of a curve say little by themselves, and are in the JSON."""
+
+
+def _print_cancelling(summary: Mapping[str, Any]) -> None:
+    cancelling, unit = summary["cancelling"], summary["unit"]
+    if cancelling:
+        parts = ", ".join(f"{name} {rms:.2g}" for name, rms in cancelling["rms"].items())
+        echo(f"\nEffects cancel each other: {parts}, together {cancelling['rms_of_sum']:.2g} {unit} rms.")
 
 
 def _print_parameters(summary: Mapping[str, Any]) -> None:

@@ -1,14 +1,16 @@
-"""Held-out error of a whole selection: everything is chosen anew from the rows that are left."""
+"""Held-out error of a whole selection, everything chosen anew from the rows that are left, and what each effect gained by it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from dbbstation.inference.verdict import Gains, is_worse
+
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection, Mapping
 
     from numpy.typing import NDArray
 
@@ -21,6 +23,13 @@ FOLDS = 10
 ENOUGH_BLOCKS = 5
 """Blocks from which on whole blocks are held back."""
 
+WIDEST_GAP = 0.5
+"""Gap beside a part at the most, as a share of its rows: where neighbours resemble each other for longer, four fifths of the rows are
+still left to choose from."""
+
+Kind: TypeAlias = "tuple[str, ...]"
+"""Family and variables of an effect, or the name of a law."""
+
 
 @dataclass(frozen=True)
 class Fold:
@@ -29,9 +38,11 @@ class Fold:
     Attributes:
         name: of the part.
         rows: how many.
-        as_simulated: root mean square error with nothing fitted but the mean of the other parts, in the unit of the residual.
+        as_simulated: root mean square error of the reference, in the unit of the residual.
         before: with the base fitted to the other parts by ordinary least squares.
         after: with what was chosen from the other parts.
+        gains: by kind of the effects that were chosen from the other parts, sum of squares of the errors without them, less that with
+            them, in the squared unit of the residual.
     """
 
     name: str
@@ -39,6 +50,7 @@ class Fold:
     as_simulated: float
     before: float
     after: float
+    gains: Mapping[Kind, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -53,7 +65,7 @@ class HeldOutError:
 
     @property
     def as_simulated(self) -> float:
-        """Over all parts, with nothing fitted but a mean."""
+        """Over all parts, of the reference."""
         return self._all([fold.as_simulated for fold in self.folds])
 
     @property
@@ -66,6 +78,15 @@ class HeldOutError:
         """Over all parts, with what was chosen."""
         return self._all([fold.after for fold in self.folds])
 
+    @property
+    def is_worse(self) -> bool:
+        """Whether what was chosen predicts worse than the reference."""
+        return is_worse(self.after, self.as_simulated)
+
+    def gains_of(self, kinds: Collection[Kind]) -> Gains:
+        """What effects of some kinds brought together in each part; nothing where none of them was chosen."""
+        return Gains(tuple(sum(fold.gains.get(kind, 0.0) for kind in set(kinds)) for fold in self.folds))
+
     def _all(self, errors: list[float]) -> float:
         counts = np.array([fold.rows for fold in self.folds], dtype=np.float64)
         return float(np.sqrt(np.sum(counts * np.square(errors)) / counts.sum()))
@@ -75,25 +96,62 @@ def held_out_error(
     channel: Channel,
     choose_without: Callable[[Channel, NDArray[np.bool_]], Settled],
     progress: Callable[[str, int, int], None] = lambda _text, _done, _of: None,
+    *,
+    alike: float = 1.0,
+    reference: Callable[[NDArray[np.bool_]], NDArray[np.float64]] | None = None,
 ) -> HeldOutError:
     """Hold back parts in turn: blocks where there are five or more, else ten stretches of consecutive rows.
+
+    Beside a stretch the rows that resemble it are held back from the choice, too: they know it. The reference may know them.
 
     Args:
         channel: all rows.
         choose_without: the whole selection, laws, patterns, noise and looks, without rows that are held back, shape (n,).
         progress: called with what is being done, and how much of how much.
+        alike: correlation time of the noise [rows].
+        reference: what predictions are held against, over all rows, shape (n,), from the rows that it may be fitted to, shape (n,);
+            the mean of these if None.
     """
     found = []
     parts = parts_of(channel)
     for done, (name, rows) in enumerate(parts):
         progress("held-out part", done, len(parts))
-        settled = choose_without(channel, rows)
-        simulated = channel.residual - float(np.mean(channel.residual[~rows]))
+        out = rows | _beside(channel, rows, alike)
+        settled = choose_without(channel, out)
+        plain = float(np.mean(channel.residual[~rows])) if reference is None else reference(~rows)
         refitted = channel.residual - channel.base.samples @ channel.without(rows).refitted()
         corrected = channel.residual - settled.predicted()
-        errors = (_rms(errors[rows]) for errors in (simulated, refitted, corrected))
-        found.append(Fold(name, int(rows.sum()), *errors))
+        one, two, three = (_rms(errors[rows]) for errors in (channel.residual - plain, refitted, corrected))
+        found.append(Fold(name, int(rows.sum()), one, two, three, _gains(settled, rows)))
     return HeldOutError(tuple(found))
+
+
+def _gains(settled: Settled, rows: NDArray[np.bool_]) -> dict[Kind, float]:
+    """What each member brings in rows that took no part, the others refitted without it, by kind."""
+    residual, members = settled.channel.residual, settled.best.members
+    with_all = float(np.sum(np.square((residual - settled.predicted())[rows])))
+    columns = {member.cause.name: settled.bank.samples(member.columns) for member in members}
+    found: dict[Kind, float] = {}
+    for member in members:
+        effect = np.zeros(len(residual))
+        if others := settled.best.without(member.cause.name):
+            samples = np.hstack([columns[other.cause.name] for other in others])
+            effect = samples @ settled.comparison.estimates(others).values
+        error = residual - effect - settled.channel.base.samples @ settled.base_values(effect)
+        kind = settled.bank.kind_of(member.cause.name)
+        found[kind] = found.get(kind, 0.0) + float(np.sum(np.square(error[rows]))) - with_all
+    return found
+
+
+def _beside(channel: Channel, rows: NDArray[np.bool_], alike: float) -> NDArray[np.bool_]:
+    """Rows of the same block within a correlation time of a part; none where rows have no order or resemble no neighbour, shape (n,)."""
+    found = np.zeros(len(rows), dtype=bool)
+    gap = min(int(np.ceil(alike)), int(WIDEST_GAP * rows.sum())) if channel.time is not None and alike > 1.0 else 0
+    for block in channel.blocks:
+        own = np.flatnonzero(rows[block])
+        if gap and len(own):
+            found[block.start + max(own[0] - gap, 0) : min(block.start + own[-1] + 1 + gap, block.stop)] = True
+    return found & ~rows
 
 
 def parts_of(channel: Channel) -> list[tuple[str, NDArray[np.bool_]]]:

@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.square_root import spread
+from dbbstation.inference.square_root import compress, solve, spread, with_random
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from dbbstation.inference.square_root import Block
+    from dbbstation.inference.settled import Settled
+    from dbbstation.inference.square_root import Block, Solution
 
 
 def jackknife_covariance(blocks: Sequence[Block], size: int) -> NDArray[np.float64]:
@@ -36,3 +37,45 @@ def jackknife_covariance(blocks: Sequence[Block], size: int) -> NDArray[np.float
         values.append(found / norm)
     away = np.array(values) - np.mean(values, axis=0)
     return np.asarray((len(blocks) - 1) / len(blocks) * away.T @ away, dtype=np.float64)
+
+
+def weighted_jackknife(
+    values: NDArray[np.float64],
+    variances: NDArray[np.float64],
+    without: NDArray[np.float64],
+    variances_without: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Standard uncertainties from how values move when parts are left out, shape (p,).
+
+    Each part counts by the share of the information that is left without it. So the expected square is the variance where the stated
+    variances are right, however unequal the parts are, and a part that alone knows a value says nothing about its spread.
+    [weighted jackknife, Wu, Annals of Statistics 14 (1986) 1261, eq. 5.1, for each value by itself]
+
+    Args:
+        values: from all parts, shape (p,).
+        variances: stated of them, shape (p,).
+        without: values without each part, shape (k, p).
+        variances_without: stated of these, shape (k, p); not finite where nothing is left that knows the value.
+    """
+    with np.errstate(all="ignore"):
+        squares = variances / variances_without * np.square(without - values)
+    return np.asarray(np.sqrt(np.sum(np.where(np.isfinite(squares), squares, 0.0), axis=0)))
+
+
+def refits_without(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> tuple[Solution, ...]:
+    """Base and members of the best hypothesis fitted without each part, in the noise that there is: nothing is chosen anew.
+
+    Args:
+        settled: what a comparison came to.
+        parts: rows of each, shape (n,).
+    """
+    bank, channel, members = settled.bank, settled.channel, settled.best.members
+    columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
+    known = with_random(channel.known, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
+    numbers, target = np.arange(columns.shape[1]), bank.target
+    blocks = [compress(numbers, columns[rows[channel.kept]], target[rows[channel.kept]]) for rows in parts]
+    with np.errstate(all="ignore"):
+        return tuple(
+            solve([*blocks[:k], *blocks[k + 1 :]], known, settled.noise.innovation, channel.held)
+            for k in range(len(blocks))
+        )

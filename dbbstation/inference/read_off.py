@@ -7,24 +7,27 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import expit
 
 from dbbstation.inference.alternatives import EVEN, Alternatives, standing_out
-from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.model_comparison import SCALES
+from dbbstation.inference.named_values import named_values, with_jackknife
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
-from dbbstation.inference.settle import impossible, moved
-from dbbstation.inference.verdict import OUT, SURE, Value, Verdict
+from dbbstation.inference.settle import impossible
+from dbbstation.inference.stretches import SHORTEST
+from dbbstation.inference.variables import Kind
+from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, Gains, Value, Verdict, claim
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
+    from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.model_comparison import Cause, Member
+    from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.settled import Settled
-
-ABSENT = 0.01
-"""Probability up to which something that would have been seen is ruled out, or its prior probability if that is less."""
+    from dbbstation.inference.square_root import Solution
 
 LATE = (Family.MEMORY, Family.DEAD_TIME)
 """Families of what follows a variable late."""
@@ -74,6 +77,10 @@ class Finding:
         equivalent: causes that nothing measured here tells from it, itself first; empty where there are none.
         ambiguous_with: causes of which one is there for sure, if not this one.
         text: why, in a sentence; empty where the verdict says it all.
+        acts: whether other rows can show it again.
+        gains: in held-out parts; None where these were not asked for.
+        persists: a step in time that held-out parts tell of, too.
+        recurs: a wave over the time that predicts held-out parts, found anew without each of them.
     """
 
     name: str
@@ -95,18 +102,41 @@ class Finding:
     equivalent: tuple[str, ...] = ()
     ambiguous_with: tuple[str, ...] = ()
     text: str = ""
+    acts: Acts = Acts.ALWAYS
+    gains: Gains | None = None
+    persists: bool = False
+    recurs: bool = False
 
 
-def read_off(settled: Settled) -> tuple[Finding, ...]:
-    """One finding per law and per pattern, those that are there first, largest first."""
-    judge = _Judge(settled)
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What parts of the rows say of the findings from all of them.
+
+    Attributes:
+        held_out: predictions of each part, everything chosen anew without it; None where these were not asked for.
+        refits: values of base and members without each part [`refits_without`]; none: uncertainties are the model's.
+    """
+
+    held_out: HeldOutError | None = None
+    refits: Sequence[Solution] = ()
+
+
+def read_off(settled: Settled, trial: Trial | None = None) -> tuple[Finding, ...]:
+    """One finding per law and per pattern, those that are there first, largest first.
+
+    Args:
+        settled: what the comparison came to.
+        trial: what parts of the rows say; None: the client judges what is sure itself [`claim`], which is called identified here.
+    """
+    judge = _Judge(settled, trial)
     found = [judge.finding(cause) for cause in settled.causes]
     found += [judge.refused(name, why) for name, why in settled.refused.items()]
     return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_factor)))
 
 
 class _Judge:
-    def __init__(self, settled: Settled) -> None:
+    def __init__(self, settled: Settled, trial: Trial | None) -> None:
+        self._trial = trial
         self._settled, self._best, laws = settled, settled.best, settled.bank.laws
         self._members = {member.cause.name: member for member in self._best.members}
         self._without = settled.bank.base_values(np.zeros(len(settled.channel.residual)))
@@ -121,9 +151,10 @@ class _Judge:
         self._classes = self._alternatives.classes
         estimates = settled.comparison.estimates(self._best.members) if self._members else None
         self._values: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+        self._own: dict[str, slice] = {}
         first = 0
         for name, member in self._members.items():
-            own = slice(first, first + len(member.columns))
+            own = self._own[name] = slice(first, first + len(member.columns))
             first = own.stop
             if estimates is not None:
                 self._values[name] = (estimates.values[own], estimates.covariance[own, own])
@@ -158,9 +189,12 @@ class _Judge:
         effect = self._settled.bank.samples(shown.columns) @ values
         whole, rms, confounded = self._concealed(effect)
         verdict, others, text = self._verdict(cause, member, probability, sigmas)
+        gains = self._gains(cause.name) if member is not None else None
         law = self._settled.bank.laws.get(cause.name)
         variables = pattern.variables if pattern else law.variables if law else ()
-        there = verdict in {Verdict.IDENTIFIED, Verdict.AMBIGUOUS} and member is not None
+        there = verdict.rank <= Verdict.AMBIGUOUS.rank and member is not None
+        rows = _stretches(effect) if there and pattern is not None and pattern.family == "pulses" else ()
+        happened = verdict is Verdict.HAPPENED and gains is not None and gains.predicts and pattern is not None
         largest = _at_half(effect) if there else np.zeros(0, dtype=bool)
         channel = self._settled.channel
         return Finding(
@@ -175,15 +209,43 @@ class _Judge:
             sigmas=sigmas,
             whole_rms=whole,
             confounded=confounded,
-            values=self._named_values(shown, values, covariance),
+            values=self._named(shown, values, covariance),
             spans=tuple(_span(v.values[largest], v.name, v.unit) for v in variables) if there else (),
             rows_there=int(largest.sum()),
-            rows=_stretches(effect) if there and pattern is not None and pattern.family == "pulses" else (),
+            rows=rows,
             blocks=tuple(_rms(effect[rows] - effect.mean()) for rows in channel.blocks) if there else (),
             equivalent=equal if len(equal) > 1 else (),
             ambiguous_with=others,
             text=text,
+            acts=_acts(pattern),
+            gains=gains,
+            persists=bool(happened and pattern and (pattern.family is Family.STEP or self._is_a_step(rows))),
+            recurs=bool(happened and pattern and pattern.family is Family.WAVE),
         )
+
+    def _gains(self, name: str) -> Gains | None:
+        """What a member and its class brought in held-out parts."""
+        if self._trial is None or self._trial.held_out is None:
+            return None
+        return self._trial.held_out.gains_of({self._settled.bank.kind_of(one) for one in self._pooled(name)})
+
+    def _is_a_step(self, rows: tuple[tuple[int, int], ...]) -> bool:
+        """Whether stretches of rows are a single one that a block begins or ends with, but for fewer rows than a stretch has."""
+        if len(rows) != 1:
+            return False
+        (first, last), blocks = rows[0], self._settled.channel.blocks
+        return any(0 <= first - b.start < SHORTEST or 0 <= b.stop - 1 - last < SHORTEST for b in blocks)
+
+    def _named(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> dict[str, Value]:
+        """Amplitudes and nonlinear parameters, with the larger of the model's uncertainty and that of a jackknife over parts."""
+        found = named_values(self._settled, member, values, covariance)
+        own = self._own.get(member.cause.name)
+        if own is None or self._trial is None or not self._trial.refits:
+            return found
+        first = len(self._settled.channel.base.names)
+        inside = slice(first + own.start, first + own.stop)
+        parts = [(one.x[inside], one.covariance[inside, inside]) for one in self._trial.refits]
+        return with_jackknife(found, [named_values(self._settled, member, *part) for part in parts])
 
     def _pooled(self, name: str) -> tuple[str, ...]:
         """A cause and its class, and what would be the same to its user.
@@ -221,7 +283,7 @@ class _Judge:
     ) -> tuple[Verdict, tuple[str, ...], str]:
         """Verdict, with whom it is ambiguous, and why."""
         if member is not None and self._alternatives.probability(self._pooled(cause.name)) >= SURE:
-            verdict, others, text = self._certain(probability, sigmas)
+            verdict, others, text = self._certain(cause.name, probability, sigmas)
             return verdict, others, text or self._unless_late(cause.name)
         if member is None and (why := self._impossible_in_place(cause)):
             return Verdict.RULED_OUT, (), why
@@ -244,13 +306,23 @@ class _Judge:
             return ""
         return "These rows do not tell whether it comes late."
 
-    def _certain(self, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
+    def _certain(self, name: str, probability: float, sigmas: float) -> tuple[Verdict, tuple[str, ...], str]:
         """Verdict of what is there for sure beside the most probable noise."""
         if probability < SURE:
             return Verdict.AMBIGUOUS, (), "Noise whose neighbours resemble each other explains it as well."
         if sigmas < OUT:
             return Verdict.AMBIGUOUS, (), f"Its effect is only {sigmas:.2g} standard deviations out."
-        return Verdict.IDENTIFIED, (), ""
+        if self._trial is None:
+            return claim(probability, sigmas, Acts.ALWAYS, None), (), ""
+        gains, held_out = self._gains(name), self._trial.held_out
+        worse = held_out is not None and held_out.is_worse
+        verdict = claim(probability, sigmas, _acts(self._settled.bank.patterns.get(name)), gains, worse=worse)
+        text = ""
+        if verdict is Verdict.DOES_NOT_PREDICT and gains is not None:
+            text = f"It was found in these rows; held-out parts gain by it in {gains.with_gain} of {len(gains.parts)}."
+            if gains.predicts:
+                text += " Everything together predicts them worse than without."
+        return verdict, (), text
 
     def _impossible_in_place(self, cause: Cause) -> str:
         """Why a law cannot stand in the place of what nothing measured tells from it; empty where it can."""
@@ -274,7 +346,7 @@ class _Judge:
             if self._seen(cause, (), base=False) >= OUT:
                 return Verdict.NOT_TESTABLE, (), "The fitted parameters would take it up."
             return Verdict.NOT_TESTABLE, (), "These rows would not show it at its plausible size."
-        if probability > max(ABSENT, float(expit(cause.log_prior_odds))):
+        if probability > ABSENT:
             return Verdict.NOT_TESTABLE, (), "These rows leave it open: they neither show nor exclude it."
         return Verdict.RULED_OUT, (), "It would have been seen at its plausible size and was not needed."
 
@@ -306,54 +378,13 @@ class _Judge:
         share = 1.0 - (rest / whole) ** 2 if whole > 0.0 else 0.0
         return whole, rest, float(np.clip(share, 0.0, 1.0))
 
-    def _named_values(
-        self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
-    ) -> dict[str, Value]:
-        """Amplitudes and nonlinear parameters with their uncertainty; what a formula may be off by is part of it."""
-        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        width = len(member.variant.columns)
-        law = self._settled.bank.laws.get(member.cause.name)
-        if law is not None:
-            found = {
-                law.parameters[j]: Value(
-                    float(values[k]), float(np.hypot(sigma[k], law.form_uncertainty * values[k])), law.units[j]
-                )
-                for k, j in enumerate(amplitudes_of(member.variant).tolist())
-            }
-            shaped, every = moved(law, member, values), len(law.plausible)
-            for k, name in enumerate(law.parameters[every:]):
-                known = len(member.variant.slack) > k
-                found[name] = Value(shaped[k], float(sigma[width + k]) if known else np.nan, law.units[every + k])
-            return found
-        pattern = self._settled.bank.patterns[member.cause.name]
-        unit = self._settled.channel.unit
-        if len(pattern.per) < width:
-            return {}
-        names = _NAMES.get(str(pattern.family), tuple(f"amplitude {k + 1}" for k in range(width)))[:width]
-        names = ("slope",) if pattern.family in {"linear", "drift"} else names
-        return {
-            name: Value(
-                float(values[k] / pattern.per[k]), float(sigma[k] / pattern.per[k]), _unit(unit, pattern.units[k])
-            )
-            for k, name in enumerate(names)
-        }
 
-
-_NAMES = {
-    "once per turn": ("cosine", "sine"),
-    "twice per turn": ("cosine", "sine"),
-    "wave": ("cosine", "sine"),
-    "hysteresis": ("half width",),
-    "speed": ("per speed",),
-    "lag": ("delay",),
-    "bump": ("height",),
-    "step": ("height",),
-}
-
-
-def _unit(unit: str, per: str) -> str:
-    """Unit of an amplitude; one that stands by itself is no quotient of the channel's."""
-    return f"{unit}{per}" if per == "" or per.startswith(("/", " per")) else per
+def _acts(pattern: Pattern | None) -> Acts:
+    """Whether other rows can show an effect again: not what follows the time alone, nor offsets of runs."""
+    if pattern is None:
+        return Acts.ALWAYS
+    over_time = any(variable.kind is Kind.TIME for variable in pattern.variables)
+    return Acts.ONCE if over_time or pattern.family in (*IN_TIME, Family.BLOCKS) else Acts.ALWAYS
 
 
 def _at_half(effect: NDArray[np.float64]) -> NDArray[np.bool_]:

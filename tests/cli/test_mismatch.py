@@ -62,6 +62,44 @@ def test_a_program_reads_the_same_and_the_files_hold_it(run, warm, tmp_path):
     assert run("mismatch", warm, *QUICK, "--out", out, "--force").code == DONE
 
 
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory):
+    """Rows that no curve from one end foretells: a parabola, and a fall in the last tenth."""
+    at, noise = np.linspace(0.0, 1.0, 200), np.random.default_rng(3).standard_normal(200)
+    measured = 0.1 * np.where(at < 0.9, at**2, 0.81 - 18.0 * (at - 0.9)) + 0.01 * noise
+    lines = [f"{m:.5f},0.0,{20.0 + 10.0 * x:.4f}" for m, x in zip(measured, at, strict=True)]
+    path = tmp_path_factory.mktemp("table") / "bent.csv"
+    path.write_text("\n".join(["measured_mm,simulated_mm,oil_temp_c", *lines]) + "\n")
+    return path
+
+
+def test_what_predicts_worse_than_the_simulation_is_said_first_and_nothing_is_identified(run, bent):
+    outcome = run("mismatch", bent, *COLUMNS)
+    first, *others = outcome.out.splitlines()
+    assert first.startswith("Held-out rows are predicted worse than as simulated: 0.0")
+    assert first.endswith("mm rms as simulated. Nothing is identified.")
+    assert not any(" identified " in line for line in others)
+    assert "does-not-predict" in outcome.out
+    data = run("mismatch", bent, *COLUMNS, "--json").data
+    assert data["held_out"] == "tested"
+    assert data["held_out_rms"]["worse"] is True
+    assert data["held_out_rms"]["after"] > data["held_out_rms"]["as_simulated"]
+    found = {f["name"]: f for f in data["findings"] if f["gains"]}
+    assert found["curve over oil_temp_c"]["verdict"] == "does-not-predict"
+    gains = found["curve over oil_temp_c"]["gains"]
+    assert (len(gains["parts"]), gains["with_gain"]) == (10, sum(part > 0.0 for part in gains["parts"]))
+    assert gains["total"] == pytest.approx(sum(gains["parts"]))
+
+
+def test_what_was_not_tested_is_said(run, bent):
+    outcome = run("mismatch", bent, *QUICK)
+    assert "curve over oil_temp_c" in outcome.out
+    assert "whether what is identified predicts other rows was not tested" in outcome.out
+    data = run("mismatch", bent, *QUICK, "--json").data
+    assert data["held_out"] == "not-tested"
+    assert all(finding["gains"] is None for finding in data["findings"])
+
+
 def test_units_may_be_stated_and_variables_chosen(run, warm, tmp_path):
     path = tmp_path / "bare.csv"
     path.write_text(warm.read_text().replace("oil_temp_c", "oil").replace("screw_deg", "screw"))

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from dbbstation.inference.jackknife import jackknife_covariance
+from dbbstation.inference.jackknife import jackknife_covariance, refits_without, weighted_jackknife
+from dbbstation.inference.settle import settle
 from dbbstation.inference.square_root import compress
+from tests.inference.tables import table
+from tests.inference.test_channel import EFFECTS, channel
 
 
 def blocks_of(columns, target, count):
@@ -43,3 +46,49 @@ def test_what_one_block_alone_knows_is_uncertain(rng):
     target = columns @ [1.0, 5.0] + rng.normal(0.0, 0.01, 300)
     covariance = jackknife_covariance(blocks_of(columns, target, 10), 2)
     assert np.sqrt(covariance[1, 1]) > 1.0
+
+
+def means_without(target, parts):
+    """Mean and its variance for white noise of one, from all rows and without each part."""
+    values = [np.delete(target, rows).mean() for rows in parts]
+    variances = [1.0 / (len(target) - len(rows)) for rows in parts]
+    one = np.array([target.mean()]), np.array([1.0 / len(target)])
+    return *one, np.array(values)[:, None], np.array(variances)[:, None]
+
+
+def test_weighted_with_equal_parts_it_is_that_of_the_means(rng):
+    target = rng.normal(3.0, 2.0, 400)
+    parts = np.array_split(np.arange(400), 20)
+    means = target.reshape(20, 20).mean(axis=1)
+    found = weighted_jackknife(*means_without(target, parts))
+    assert found == pytest.approx(np.sqrt(means.var(ddof=1) / 20), rel=1e-9)
+
+
+def test_weighted_with_unequal_parts_its_square_is_the_variance(rng):
+    """Of white noise, over 3,000 draws; one part has half of the rows."""
+    parts = [np.arange(200), *np.array_split(np.arange(200, 400), 5)]
+    squares = [weighted_jackknife(*means_without(rng.standard_normal(400), parts))[0] ** 2 for _ in range(3000)]
+    assert np.mean(squares) == pytest.approx(1.0 / 400.0, rel=4.0 * np.std(squares) / np.mean(squares) / np.sqrt(3000))
+
+
+def test_weighted_what_one_part_alone_knows_stays_as_it_is_stated():
+    for unknown in (np.inf, 1e12):
+        found = weighted_jackknife(
+            np.array([5.0]), np.array([0.01]), np.array([[0.0], [5.0]]), np.array([[unknown], [0.01]])
+        )
+        assert found[0] < 0.01
+
+
+def test_refits_are_those_of_the_rows_that_are_left():
+    """Against a dense least-squares fit with a row for each prior."""
+    settled = settle(channel(table(2, EFFECTS["hysteresis of q"], rows=600)))
+    bank, (member,) = settled.bank, settled.best.members
+    parts = [np.arange(600) // 60 == k for k in range(10)]
+    columns, noise = np.hstack([bank.base, bank.fitted(member.columns)]), settled.noise.innovation
+    priors = np.hstack([np.zeros((len(member.sd), 1)), np.diag(noise / member.sd)])
+    for rows, refit in zip(parts, refits_without(settled, parts), strict=True):
+        stacked = np.vstack([columns[~rows], priors])
+        values, *_ = np.linalg.lstsq(stacked, np.concatenate([bank.target[~rows], np.zeros(len(priors))]), rcond=None)
+        assert refit.x == pytest.approx(values, rel=1e-6)
+        spread = noise**2 * np.linalg.inv(stacked.T @ stacked)
+        assert np.diag(refit.covariance) == pytest.approx(np.diag(spread), rel=1e-6)

@@ -10,11 +10,12 @@ import numpy as np
 
 from dbbstation.diagnosis.table.data import OFFSET
 from dbbstation.errors import CalibrationError
-from dbbstation.inference.folds import held_out_error
+from dbbstation.inference.folds import held_out_error, parts_of
+from dbbstation.inference.jackknife import refits_without, weighted_jackknife
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.noise import noise_of
 from dbbstation.inference.patterns import Family, covers_turns, turn
-from dbbstation.inference.read_off import read_off
+from dbbstation.inference.read_off import Trial, read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import compress, solve, with_random
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.read_off import Finding
     from dbbstation.inference.settled import Settled
+    from dbbstation.inference.square_root import Solution
     from dbbstation.texts import Texts
 
 FAR_STATED = 3.0
@@ -87,6 +89,19 @@ class Share:
     terms: int
 
 
+@dataclass(frozen=True)
+class Cancelling:
+    """Effects that cancel each other: each is larger than all together.
+
+    Attributes:
+        rms: of each about its mean, by name of effect or parameter, in the unit of the table.
+        rms_of_sum: of all effects and parameters together.
+    """
+
+    rms: dict[str, float]
+    rms_of_sum: float
+
+
 @dataclass(frozen=True, eq=False)
 class Mismatch:
     """What is said of a table.
@@ -103,6 +118,7 @@ class Mismatch:
         lacking: physics of the user's own that could not be asked, and why.
         texts: of that which was asked, by name.
         second_start: log odds of what a search that begins with nothing ends at, over what was found; zero where both are the same.
+        cancelling: effects that cancel each other; None where they do not.
     """
 
     table: Table
@@ -116,11 +132,22 @@ class Mismatch:
     lacking: dict[str, str]
     texts: dict[str, Texts]
     second_start: float = 0.0
+    cancelling: Cancelling | None = None
 
     @property
     def there(self) -> tuple[Finding, ...]:
-        """Findings of what is there."""
-        return tuple(finding for finding in self.findings if finding.verdict is Verdict.IDENTIFIED)
+        """Findings of what is there, or happened once."""
+        return tuple(one for one in self.findings if one.verdict in {Verdict.IDENTIFIED, Verdict.HAPPENED})
+
+    @property
+    def identified(self) -> tuple[Finding, ...]:
+        """Findings of what is there and predicts other rows, where that was asked."""
+        return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether held-out parts are predicted worse than by the values as simulated."""
+        return self.held_out is not None and self.held_out.is_worse
 
     @property
     def is_there(self) -> bool:
@@ -201,21 +228,38 @@ def _found(
     channel = table.channel(sources)
     channel = replace(channel, static=static_patterns(channel))
     settled = settle(channel, progress=progress)
-    findings = read_off(settled)
-    chosen = partial(choose_without, beginning=settled.beginning)
-    held_out = held_out_error(channel, chosen, progress) if hold_out else None
+    held_out = _held_out(settled, table, progress) if hold_out else None
+    refits = refits_without(settled, [rows for _, rows in parts_of(channel)])
+    findings = read_off(settled, Trial(held_out, refits))
     return Mismatch(
         table=table,
         settled=settled,
         findings=findings,
         shares=_shares(settled),
         resembles=_resembles(settled),
-        fitted=_fitted(settled, table),
+        fitted=_fitted(settled, table, refits),
         left=left_over(settled),
         held_out=held_out,
         lacking=lacking,
         texts={source.name: source.texts for source in sources},
         second_start=_second_start(settled, findings),
+        cancelling=_cancelling(settled),
+    )
+
+
+def _held_out(settled: Settled, table: Table, progress: Callable[..., None]) -> HeldOutError:
+    """Held-out error; the reference is the values as simulated, and a constant where one may lie between."""
+    residual = settled.channel.residual
+
+    def as_simulated(rows: NDArray[np.bool_]) -> NDArray[np.float64]:
+        return np.full(len(residual), float(np.mean(residual[rows])) if table.has_offset else 0.0)
+
+    return held_out_error(
+        settled.channel,
+        partial(choose_without, beginning=settled.beginning),
+        progress,
+        alike=settled.noise.correlation_samples,
+        reference=as_simulated,
     )
 
 
@@ -287,8 +331,27 @@ def _followed(effect: NDArray[np.float64], columns: NDArray[np.float64]) -> floa
     return 1.0 - float(np.sum((effect - both @ values) ** 2)) / whole if whole > 0.0 else 0.0
 
 
-def _fitted(settled: Settled, table: Table) -> tuple[Fitted, ...]:
-    """Base parameters with the base alone, and beside everything that was found."""
+def _cancelling(settled: Settled) -> Cancelling | None:
+    """Effects and parameters larger than all together, where most of their squares cancel."""
+    effects = {name: settled.effect([name]) for name in sorted(settled.best.names)}
+    base = settled.channel.base
+    effects |= {
+        n: base.samples[:, k] * v for k, (n, v) in enumerate(zip(base.names, settled.base_values(), strict=True))
+    }
+    rms = {name: _rms_about_mean(effect) for name, effect in effects.items()}
+    whole = _rms_about_mean(np.sum(list(effects.values()), axis=0)) if effects else 0.0
+    if whole >= MOST_CANCELS * float(np.sqrt(np.sum(np.square(list(rms.values()))))):
+        return None
+    return Cancelling({name: own for name, own in rms.items() if own > whole}, whole)
+
+
+MOST_CANCELS = 0.5
+"""Root mean square of all effects together, over the root of the sum of their mean squares, below which they cancel each other:
+three quarters of the squares are gone. Of effects that have nothing to do with each other it is one."""
+
+
+def _fitted(settled: Settled, table: Table, refits: Sequence[Solution]) -> tuple[Fitted, ...]:
+    """Base parameters with the base alone, and beside everything that was found; uncertainties as `read_off` has them."""
     channel, bank, members = settled.channel, settled.bank, settled.best.members
     noise, known, size = settled.noise.innovation, channel.known, channel.base.samples.shape[1]
     alone = channel.fitted(channel.target, _noise_alone(channel))
@@ -299,12 +362,18 @@ def _fitted(settled: Settled, table: Table) -> tuple[Fitted, ...]:
         block = compress(np.arange(columns.shape[1]), columns, bank.target)
         beside = solve([block], both, noise, channel.held)
     before, after = np.diag(alone.covariance), np.diag(beside.covariance)[:size]
+    moved = weighted_jackknife(
+        beside.x[:size],
+        after,
+        np.array([one.x[:size] for one in refits]),
+        np.array([np.diag(one.covariance)[:size] for one in refits]),
+    )
     units = [channel.unit if name == OFFSET else "in its own unit" for name in channel.base.names]
     return tuple(
         Fitted(
             name,
             Value(float(alone.x[k]), float(np.sqrt(max(before[k], 0.0))), units[k]),
-            Value(float(beside.x[k]), float(np.sqrt(max(after[k], 0.0))), units[k]),
+            Value(float(beside.x[k]), float(np.sqrt(max(after[k], 0.0))), units[k]).at_least(float(moved[k])),
             float(np.clip(1.0 - before[k] / after[k], 0.0, 1.0)) if after[k] > 0.0 else 1.0,
             float(channel.base.prior[k]) if np.isfinite(channel.base.prior[k]) else None,
             name in table.known,

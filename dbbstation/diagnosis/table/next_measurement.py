@@ -116,4 +116,4 @@ def _apart(found: Mismatch) -> Iterator[Next]:
                 yield Next(text, (other.name, one.name))
 
 
-LIKELY = frozenset({Verdict.IDENTIFIED, Verdict.AMBIGUOUS})
+LIKELY = frozenset({Verdict.IDENTIFIED, Verdict.HAPPENED, Verdict.DOES_NOT_PREDICT, Verdict.AMBIGUOUS})

@@ -52,12 +52,14 @@ def mismatch_summary(found: Mismatch) -> dict[str, Any]:
             ],
         },
         "residual_rms": {"before": found.rms_before, "after": found.rms_after},
+        "held_out": "not-tested" if found.held_out is None else "tested",
         "held_out_rms": None
         if found.held_out is None
         else {
             "as_simulated": found.held_out.as_simulated,
             "before": found.held_out.before,
             "after": found.held_out.after,
+            "worse": found.is_worse,
             "folds": [
                 {
                     "name": fold.name,
@@ -69,6 +71,9 @@ def mismatch_summary(found: Mismatch) -> dict[str, Any]:
                 for fold in found.held_out.folds
             ],
         },
+        "cancelling": None
+        if found.cancelling is None
+        else {"rms": found.cancelling.rms, "rms_of_sum": found.cancelling.rms_of_sum},
         "led_by": [
             {"variable": s.variable, "rms": s.rms, "share": s.share, "lost": s.lost, "terms": s.terms}
             for s in found.shares
@@ -106,6 +111,17 @@ def _finding(found: Mismatch, finding: Finding) -> dict[str, Any]:
     return {
         "name": finding.name,
         "verdict": str(finding.verdict),
+        "acts": finding.acts.name.lower(),
+        "persists": finding.persists,
+        "recurs": finding.recurs,
+        "gains": None
+        if finding.gains is None
+        else {
+            "parts": list(finding.gains.parts),
+            "with_gain": finding.gains.with_gain,
+            "total": finding.gains.total,
+            "predicts": finding.gains.predicts,
+        },
         "form": None if finding.family is None else str(finding.family),
         "variables": list(finding.variables),
         "probability": finding.probability,

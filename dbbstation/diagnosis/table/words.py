@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.seen import IN_TIME
+from dbbstation.inference.verdict import Acts
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.table.mismatch import Mismatch
@@ -40,9 +40,8 @@ def sentence_of(found: Mismatch, finding: Finding) -> str:
     parts = [_where(found, finding)]
     if finding.family is not None:
         parts.append(MEANINGS[finding.family])
-        clock = found.table.clock
-        if finding.family in IN_TIME or (clock is not None and clock.name in finding.variables):
-            parts.append(HAPPENED)
+        if finding.acts is Acts.ONCE:
+            parts.append(PERSISTS if finding.persists else RECURS if finding.recurs else HAPPENED)
     if finding.name in found.texts:
         texts = found.texts[finding.name]
         parts += [texts.what, texts.confirm]
@@ -62,7 +61,9 @@ def sentence_of(found: Mismatch, finding: Finding) -> str:
     return " ".join(part for part in parts if part)
 
 
-HAPPENED = "It is something that happened in these rows: no law says whether it comes again."
+HAPPENED = "It is something that happened in these rows: no other rows can test it."
+PERSISTS = "It is something that happened in these rows, and stayed: parts that were held back tell of it, too."
+RECURS = "It is something that happens again in these rows: found without each part, it predicts that part, too."
 
 HALF = 0.5
 """Share of a curve that a named form must follow to be said to be most of it."""

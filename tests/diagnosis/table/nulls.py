@@ -13,7 +13,7 @@ import csv
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,9 +25,12 @@ from scipy.signal import lfilter
 from dbbstation.diagnosis.table.data import Table
 from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.verdict import Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from dbbstation.inference.read_off import Finding
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,11 +205,40 @@ def table_of(axis: Moving, measured: NDArray[np.float64], simulated: NDArray[np.
     )
 
 
-def named_in(kind: str, seed: int, effect: str = "", size: float = 0.0) -> tuple[list[str], float]:
-    """Names that are called identified in a table, and the processor time [s]."""
-    began = time.process_time()
+def named_in(kind: str, seed: int, effect: str = "", size: float = 0.0, *, hold_out: bool = True) -> dict[str, Finding]:
+    """What these rows surely show of a table, by name; parts are held out only where that decides a verdict."""
     table = null_table(kind, seed, effect, size)
-    return [one.name for one in find_mismatch(table, hold_out=False).there], time.process_time() - began
+    found = find_mismatch(table, hold_out=False)
+    if hold_out and found.identified:
+        found = find_mismatch(table)
+    return {one.name: one for one in found.findings if one.verdict.rank < Verdict.AMBIGUOUS.rank}
+
+
+def identified_in(kind: str, seed: int, effect: str = "", size: float = 0.0, *, hold_out: bool = True) -> list[str]:
+    """Names that are called identified."""
+    named = named_in(kind, seed, effect, size, hold_out=hold_out)
+    return [name for name, one in named.items() if one.verdict is Verdict.IDENTIFIED]
+
+
+def _row(kind: str, seed: int, effect: str, size: float) -> dict[str, object]:
+    """Row of the file: names by verdict, and of those that held-out parts decide, in how many parts each gained, - where not in sum
+    without the best part."""
+    began = time.process_time()
+    named = named_in(kind, seed, effect, size)
+    gained = [one.gains for one in named.values() if one.gains is not None and one.verdict is not Verdict.HAPPENED]
+    return {
+        "kind": kind,
+        "seed": seed,
+        "effect": effect,
+        "size": size,
+        **{str(v): "; ".join(name for name, one in named.items() if one.verdict is v) for v in TOLD},
+        "gained": "; ".join(f"{g.with_gain}{'+' if g.total > max(g.parts) else '-'}" for g in gained),
+        "seconds": f"{time.process_time() - began:.1f}",
+    }
+
+
+TOLD = (Verdict.IDENTIFIED, Verdict.HAPPENED, Verdict.DOES_NOT_PREDICT)
+COLUMNS = ("kind", "seed", "effect", "size", *map(str, TOLD), "gained", "seconds")
 
 
 def is_right(name: str, effect: str) -> bool:
@@ -225,7 +257,7 @@ def main() -> None:
     options.add_argument("--workers", type=int, default=os.cpu_count())
     chosen = options.parse_args()
     if not chosen.out.exists():
-        chosen.out.write_text("kind,seed,effect,size,names,seconds\n", encoding="utf-8")
+        chosen.out.write_text(",".join(COLUMNS) + "\n", encoding="utf-8")
     wanted = [
         (kind, chosen.seed * 1000 + k, effect, size)
         for k in range(chosen.count)
@@ -236,23 +268,28 @@ def main() -> None:
     with chosen.out.open(encoding="utf-8", newline="") as file:
         known = {(r["kind"], int(r["seed"]), r["effect"], float(r["size"])) for r in csv.DictReader(file)}
     with ProcessPoolExecutor(chosen.workers) as pool:
-        running = {pool.submit(named_in, *one): one for one in wanted if one not in known}
+        running = [pool.submit(_row, *one) for one in wanted if one not in known]
         for done in as_completed(running):
-            names, seconds = done.result()
             with chosen.out.open("a", encoding="utf-8", newline="") as file:
-                csv.writer(file).writerow([*running[done], "; ".join(names), f"{seconds:.1f}"])
+                csv.DictWriter(file, COLUMNS).writerow(done.result())
     with chosen.out.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     for kind, size in sorted({(row["kind"], row["size"]) for row in rows}, key=lambda one: (one[1], one[0])):
         own = [row for row in rows if (row["kind"], row["size"]) == (kind, size)]
-        named = [([n for n in row["names"].split("; ") if n], row["effect"]) for row in own]
-        right = sum(any(is_right(name, effect) for name in names) for names, effect in named)
-        false = [[name for name in names if not is_right(name, effect)] for names, effect in named]
-        print(  # noqa: T201
-            f"{kind:12} size {float(size):3g}: {len(own):4} tables, {right:4} with the right name, "
-            f"{sum(map(bool, false)):3} with a false one, {sum(map(len, false)):4} false names"
-        )
+        print(f"{kind:12} size {float(size):3g}: {len(own):4} tables, {', '.join(map(_told(own), TOLD))}")  # noqa: T201
     print(f"largest time {max((float(row['seconds']) for row in rows), default=0.0):.0f} s")  # noqa: T201
+
+
+def _told(rows: Sequence[Mapping[str, str]]) -> Callable[[Verdict], str]:
+    """Say of a verdict in how many tables it is given to a right name, and in how many to a false one."""
+
+    def told(verdict: Verdict) -> str:
+        named = [([n for n in row[verdict].split("; ") if n], row["effect"]) for row in rows]
+        right = sum(any(is_right(name, effect) for name in names) for names, effect in named)
+        false = sum(any(not is_right(name, effect) for name in names) for names, effect in named)
+        return f"{verdict} {right} right {false} false"
+
+    return told
 
 
 if __name__ == "__main__":

@@ -1,0 +1,93 @@
+"""Values of a finding by name: amplitudes and nonlinear parameters of a law or a pattern, with unit and uncertainty."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.bank import amplitudes_of
+from dbbstation.inference.jackknife import weighted_jackknife
+from dbbstation.inference.settle import moved
+from dbbstation.inference.verdict import Value
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.model_comparison import Member
+    from dbbstation.inference.settled import Settled
+
+
+def named_values(
+    settled: Settled, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> dict[str, Value]:
+    """Amplitudes and nonlinear parameters with their uncertainty; what a formula may be off by is part of it.
+
+    Args:
+        settled: what a comparison came to.
+        member: of its hypothesis, or one that is laid beside it.
+        values: of its columns, shape (p,).
+        covariance: of these, shape (p, p).
+    """
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    width = len(member.variant.columns)
+    law = settled.bank.laws.get(member.cause.name)
+    if law is not None:
+        found = {
+            law.parameters[j]: Value(
+                float(values[k]), float(np.hypot(sigma[k], law.form_uncertainty * values[k])), law.units[j]
+            )
+            for k, j in enumerate(amplitudes_of(member.variant).tolist())
+        }
+        shaped, every = moved(law, member, values), len(law.plausible)
+        for k, name in enumerate(law.parameters[every:]):
+            known = len(member.variant.slack) > k
+            found[name] = Value(shaped[k], float(sigma[width + k]) if known else np.nan, law.units[every + k])
+        return found
+    pattern = settled.bank.patterns[member.cause.name]
+    unit = settled.channel.unit
+    if len(pattern.per) < width:
+        return {}
+    names = _NAMES.get(str(pattern.family), tuple(f"amplitude {k + 1}" for k in range(width)))[:width]
+    names = ("slope",) if pattern.family in {"linear", "drift"} else names
+    return {
+        name: Value(float(values[k] / pattern.per[k]), float(sigma[k] / pattern.per[k]), _unit(unit, pattern.units[k]))
+        for k, name in enumerate(names)
+    }
+
+
+def with_jackknife(found: Mapping[str, Value], without: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
+    """Values with the larger of their own uncertainty and that from how they move without each part.
+
+    Args:
+        found: from all rows, by name.
+        without: the same without each part.
+    """
+    if not found:
+        return {}
+    u = weighted_jackknife(
+        np.array([value.value for value in found.values()]),
+        np.square([value.uncertainty for value in found.values()]),
+        np.array([[part[name].value for name in found] for part in without]),
+        np.square([[part[name].uncertainty for name in found] for part in without]),
+    )
+    return {name: value.at_least(float(own)) for (name, value), own in zip(found.items(), u, strict=True)}
+
+
+_NAMES = {
+    "once per turn": ("cosine", "sine"),
+    "twice per turn": ("cosine", "sine"),
+    "wave": ("cosine", "sine"),
+    "hysteresis": ("half width",),
+    "speed": ("per speed",),
+    "lag": ("delay",),
+    "bump": ("height",),
+    "step": ("height",),
+}
+
+
+def _unit(unit: str, per: str) -> str:
+    """Unit of an amplitude; one that stands by itself is no quotient of the channel's."""
+    return f"{unit}{per}" if per == "" or per.startswith(("/", " per")) else per

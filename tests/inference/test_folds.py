@@ -1,0 +1,124 @@
+"""Held-out parts: what each effect gains is what a refit without it loses; what is chosen knows neither part nor neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dbbstation.inference.folds import Fold, HeldOutError, held_out_error, parts_of
+from dbbstation.inference.read_off import Trial, read_off
+from dbbstation.inference.settle import settle
+from dbbstation.inference.settled import Beginning
+from dbbstation.inference.verdict import Gains, Verdict
+from tests.inference.tables import direction, table
+from tests.inference.test_channel import EFFECTS, channel
+
+
+@pytest.fixture(scope="module")
+def both():
+    """A channel with hysteresis and cogging, and what a comparison makes of it."""
+    data = table(2, lambda d: EFFECTS["hysteresis of q"](d) + EFFECTS["twice per turn of angle"](d), rows=600)
+    whole = channel(data, blocks=1)
+    settled = settle(whole, thorough=False)
+    assert settled.best.names == {"hysteresis of q", "twice per turn of angle"}
+    return data, whole, settled
+
+
+def test_gains_are_what_a_refit_without_an_effect_loses(both):
+    """Against least squares over the rows that are left; sizes of effects have priors, which matter little here."""
+    data, whole, _ = both
+    beginnings = (Beginning.EVERYTHING,)
+    error = held_out_error(whole, lambda one, rows: settle(one.without(rows), look=False, beginnings=beginnings))
+    columns = {
+        ("hysteresis of q",): [direction(data.q)],
+        ("twice per turn of angle",): [np.cos(2.0 * np.radians(data.angle)), np.sin(2.0 * np.radians(data.angle))],
+    }
+    for fold, (_, rows) in zip(error.folds, parts_of(whole), strict=True):
+        assert set(fold.gains) == set(columns)
+        with_all = squares(data.residual, [c for own in columns.values() for c in own], rows)
+        assert fold.after == pytest.approx(np.sqrt(with_all / rows.sum()), rel=0.02)
+        for kind, gain in fold.gains.items():
+            without = squares(data.residual, [c for k, own in columns.items() if k != kind for c in own], rows)
+            assert gain == pytest.approx(without - with_all, rel=0.1, abs=0.02 * without)
+    assert error.gains_of([("hysteresis of q",)]).predicts
+    assert error.gains_of([("hysteresis of load",)]) == Gains((0.0,) * 10)
+    each = [error.gains_of([kind]).total for kind in columns]
+    assert error.gains_of(list(columns)).total == pytest.approx(sum(each))
+
+
+def squares(residual, columns, rows):
+    """Sum of squares of the errors of prediction of rows from the others, with a constant."""
+    stacked = np.column_stack([np.ones(len(residual)), *columns])
+    values, *_ = np.linalg.lstsq(stacked[~rows], residual[~rows], rcond=None)
+    return float(np.sum((residual - stacked @ values)[rows] ** 2))
+
+
+@pytest.mark.parametrize(("alike", "gap"), [(1.0, 0), (4.3, 5), (1000.0, 30)])
+def test_neighbours_that_resemble_a_part_are_not_chosen_from(both, alike, gap):
+    _, whole, settled = both
+    seen = []
+
+    def chosen(_channel, rows):
+        seen.append(np.flatnonzero(rows))
+        return settled
+
+    held_out_error(whole, chosen, alike=alike)
+    assert len(seen) == 10
+    # Ten parts of 60 rows; the widest gap is half of one.
+    for k, rows in enumerate(seen):
+        assert (rows[0], rows[-1]) == (max(60 * k - gap, 0), min(60 * k + 59 + gap, 599))
+        assert len(rows) == rows[-1] - rows[0] + 1
+
+
+def test_whole_blocks_have_no_gap(both):
+    data, _, settled = both
+    seen = []
+    held_out_error(channel(data, blocks=6), lambda _c, rows: seen.append(int(rows.sum())) or settled, alike=9.0)
+    assert seen == [100] * 6
+
+
+def test_the_reference_is_what_the_client_says(both):
+    _, whole, settled = both
+    error = held_out_error(whole, lambda _c, _rows: settled, reference=lambda _rows: np.zeros(600))
+    assert error.as_simulated == pytest.approx(np.sqrt(np.mean(whole.residual**2)))
+    plain = held_out_error(whole, lambda _c, _rows: settled)
+    assert plain.as_simulated == pytest.approx(np.std(whole.residual), rel=0.05)
+
+
+def trial(kinds, after, *, as_simulated=1.0):
+    """Ten parts in which effects of some kinds gain."""
+    folds = [Fold(str(k), 60, as_simulated, 1.0, after, dict.fromkeys(kinds, 1.0)) for k in range(10)]
+    return Trial(HeldOutError(tuple(folds)))
+
+
+def test_a_name_needs_a_gain_and_a_whole_that_is_not_worse(both):
+    _, _, settled = both
+
+    def verdicts(told):
+        return {one.name: one.verdict for one in read_off(settled, told) if one.name in settled.best.names}
+
+    play, cog = "hysteresis of q", "twice per turn of angle"
+    assert set(verdicts(None).values()) == {Verdict.IDENTIFIED}
+    assert set(verdicts(Trial()).values()) == {Verdict.IDENTIFIED}
+    assert verdicts(trial([(play,), (cog,)], 0.5)) == {play: Verdict.IDENTIFIED, cog: Verdict.IDENTIFIED}
+    assert verdicts(trial([(play,)], 0.5)) == {play: Verdict.IDENTIFIED, cog: Verdict.DOES_NOT_PREDICT}
+    assert set(verdicts(trial([(play,), (cog,)], 1.1)).values()) == {Verdict.DOES_NOT_PREDICT}
+    text = next(one.text for one in read_off(settled, trial([(play,)], 0.5)) if one.name == cog)
+    assert "in 0 of 10" in text
+
+
+@pytest.mark.parametrize(("last", "persists"), [(600, True), (300, False)])
+def test_what_came_once_has_happened_and_a_step_that_gains_persists(last, persists):
+    data = table(4, rows=600)
+    inside = (np.arange(600) >= 200) & (np.arange(600) < last)
+    whole = channel(data, blocks=1)
+    settled = settle(replace(whole, residual=whole.residual + 0.3 * inside))
+    (name,) = settled.best.names
+    told = {one.name: one for one in read_off(settled, trial([settled.bank.kind_of(name)], 0.5))}[name]
+    assert told.verdict is Verdict.HAPPENED
+    assert told.persists is persists
+    without = {one.name: one for one in read_off(settled, trial([], 0.5))}[name]
+    assert without.verdict is Verdict.HAPPENED
+    assert not without.persists

@@ -21,7 +21,8 @@ from dbbstation.diagnosis.unexplained_model import with_exact_wave
 from dbbstation.diagnosis.verdicts import judge
 from dbbstation.diagnosis.workspace import workspace_error
 from dbbstation.errors import ModelError
-from dbbstation.inference.alternatives import EVEN, SURE
+from dbbstation.inference.alternatives import EVEN
+from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.by_temperature import not_given
 
 if TYPE_CHECKING:

@@ -18,10 +18,11 @@ from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import Channel
 from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
-from dbbstation.inference.alternatives import SURE, in_place_of
+from dbbstation.inference.alternatives import in_place_of
 from dbbstation.inference.hypotheses import Hypothesis, Posterior, search
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.settle import impossibly_negative
+from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence

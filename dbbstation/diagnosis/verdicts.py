@@ -11,10 +11,11 @@ from scipy.special import expit
 from dbbstation.diagnosis.channel import NAMED_ODDS
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties, unseen
-from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
+from dbbstation.inference.alternatives import EVEN, Alternatives, standing_out
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.square_root import free_directions
+from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

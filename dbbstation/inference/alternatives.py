@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dbbstation.inference.verdict import SURE
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
@@ -13,9 +15,6 @@ if TYPE_CHECKING:
 
     from dbbstation.inference.hypotheses import Hypothesis, Posterior
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
-
-SURE = 0.95
-"""Probability from which on something is said to be there."""
 
 EVEN = 0.5
 """Probability from which on a cause that is not certain is rather there than not."""

@@ -9,22 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import expit
 
-from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
+from dbbstation.inference.alternatives import EVEN, Alternatives, standing_out
 from dbbstation.inference.bank import amplitudes_of
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.patterns import Family
 from dbbstation.inference.seen import IN_TIME
 from dbbstation.inference.settle import impossible, moved
-from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.inference.verdict import OUT, SURE, Value, Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.inference.model_comparison import Cause, Member
     from dbbstation.inference.settled import Settled
-
-OUT = 5.0
-"""Standard deviations by which the norm of an effect must be out to be said to be there, or would have to be to be ruled out."""
 
 ABSENT = 0.01
 """Probability up to which something that would have been seen is ruled out, or its prior probability if that is less."""
@@ -105,8 +102,7 @@ def read_off(settled: Settled) -> tuple[Finding, ...]:
     judge = _Judge(settled)
     found = [judge.finding(cause) for cause in settled.causes]
     found += [judge.refused(name, why) for name, why in settled.refused.items()]
-    order = [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT]
-    return tuple(sorted(found, key=lambda one: (order.index(one.verdict), -one.log_factor)))
+    return tuple(sorted(found, key=lambda one: (one.verdict.rank, -one.log_factor)))
 
 
 class _Judge:

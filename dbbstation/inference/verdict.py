@@ -1,18 +1,92 @@
-"""What can be said of a cause, and values with their uncertainty."""
+"""Verdicts: what can be said of a cause, by which test, in which word. The same for tables, drives, circles and two sessions.
+
+| cause | test | verdict, as `--json` has it |
+| --- | --- | --- |
+| acts always: a law over a variable; a named cause at work in the whole session | sure, and a gain in held-out parts | `identified` |
+| the same | sure, held-out parts not asked for | `identified` |
+| the same | sure, no gain in held-out parts | `does-not-predict` |
+| acts once: a pulse, step, bump, drift, wave or curve over the time, an offset, a mounting | sure; no other rows can test it | `happened` |
+| any that is rather there | not sure, or others would do as well | `ambiguous` |
+| any that is rather not there | these rows would not have shown it, or leave it open | `not-testable` |
+| any that is rather not there | it would have been seen, and its probability is at most `ABSENT` | `ruled-out` |
+
+Sure: a probability of `SURE` or more, and an effect of `OUT` standard deviations or more.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import dataclass, replace
+from enum import Enum, StrEnum, auto
+
+SURE = 0.95
+"""Probability from which on something is said to be there: one claim in twenty may be wrong if the model of noise and causes is right."""
+
+OUT = 5.0
+"""Standard deviations by which the norm of an effect must be out to be said to be there, or would have to be to be ruled out: physics'
+usual limit of a discovery, since effects are picked from many."""
+
+ABSENT = 1.0 - SURE
+"""Probability up to which something that would have been seen is ruled out: as sure as what is there. It is the prior probability of a
+named cause, so what the recording makes more probable than it was is never ruled out."""
+
+PARTS_WITH_GAIN = 0.7
+"""Share of the held-out parts in which an effect must bring something. An effect that brings nothing gains by chance in half of them:
+in seven of ten or more once in six times, and then still has to gain in sum without its best part."""
+
+SEEN_WORSE = 1e-3
+"""Share by which one error must exceed another to be worse: what three printed figures hardly show."""
 
 
 class Verdict(StrEnum):
-    """What can be said of a cause."""
+    """What can be said of a cause, in the order in which findings are listed; the values are the tokens of `--json`."""
 
     IDENTIFIED = "identified"
+    HAPPENED = "happened"
+    DOES_NOT_PREDICT = "does-not-predict"
     AMBIGUOUS = "ambiguous"
-    RULED_OUT = "ruled-out"
     NOT_TESTABLE = "not-testable"
+    RULED_OUT = "ruled-out"
+
+    @property
+    def rank(self) -> int:
+        """Place in the order of listing."""
+        return tuple(Verdict).index(self)
+
+
+class Acts(Enum):
+    """When a cause is at work: whether other rows or tests can show it again."""
+
+    ALWAYS = auto()
+    ONCE = auto()
+
+
+@dataclass(frozen=True)
+class Gains:
+    """What an effect brought in each held-out part, everything chosen anew without that part.
+
+    Attributes:
+        parts: sum of squares of the errors of prediction of a part without the effect, what else was chosen refitted, less that with it,
+            in the squared unit of what is predicted; zero where the effect was not chosen.
+    """
+
+    parts: tuple[float, ...]
+
+    @property
+    def total(self) -> float:
+        """Over all parts."""
+        return sum(self.parts)
+
+    @property
+    def with_gain(self) -> int:
+        """Parts in which it brought something."""
+        return sum(part > 0.0 for part in self.parts)
+
+    @property
+    def predicts(self) -> bool:
+        """Whether it brought something in enough parts, and in sum without the best part."""
+        if not self.parts or self.with_gain < PARTS_WITH_GAIN * len(self.parts):
+            return False
+        return self.total - max(self.parts) > 0.0
 
 
 @dataclass(frozen=True)
@@ -22,3 +96,35 @@ class Value:
     value: float
     uncertainty: float
     unit: str
+
+    def at_least(self, uncertainty: float) -> Value:
+        """Return it with the larger of its own and another standard uncertainty; one that is not known (nan) changes nothing."""
+        return replace(self, uncertainty=uncertainty) if uncertainty > self.uncertainty else self
+
+
+def is_worse(corrected: float, reference: float) -> bool:
+    """Whether a corrected prediction is worse than that of the reference, both as root mean square errors of the same held-out rows.
+
+    The reference is, for tables and simulators, the values as simulated; for circles the kinematic calibration; for drives the law
+    with mass and friction; for two sessions the first one.
+    """
+    return corrected > (1.0 + SEEN_WORSE) * reference
+
+
+def claim(probability: float, sigmas: float, acts: Acts, gains: Gains | None, *, worse: bool = False) -> Verdict:
+    """Verdict of a cause that the most probable hypothesis has.
+
+    Args:
+        probability: that it is there, or one of its class.
+        sigmas: norm of its effect over its standard deviation.
+        acts: when it is at work.
+        gains: in held-out parts; None: these were not asked for.
+        worse: whether everything together predicts worse than the reference [`is_worse`]; then nothing is identified.
+    """
+    if not (probability >= SURE and sigmas >= OUT):
+        return Verdict.AMBIGUOUS
+    if acts is Acts.ONCE:
+        return Verdict.HAPPENED
+    if worse or (gains is not None and not gains.predicts):
+        return Verdict.DOES_NOT_PREDICT
+    return Verdict.IDENTIFIED

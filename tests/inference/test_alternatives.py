@@ -7,8 +7,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from dbbstation.inference.alternatives import EVEN, SURE, Alternatives, standing_out
+from dbbstation.inference.alternatives import EVEN, Alternatives, standing_out
 from dbbstation.inference.hypotheses import Hypothesis, Posterior
+from dbbstation.inference.verdict import SURE
 
 NAMES = "abcdef"
 

@@ -19,11 +19,11 @@ from dbbstation.diagnosis.compare.details import both_directions, effects_of, no
 from dbbstation.diagnosis.compare.pairs import match
 from dbbstation.diagnosis.compare.sides import Sides
 from dbbstation.errors import TraceError
-from dbbstation.inference.alternatives import SURE
 from dbbstation.inference.harmonics import bands, basis, coefficients
 from dbbstation.inference.left_over import left_over
-from dbbstation.inference.read_off import OUT, read_off
+from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
+from dbbstation.inference.verdict import OUT, SURE
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
 from dbbstation.inference.held_out import held_out
-from dbbstation.inference.read_off import HALF, OUT
+from dbbstation.inference.read_off import HALF
 from dbbstation.inference.square_root import Columns, compress
+from dbbstation.inference.verdict import OUT
 from dbbstation.sources.registry import sources_named
 
 if TYPE_CHECKING:

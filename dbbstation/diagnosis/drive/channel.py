@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.drive.recordings import with_waves
-from dbbstation.inference.alternatives import SURE
 from dbbstation.inference.channel import Base, Channel, Law
 from dbbstation.inference.curves import Clock, Spline
 from dbbstation.inference.model_form import modulated
 from dbbstation.inference.patterns import CURVES, Family, Pattern
 from dbbstation.inference.variables import Kind, Variable
+from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence

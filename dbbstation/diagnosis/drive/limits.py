@@ -9,7 +9,7 @@ import numpy as np
 
 from dbbstation.diagnosis.drive.channel import MASS, VISCOUS
 from dbbstation.diagnosis.drive.sources.coulomb_friction import COULOMB_SHARE
-from dbbstation.inference.read_off import OUT
+from dbbstation.inference.verdict import OUT
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.drive.explain import Explained

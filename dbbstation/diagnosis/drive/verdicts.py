@@ -11,10 +11,9 @@ import numpy as np
 from dbbstation.diagnosis.drive.channel import METHOD_SHARE
 from dbbstation.diagnosis.drive.findings import DriveFinding, Effect, Part
 from dbbstation.diagnosis.drive.pulses import edges_of, pulse_parts
-from dbbstation.inference.alternatives import SURE
 from dbbstation.inference.patterns import Family
-from dbbstation.inference.read_off import OUT, read_off
-from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.inference.read_off import read_off
+from dbbstation.inference.verdict import OUT, SURE, Value, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,11 +14,11 @@ from dbbstation.inference.folds import held_out_error
 from dbbstation.inference.left_over import left_over
 from dbbstation.inference.noise import noise_of
 from dbbstation.inference.patterns import Family, covers_turns, turn
-from dbbstation.inference.read_off import OUT, read_off
+from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import compress, solve, with_random
-from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.inference.verdict import OUT, Value, Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

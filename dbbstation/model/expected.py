@@ -62,7 +62,7 @@ def expected_circle(
     again = np.zeros((COEFFICIENTS, COEFFICIENTS))
     effects: dict[tuple[str, str], NDArray[np.float64]] = {}
     shapes = form_columns(theta - start)[:, HIGHER]
-    for cause in _acting(reading, motion, model, identified, causes, shapes):
+    for cause in _acting(reading, motion, model, identified, causes, shapes, observation.test):
         effects[cause.key] = effect = to_form @ cause.columns_mm
         again += cause.scatters * effect @ effect.T
         if cause.at_a_pose:
@@ -110,18 +110,19 @@ def _acting(
     identified: IdentifiedModel | None,
     causes: Iterable[ErrorSource],
     shapes: NDArray[np.float64],
+    test: str,
 ) -> Iterator[_Acting]:
-    """Causes along a run; `shapes` are the undulations of its form that no shift and no length makes, shape (n, 4)."""
+    """Causes along a run of a test; `shapes` are the undulations that no shift and no length makes, shape (n, 4)."""
     if identified is not None:
         yield from _of_model(reading, motion, model, identified)
         left_mm = 1e-3 * float(identified.report.get("residual_rms_um", 0.0))
-        run = "" if motion.setup is None else motion.setup.run
-        yield _Acting(("left by the model", run), left_mm * np.column_stack(_as_circle(motion)), at_a_pose=True)
-        yield _Acting(("left of the form by the model", run), left_mm * shapes, at_a_pose=False)
+        # What is left of a circle is its form, the same in all its runs.
+        yield _Acting(("left by the model", test), left_mm * np.column_stack(_as_circle(motion)), at_a_pose=True)
+        yield _Acting(("left of the form by the model", test), left_mm * shapes, at_a_pose=False)
     for source in causes:
         of_machine = source.belongs_to is Owner.MACHINE
-        # A model says what the machine is, not how warm it has become since.
-        known = of_machine and identified is not None and source.varies_with != "time"
+        # A model says where the machine goes; how that differs between directions and days has its usual size.
+        known = of_machine and identified is not None and source.needs <= {Need.POSE}
         if source.of_currents or known or not source.needs <= {Need.POSE, Need.PATH, Need.TIME}:
             continue
         try:

@@ -460,7 +460,8 @@ def print_equipment(counted: Row) -> None:
     for fault in Fault:
         for size in sorted({key[1] for key in counted if key[0] is fault}):
             cells = [f"{counted[fault, size, *head, 'found']} of {counted[fault, size, *head, 'of']}" for head in heads]
-            sys.stdout.write(f"| {fault} | {size:g} | {' | '.join(cells)} |\n")
+            shown = f"{size:g}" if fault in SIZES else ""
+            sys.stdout.write(f"| {fault} | {shown} | {' | '.join(cells)} |\n")
 
 
 def false_alarms(folder: Path, seed: int, wanted: int) -> None:

@@ -11,7 +11,16 @@ from dbbstation.plan.circle import Direction
 from dbbstation.quality.finding import Name, Verdict
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
-from tests.quality.sabotage import begun_elsewhere, calibrated, drifting, elsewhere, finding_of, mirrored, sound
+from tests.quality.sabotage import (
+    begun_elsewhere,
+    calibrated,
+    drifting,
+    drifting_session,
+    elsewhere,
+    finding_of,
+    mirrored,
+    sound,
+)
 
 
 @pytest.fixture(scope="module")
@@ -126,3 +135,13 @@ def test_a_drift_that_moves_the_centre_less_than_the_plan_leaves_open_is_no_faul
     assert slow.wrong == ()
     fast = judged([], spoilt(one, drifting, 6.0))
     assert Name.DRIFT in {f.name for f in fast.wrong}
+
+
+@pytest.mark.nightly
+def test_good_circles_on_drifting_days_have_no_more_findings_than_one_in_a_hundred(tmp_path):
+    """Of 210 circles 2.1 at the most are to be expected; seven or more come by chance once in 170 times [Poisson]."""
+    alarms = 0
+    for seed in range(1, 7):
+        runs = drifting_session(tmp_path / str(seed), seed).runs
+        alarms += sum(bool(judged(runs[:k], one).wrong) for k, one in enumerate(runs))
+    assert alarms < 7

@@ -55,7 +55,9 @@ def of_its_test(one: Seen, others: Others) -> Finding:
     fitting = [each for each in every if each.fits]
     nearest = max(fitting or every, key=lambda each: each.ratio)
     value = max(nearest.ratio, 0.0) if fitting else 0.0
-    better = f"the readings are e^{value:.1f} times as likely those of {nearest.label} as those of {one.run.test} {one.run.circle.direction}"
+    times = "over a million" if value > np.log(1e6) else f"{np.exp(value):.0f}"
+    own = f"{one.run.test} {one.run.circle.direction}"
+    better = f"the readings are {times} times as likely those of {nearest.label} as those of {own}"
     if 0.0 < value <= limit:
         return Finding(Name.TEST, value, limit, "", Verdict.CANNOT_TELL, f"{better}: too alike to tell")
     sound = f"none of {len(every)} other circles of the plan explains the readings better"

@@ -341,12 +341,23 @@ def spoil(whole: Sound, run: int, name: Name) -> Iterator[Spoilt]:
     before = finding_of(whole.judged()[run], name)
     assert before is not None
     assert before.limit is not None, before.text
+    limit = _limit_of_fault(whole, run, name, before.limit)
     for share in SHARES:
-        judged = _spoilt(whole, run, name, _size(whole, run, name, share * before.limit))
+        judged = _spoilt(whole, run, name, _size(whole, run, name, share * limit))
         after = finding_of(judged, name)
         others = tuple(f"{f.name}" for f in judged.wrong if f.name is not name)
         verdict = Verdict.CANNOT_TELL if after is None else after.verdict
-        yield Spoilt(name, share, None if after is None else after.value, before.limit, verdict, others)
+        yield Spoilt(name, share, None if after is None else after.value, limit, verdict, others)
+
+
+def _limit_of_fault(whole: Sound, run: int, name: Name, limit: float) -> float:
+    """The limit in the direction in which a fault moves the form, where that has a direction: that of a large one."""
+    if name not in {Name.OTHER_DIRECTION, Name.REPEAT}:
+        return limit
+    found = finding_of(_spoilt(whole, run, name, 5.0 * limit), name)
+    assert found is not None
+    assert found.limit is not None
+    return found.limit
 
 
 def _spoilt(whole: Sound, run: int, name: Name, size: float) -> Judgement:

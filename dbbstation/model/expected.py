@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ from dbbstation.errors import ModelError
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.machine.rotation import Frames
 from dbbstation.model.identified import IdentifiedModel
-from dbbstation.quality.knowledge import Expected
+from dbbstation.quality.knowledge import COEFFICIENTS, HIGHER, Expected, form_columns
 from dbbstation.sources.contract import Need, Owner
 from dbbstation.trace.average import averaged
 
@@ -54,50 +54,93 @@ def expected_circle(
     reading = model.bar(motion)
     theta = np.radians(sparse.raw.theta_deg)
     fit = np.linalg.pinv(np.column_stack([np.cos(theta), np.sin(theta), np.ones(len(theta))]))
-    off = fit @ (reading.length_mm - sparse.raw.circle.bar_mm)
+    start = np.radians(sparse.raw.circle.start_deg)
+    to_form = 1e3 * np.linalg.pinv(form_columns(theta - start))
+    long_mm = reading.length_mm - sparse.raw.circle.bar_mm
+    off = fit @ long_mm
     covariance = np.zeros((3, 3))
-    for columns, of_parameters in _parts(reading, motion, model, identified, causes):
-        effect = fit @ columns
-        covariance += effect @ of_parameters @ effect.T
+    again = np.zeros((COEFFICIENTS, COEFFICIENTS))
+    effects: dict[tuple[str, str], NDArray[np.float64]] = {}
+    shapes = form_columns(theta - start)[:, HIGHER]
+    for cause in _acting(reading, motion, model, identified, causes, shapes, observation.test):
+        effects[cause.key] = effect = to_form @ cause.columns_mm
+        again += cause.scatters * effect @ effect.T
+        if cause.at_a_pose:
+            covariance += (fit @ cause.columns_mm) @ (fit @ cause.columns_mm).T
     # A raised bar sees cos e of a horizontal shift.
     along = sparse.raw.circle.radius_mm / sparse.raw.circle.bar_mm
     scale = np.diag([1.0 / along, 1.0 / along, 1.0])
+    mounting_mm = float(np.max(observation.setup.mounting_repeatability_mm))
     return Expected(
         centre_mm=(scale @ off)[:2],
         radial_mm=float(off[2]),
         covariance_mm2=scale @ covariance @ scale,
         place_known=observation.setup.place_known,
-        mounting_mm=float(np.max(observation.setup.mounting_repeatability_mm)),
+        mounting_mm=mounting_mm,
         reversals_deg=_reversals_deg(observation, model),
+        form_um=to_form @ long_mm,
+        effects_um=effects,
+        again_um2=again,
+        place_um=1e3 * float(np.hypot(mounting_mm, observation.setup.ball_uncertainty_mm)),
     )
 
 
-def _parts(
+@dataclass(frozen=True, eq=False)
+class _Acting:
+    """One cause along a run.
+
+    Attributes:
+        key: its name, and the set of values that it shares with other runs.
+        columns_mm: what one standard deviation of each of its parameters does to the reading, shape (n, p) [mm].
+        at_a_pose: whether it acts wherever the machine stands, whatever the way there and the time.
+        scatters: variances of it that the difference of two runs of one circle has: two where each mounting has its own, one of
+            what grows with time.
+    """
+
+    key: tuple[str, str]
+    columns_mm: NDArray[np.float64]
+    at_a_pose: bool
+    scatters: float = 0.0
+
+
+def _acting(
     reading: BarReading,
     motion: Motion,
     model: MachineModel,
     identified: IdentifiedModel | None,
     causes: Iterable[ErrorSource],
-) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Derivatives of the reading by parameters, shape (n, p), with the covariance of these, shape (p, p)."""
+    shapes: NDArray[np.float64],
+    test: str,
+) -> Iterator[_Acting]:
+    """Causes along a run of a test; `shapes` are the undulations that no shift and no length makes, shape (n, 4)."""
     if identified is not None:
         yield from _of_model(reading, motion, model, identified)
-        left_um = float(identified.report.get("residual_rms_um", 0.0))
-        yield 1e-3 * left_um * np.column_stack(_as_circle(motion)), np.eye(3)
+        left_mm = 1e-3 * float(identified.report.get("residual_rms_um", 0.0))
+        # What is left of a circle is its form, the same in all its runs.
+        yield _Acting(("left by the model", test), left_mm * np.column_stack(_as_circle(motion)), at_a_pose=True)
+        yield _Acting(("left of the form by the model", test), left_mm * shapes, at_a_pose=False)
     for source in causes:
         of_machine = source.belongs_to is Owner.MACHINE
-        if source.of_currents or not source.needs <= {Need.POSE} or (of_machine and identified is not None):
+        # A model says where the machine goes; how that differs between directions and days has its usual size.
+        known = of_machine and identified is not None and source.needs <= {Need.POSE}
+        if source.of_currents or known or not source.needs <= {Need.POSE, Need.PATH, Need.TIME}:
             continue
         try:
             source.require(motion)
             stated = None if of_machine else source.stated_mm(motion)
-            usual = np.array([parameter.plausible for parameter in source.parameters(model.machine)])
+            parameters = source.parameters(model.machine)
+            usual = np.array([parameter.plausible for parameter in parameters])
             size = usual if stated is None else np.asarray(stated, dtype=np.float64)
-            columns = reading.by_source(source, model.machine, np.zeros(len(usual)))
+            at_a_pose = source.needs <= {Need.POSE}
+            # Amplitudes are zero as long as nothing is known; what says when, such as a time constant, has its usual value.
+            about = np.where([bool(parameter.shape) and not at_a_pose for parameter in parameters], usual, 0.0)
+            columns = reading.by_source(source, model.machine, about) * size
         except ModelError:
             continue  # the machine file does not have what it acts on
         if np.all(np.isfinite(columns)):
-            yield columns, np.diag(size**2)
+            scatters = 2.0 if source.belongs_to is Owner.MOUNTING else float(source.varies_with == "time")
+            key = source.name, source.shared_by(motion)
+            yield _Acting(key, columns, at_a_pose=at_a_pose, scatters=scatters)
 
 
 def _as_circle(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -110,7 +153,7 @@ def _as_circle(motion: Motion) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 def _of_model(
     reading: BarReading, motion: Motion, model: MachineModel, identified: IdentifiedModel
-) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+) -> Iterator[_Acting]:
     row_of = {row: k for k, row in enumerate(identified.covariance_rows)}
     columns, rows = [], []
     for fitted in model.acting(motion):
@@ -119,12 +162,14 @@ def _of_model(
         columns.append(reading.by_fitted(fitted)[:, known])
         rows += [row_of[names[k]] for k in known]
     if rows:
-        covariance = identified.covariance[np.ix_(rows, rows)]
+        by_parameter = np.hstack(columns)
+        variance, axes = np.linalg.eigh(identified.covariance)
+        root = axes * np.sqrt(np.maximum(variance, 0.0))
+        yield _Acting(("model", ""), by_parameter @ root[rows], at_a_pose=True)
         if (
             identified.unseen is not None
         ):  # what was held at nominal has its usual size, as of a machine that nobody calibrated
-            covariance = covariance + identified.unseen[:, rows].T @ identified.unseen[:, rows]
-        yield np.hstack(columns), covariance
+            yield _Acting(("held by the model", ""), by_parameter @ identified.unseen[:, rows].T, at_a_pose=True)
 
 
 def _reversals_deg(observation: Observation, model: MachineModel) -> tuple[float, ...]:

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.quality.finding import Finding, Name, Verdict, found, undecided
-from dbbstation.quality.knowledge import HIGHEST_HARMONIC, Others, Seen, across, apart_um
-from dbbstation.quality.limits import FEWEST_OTHERS, length_limit, length_quantile, quantile, ratio_quantile
+from dbbstation.quality.knowledge import ACROSS, COEFFICIENTS, Others, Seen, across
+from dbbstation.quality.limits import FEWEST_OTHERS, length_limit, length_quantile, median_length, quantile
+from dbbstation.quality.stated import covariance_apart, drifted_um, limit_along, limit_of_length, unseen_um2
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
 
 SCATTERING = 3
@@ -36,25 +39,37 @@ def direction(one: Seen, others: Others) -> Finding:
     if against is None:
         why = "no other run of this test, and the expected centre does not lie off the axis through the start"
         return undecided(Name.DIRECTION, f"cannot be seen: {why}", "µm")
-    mine, theirs = across(one), across(against)
-    apart, mirrored = float(np.linalg.norm(mine - theirs)), float(np.linalg.norm(mine + theirs))
-    stated = f"off the axis through the start it is {apart:.1f} µm from run {against.run.label}, {mirrored:.1f} µm from its mirror image"
-    if len(others.across_um) < FEWEST_OTHERS:
-        # What both may differ by is not known: it is taken from the smaller of the two, with Fisher's limit.
-        limit = mirrored * float(np.sqrt(ratio_quantile(len(mine), len(mine))))
-        least = apart * float(np.sqrt(ratio_quantile(len(mine), len(mine))))
-    else:
-        by_noise = length_quantile(len(mine)) * float(np.hypot(one.u_um, against.u_um))
-        limit = least = max(by_noise, length_limit(others.across_um, len(mine)))
-    if apart > limit >= mirrored:
+    off, mirrored = across(one) - across(against), across(one) + across(against)
+    apart, mirror = float(np.linalg.norm(off)), float(np.linalg.norm(mirrored))
+    stated = f"off the axis through the start it is {apart:.1f} µm from run {against.run.label}, {mirror:.1f} µm from its mirror image"
+    limits = _across_limits(one, against, others, off, mirrored)
+    if limits is None:
+        return undecided(Name.DIRECTION, f"{stated}: what both may differ by is not known", "µm", apart)
+    limit, of_mirror = limits
+    if apart > limit and mirror <= of_mirror:
         why = f"{stated}: one of both was run the wrong way round; run both again"
         return Finding(Name.DIRECTION, apart, limit, "µm", Verdict.WRONG, why)
-    if mirrored > least >= apart:
+    if apart <= limit and mirror > of_mirror:
         return Finding(Name.DIRECTION, apart, limit, "µm", Verdict.GOOD, stated)
-    why = (
-        "too alike to tell" if max(apart, mirrored) <= max(limit, least) else "neither of them; something else differs"
-    )
+    why = "too alike to tell" if apart <= limit else "neither of them; something else differs"
     return Finding(Name.DIRECTION, apart, limit, "µm", Verdict.CANNOT_TELL, f"{stated}: {why}")
+
+
+def _across_limits(
+    one: Seen, against: Seen, others: Others, off: NDArray[np.float64], mirrored: NDArray[np.float64]
+) -> tuple[float, float] | None:
+    """Greatest distance from another run, and from its mirror image, of a sound circle [µm]; None where nothing is known."""
+    covariance = covariance_apart(one, against)
+    rows = np.ix_(ACROSS, ACROSS)
+    stated = None if covariance is None else [limit_along(covariance[rows], each) for each in (off, mirrored)]
+    if len(others.across_um) < FEWEST_OTHERS:
+        return None if stated is None else (stated[0], stated[1])
+    by_noise = length_quantile(len(off)) * float(np.sqrt(unseen_um2(one, against)))
+    limit = max(by_noise, length_limit(others.across_um, len(off)))
+    if stated is None or covariance is None:
+        return limit, limit
+    most = limit_of_length(covariance[rows])
+    return min(limit, most), min(limit, most)
 
 
 def _by_place(one: Seen) -> Finding | None:
@@ -80,36 +95,50 @@ def _by_place(one: Seen) -> Finding | None:
 
 
 def other_direction(one: Seen, others: Others) -> Finding:
-    """Form and place against the other direction on the same mounting."""
+    """Form and place against the other direction."""
     if others.opposite is None:
-        return undecided(Name.OTHER_DIRECTION, "the other direction was not measured on this mounting", "µm")
-    value, u = apart_um(one, others.opposite)
-    return _beside(Name.OTHER_DIRECTION, others.opposite, value, u, others.directions_um, "the machine's own reversal")
+        return undecided(Name.OTHER_DIRECTION, "the other direction has not been measured", "µm")
+    return _beside(Name.OTHER_DIRECTION, one, others.opposite, others.directions_um, others.directions_stated)
 
 
 def repeat(one: Seen, others: Others) -> Finding:
     """Form and place against the repeat before."""
     if others.earlier is None:
         return undecided(Name.REPEAT, "there is no earlier run of this test and direction", "µm")
-    value, u = apart_um(one, others.earlier)
-    expected = one.run.expected
-    if one.run.mounting != others.earlier.run.mounting and expected is not None:
-        # A shift d moves two coefficients, by d / sqrt 2 each; both mountings scatter.
-        u = float(np.hypot(u, 1e3 * expected.mounting_mm))
-    return _beside(Name.REPEAT, others.earlier, value, u, others.repeats_um, "what changed in between")
+    return _beside(Name.REPEAT, one, others.earlier, others.repeats_um, others.repeats_stated)
 
 
 def _beside(
-    name: Name, other: Seen, value: float, u: float, usual: Sequence[tuple[float, float]], else_: str
+    name: Name, one: Seen, other: Seen, usual: Sequence[tuple[float, float]], sigmas: Sequence[float]
 ) -> Finding:
-    by_noise = length_quantile(2 * HIGHEST_HARMONIC + 1) * u
+    """Hold a run against another of its test.
+
+    Few other pairs say little: then the limit is what plan, machine file and usual sizes of causes allow in the direction in which
+    both differ. Enough other pairs say more of this machine: how they scatter limits a run, and where they scatter by more than is
+    stated, that limit grows with them. No limit is above what is stated allows in any direction, and none below what noise and the
+    plan leave open.
+    """
+    off = one.coefficients_um - other.coefficients_um
+    value = float(np.linalg.norm(off))
     stated = f"{value:.1f} µm rms from run {other.run.label} in mean, centre, ellipse and triangle"
+    covariance = covariance_apart(one, other)
     if len(usual) < FEWEST_OTHERS:
-        if value <= by_noise:
-            return found(name, value, by_noise, "µm", stated, stated)
-        why = f"{stated}, {by_noise:.1f} µm by noise: a fault of one of both or {else_}; fewer than {FEWEST_OTHERS} other pairs"
-        return undecided(name, why, "µm", value)
+        if covariance is None:
+            why = f"{stated}; fewer than {FEWEST_OTHERS} other pairs, and nothing stated, to hold it against"
+            return undecided(name, why, "µm", value)
+        limit = limit_along(covariance, off)
+        wrong = f"{stated}, at most {limit:.1f} µm by what machine and plan state: something moved between both; run both again"
+        return found(name, value, limit, "µm", stated, wrong)
     lengths = [apart for apart, _ in usual]
-    limit = max(by_noise, length_limit(lengths, SCATTERING))
+    limit = max(
+        length_quantile(COEFFICIENTS) * float(np.sqrt(unseen_um2(one, other))), length_limit(lengths, SCATTERING)
+    )
+    limit = float(np.hypot(limit, quantile(np.inf) * drifted_um(one, other)))
+    if one.run.mounting != other.run.mounting and one.run.expected is not None:
+        # A shift d moves two coefficients, by d / sqrt 2 each; both mountings scatter.
+        limit = float(np.hypot(limit, length_quantile(2) * 1e3 * one.run.expected.mounting_mm))
+    if covariance is not None:
+        more = max(float(np.median(sigmas)) / median_length(COEFFICIENTS), 1.0) if sigmas else 1.0
+        limit = min(limit, more * limit_along(covariance, off), limit_of_length(covariance))
     wrong = f"{stated}, {np.median(lengths):.1f} µm usual in this session: something moved between both; run both again"
     return found(name, value, limit, "µm", stated, wrong)

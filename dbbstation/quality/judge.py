@@ -12,6 +12,8 @@ from dbbstation.quality.finding import Finding, Name
 from dbbstation.quality.knowledge import Others, Run, Seen, across, apart_um, seen
 from dbbstation.quality.place import bore, radius
 from dbbstation.quality.single import by_itself
+from dbbstation.quality.stated import sigmas_apart
+from dbbstation.quality.swapped import of_its_test
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -67,12 +69,13 @@ class SessionRuns:
         pairs = [(one, match) for one in self._runs if (match := self._opposite(one)) is not None]
         repeats = [(one, match) for one in self._runs if (match := self._earlier(one)) is not None]
         taken: set[int] = set()
-        self._directions: list[tuple[Seen, Seen, tuple[float, float]]] = []
+        self._directions: list[tuple[Seen, Seen, tuple[float, float], float | None]] = []
         for one, other in pairs:
-            if id(other) not in taken:
+            # Another mounting scatters, which says nothing of the machine's own reversal.
+            if id(other) not in taken and other.run.mounting == one.run.mounting:
                 taken.add(id(one))
-                self._directions.append((one, other, apart_um(one, other)))
-        self._repeats = [(one, other, apart_um(one, other)) for one, other in repeats]
+                self._directions.append((one, other, apart_um(one, other), sigmas_apart(one, other)))
+        self._repeats = [(one, other, apart_um(one, other), sigmas_apart(one, other)) for one, other in repeats]
 
     def judge(self, one: Seen) -> Judgement:
         """Judge one run, of these or another of the same session."""
@@ -82,6 +85,7 @@ class SessionRuns:
             expected = one.run.expected
             findings += [
                 direction(one, others),
+                of_its_test(one, others),
                 radius(one.analysis, expected),
                 bore(one.analysis, expected),
                 other_direction(one, others),
@@ -99,28 +103,32 @@ class SessionRuns:
             drift_um=tuple(
                 (a.passes.mean_um, a.passes.u_mean_um(a.noise.sigma_um)) for a in analyses if a.passes is not None
             ),
-            directions_um=tuple(apart for a, b, apart in self._directions if one is not a and one is not b),
-            repeats_um=tuple(apart for a, b, apart in self._repeats if one is not a and one is not b),
+            directions_um=tuple(apart for a, b, apart, _ in self._directions if one is not a and one is not b),
+            repeats_um=tuple(apart for a, b, apart, _ in self._repeats if one is not a and one is not b),
+            directions_stated=_stated(self._directions, one),
+            repeats_stated=_stated(self._repeats, one),
             across_um=tuple(
                 float(np.linalg.norm(across(a) - across(b)))
-                for a, b, _ in self._directions
+                for a, b, *_ in self._directions
                 if one is not a and one is not b
             ),
             opposite=self._opposite(one),
             earlier=self._earlier(one),
+            every=tuple(other for other in self._runs if other is not one),
         )
 
     def _opposite(self, one: Seen) -> Seen | None:
-        """Return the same repeat of a test on the same mounting in the other direction."""
-        for other in self._runs:
-            same = (other.run.test, other.run.repeat, other.run.mounting) == (
-                one.run.test,
-                one.run.repeat,
-                one.run.mounting,
-            )
-            if same and other.run.circle.direction is not one.run.circle.direction:
-                return other
-        return None
+        """Return the run of the test in the other direction: on the same mounting before another, then of the same repeat."""
+        found = [
+            other
+            for other in self._runs
+            if other.run.test == one.run.test and other.run.circle.direction is not one.run.circle.direction
+        ]
+
+        def nearness(other: Seen) -> tuple[bool, bool, int]:
+            return other.run.mounting == one.run.mounting, other.run.repeat == one.run.repeat, other.run.repeat
+
+        return max(found, key=nearness, default=None)
 
     def _earlier(self, one: Seen) -> Seen | None:
         """Return the repeat before, in the same direction."""
@@ -132,3 +140,8 @@ class SessionRuns:
             and other.run.repeat < one.run.repeat
         ]
         return max(earlier, key=lambda other: other.run.repeat, default=None)
+
+
+def _stated(pairs: Sequence[tuple[Seen, Seen, tuple[float, float], float | None]], one: Seen) -> tuple[float, ...]:
+    """How far the runs of pairs differ, in standard deviations of what is stated; without those of a run, and where nothing is."""
+    return tuple(sigmas for a, b, _, sigmas in pairs if sigmas is not None and one is not a and one is not b)

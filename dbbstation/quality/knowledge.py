@@ -13,6 +13,8 @@ from dbbstation.inference.harmonics import amplitudes
 from dbbstation.trace.cut import cut, lost_on_turn, unusable_on_turn
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from dbbstation.plan.circle import Circle
@@ -21,6 +23,27 @@ if TYPE_CHECKING:
 HIGHEST_HARMONIC = 3
 """Undulations per revolution up to which runs are compared: mean, centre, ellipse and triangle are what a wrong ball, bar, tilt
 or direction changes, and seven numbers of thousands of samples are known to hundredths of a micrometre."""
+
+COEFFICIENTS = 2 * HIGHEST_HARMONIC + 1
+"""Numbers of a form: its mean, and a cosine and a sine of each harmonic."""
+
+HIGHER = (2, 3, 5, 6)
+"""Those of two and three undulations, which no shift of a ball and no length of a bar makes."""
+
+
+def form_columns(theta_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what a reading is per orthonormal coefficient of its form, shape (n, 7).
+
+    Args:
+        theta_rad: commanded angles from the start of the turn towards +Y, shape (n,) [rad].
+    """
+    angles = np.outer(theta_rad, np.arange(1, HIGHEST_HARMONIC + 1))
+    return np.hstack([np.ones((len(theta_rad), 1)), np.sqrt(2.0) * np.cos(angles), np.sqrt(2.0) * np.sin(angles)])
+
+
+def along_travel(circle: Circle) -> NDArray[np.float64]:
+    """Return the signs that coefficients take when angles are counted along the travel in place of towards +Y, shape (7,)."""
+    return np.concatenate([np.ones(HIGHEST_HARMONIC + 1), np.full(HIGHEST_HARMONIC, circle.direction.sign)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +57,11 @@ class Expected:
         place_known: False for a ball put up under the spindle: its centre says nothing.
         mounting_mm: standard deviation of where a ball comes to lie when it is put up again, in X and in Y [mm].
         reversals_deg: angles from +X at which a strut turns round [deg].
+        form_um: expected coefficients, as of `Seen.coefficients_um`, shape (7,) [µm].
+        effects_um: what one standard deviation of each cause's parameters does to these coefficients, shape (7, p) each, by the
+            cause and the set of values that it shares with other runs [µm].
+        again_um2: covariance of the difference of two runs of this circle, each on a mounting of its own, shape (7, 7) [µm²].
+        place_um: standard deviation of the ball's place that the plan states, CMM and holder, per axis [µm].
     """
 
     centre_mm: NDArray[np.float64]
@@ -42,6 +70,30 @@ class Expected:
     place_known: bool = True
     mounting_mm: float = 0.0
     reversals_deg: tuple[float, ...] = ()
+    form_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(COEFFICIENTS))
+    effects_um: Mapping[tuple[str, str], NDArray[np.float64]] = field(default_factory=dict)
+    again_um2: NDArray[np.float64] = field(default_factory=lambda: np.zeros((COEFFICIENTS, COEFFICIENTS)))
+    place_um: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A circle of the plan, and what a model says that it looks like.
+
+    Attributes:
+        test: name of its test.
+        circle: as commanded.
+        expected: by the model.
+    """
+
+    test: str
+    circle: Circle
+    expected: Expected
+
+    @property
+    def label(self) -> str:
+        """Name in texts."""
+        return f"{self.test} {self.circle.direction}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +108,8 @@ class Run:
         recording: as recorded.
         expected: where its circle should lie; None where nobody knows.
         largest_loss_percent: share of samples that may be lost [%].
+        planned: all circles of its plan, where a model says what they look like.
+        started_s: when it began, on the clock of its session [s]; None where not noted.
     """
 
     test: str
@@ -65,6 +119,8 @@ class Run:
     recording: Recording
     expected: Expected | None = None
     largest_loss_percent: float = 0.0
+    planned: tuple[Planned, ...] = ()
+    started_s: float | None = None
 
     @property
     def label(self) -> str:
@@ -92,7 +148,7 @@ class Seen:
     problem: str
     lost: tuple[int, int]
     feed_mm_min: tuple[float, float] | None = None
-    coefficients_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2 * HIGHEST_HARMONIC + 1))
+    coefficients_um: NDArray[np.float64] = field(default_factory=lambda: np.zeros(COEFFICIENTS))
     unusable: int = 0
 
     @property
@@ -101,6 +157,12 @@ class Seen:
         if self.analysis is None:
             return 0.0
         return self.analysis.noise.sigma_um / float(np.sqrt(len(self.analysis.raw)))
+
+    @property
+    def drift_um_s(self) -> float:
+        """How fast the bar's reading of one place grows, by the overlap; zero where it has none [µm/s]."""
+        passes = None if self.analysis is None else self.analysis.passes
+        return 0.0 if passes is None else passes.mean_um / passes.turn_s
 
 
 def seen(run: Run) -> Seen:
@@ -136,9 +198,12 @@ class Others:
         drift_um: drift over the turn of each, likewise [µm].
         directions_um: root mean square of the difference of both directions, of each other circle, likewise [µm].
         repeats_um: the same of repeats.
+        directions_stated: how far both directions of each other circle differ, in standard deviations of what is stated.
+        repeats_stated: the same of repeats.
         across_um: difference of both directions, of each other circle, off the axis through the start of the turn [µm].
-        opposite: same test, mounting and repeat in the other direction; None where there is none.
+        opposite: same test in the other direction, on the same mounting where there is one; None where there is none.
         earlier: same test and direction, the repeat before; None where there is none.
+        every: all other runs.
     """
 
     noise_um: tuple[float, ...] = ()
@@ -146,9 +211,12 @@ class Others:
     drift_um: tuple[tuple[float, float], ...] = ()
     directions_um: tuple[tuple[float, float], ...] = ()
     repeats_um: tuple[tuple[float, float], ...] = ()
+    directions_stated: tuple[float, ...] = ()
+    repeats_stated: tuple[float, ...] = ()
     across_um: tuple[float, ...] = ()
     opposite: Seen | None = None
     earlier: Seen | None = None
+    every: tuple[Seen, ...] = ()
 
 
 def apart_um(one: Seen, other: Seen) -> tuple[float, float]:
@@ -156,6 +224,10 @@ def apart_um(one: Seen, other: Seen) -> tuple[float, float]:
     return float(np.linalg.norm(one.coefficients_um - other.coefficients_um)), float(np.hypot(one.u_um, other.u_um))
 
 
+ACROSS = (HIGHEST_HARMONIC + 1, HIGHEST_HARMONIC + 3)
+"""Odd coefficients that change sign when a circle is mirrored about the axis through its start: sines of one and three undulations."""
+
+
 def across(one: Seen) -> NDArray[np.float64]:
-    """Odd coefficients that change sign when a circle is mirrored about the axis through its start, shape (2,) [µm]."""
-    return one.coefficients_um[HIGHEST_HARMONIC + 1 :][::2]
+    """Those coefficients, shape (2,) [µm]."""
+    return one.coefficients_um[list(ACROSS)]

@@ -48,6 +48,11 @@ def length_quantile(dimensions: int) -> float:
     return float(np.sqrt(chdtri(dimensions, SHARE)))
 
 
+def scaled_length_quantile(freedom: float) -> float:
+    """Square root of the chi-square quantile of a number of degrees of freedom that need not be whole."""
+    return float(np.sqrt(chdtri(max(freedom, 1.0), SHARE)))
+
+
 def ratio_quantile(above: float, below: float) -> float:
     """Ratio of two estimates of one variance that chance passes with probability SHARE [Fisher].
 
@@ -91,6 +96,11 @@ def length_limit(lengths: Sequence[float], dimensions: int) -> float:
     variance = float(np.median(np.square(lengths))) / median
     known = ROBUST_SHARE * dimensions * len(lengths)
     return float(np.sqrt(variance * ratio_quantile(dimensions, max(known, 1.0))))
+
+
+def median_length(dimensions: int) -> float:
+    """Median length of a sound vector of so many dimensions, in standard deviations."""
+    return float(np.sqrt(chdtri(dimensions, 0.5)))
 
 
 def joined(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -91,10 +91,11 @@ class Remembered:
         return dict(self.sessions).get(folder.absolute(), self.line)
 
     def with_session(self, folder: Path, line: Line) -> Remembered:
-        """Return the same with a session that was opened just now."""
+        """Return the same with a session that was opened just now; a virtual machine is the last choice of no other session."""
         folder = folder.absolute()
         others = [(other, by) for other, by in self.sessions if other != folder]
-        return replace(self, line=line, sessions=((folder, line), *others)[:MOST])
+        last = self.line if line.virtual else line
+        return replace(self, line=last, sessions=((folder, line), *others)[:MOST])
 
 
 class Memory:
@@ -124,7 +125,8 @@ class Memory:
             return Remembered()
         sessions = tuple((Path(folder), line) for folder, line in file.sessions.items())
         machine, plan = (Path(name) if name else None for name in (file.machine, file.plan))
-        return Remembered(machine, plan, file.line, file.operator, file.serial_number, sessions)
+        last = _NO_LINE if file.line.virtual else file.line  # older programs remembered a virtual one like any other
+        return Remembered(machine, plan, last, file.operator, file.serial_number, sessions)
 
     def write(self, remembered: Remembered) -> None:
         """Keep the last choices; where they cannot be kept, nothing else suffers."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from dbbstation.trace.cut import FEED_TOLERANCE
+
 if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle
 
@@ -19,6 +21,12 @@ CORNER_DWELL_S = 0.3
 
 DWELL_BEHIND_S = 0.5
 """Recorded behind the feed-out, so that its edge has both sides [s]."""
+
+
+def feed_out_due_s(circle: Circle) -> float:
+    """Time from the feed-in edge to the feed-out edge at the plan's feed, with the tolerance that cutting has [s]."""
+    feeding_s = circle.feed_in_mm / (circle.feed_mm_min / 60.0)
+    return (1.0 + FEED_TOLERANCE) * circle.swept_deg / circle.turning_deg_s + feeding_s + 2.0 * CORNER_DWELL_S
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError
 from dbbstation.files.recordings.entries import RunEntry, RunState
-from dbbstation.files.recordings.judged import runs_of
+from dbbstation.files.recordings.judged import planned_circles, run_of
 from dbbstation.instrument.reading import DOUBTFUL
 from dbbstation.quality.judge import SessionRuns
 from dbbstation.quality.knowledge import seen
@@ -60,6 +60,7 @@ class RunJudge:
         self._writer = writer
         self._programs = programs or {}
         self._model = model
+        self._planned = planned_circles(writer.session, model)
         self._counting: dict[tuple[str, Direction, int], Seen] = {}
         self._waiting: dict[tuple[str, Direction, int], Seen] = {}
         self._rejected: dict[tuple[str, Direction, int], Seen] = {}
@@ -114,13 +115,13 @@ class RunJudge:
             mounting=run.mounting,
             state=RunState.COMPLETE,
             reason="",
-            started=None,
+            started=next((known.started for known in self._writer.runs if _key(known) == _key(run)), None),
             path=self._writer.session.folder,
             sha256="",
             program=self._programs.get((run.test, run.direction)),
             centre_mm=None,
         )
-        (one,) = runs_of(self._writer.session, [(entry, recording)], self._model)
+        one = run_of(self._writer.session, entry, recording, self._model, self._planned)
         self._waiting[_key(run)] = new = seen(one)
         others = [known for key, known in self._counting.items() if key != _key(run)]
         return SessionRuns([*others, new]).judge(new).findings
@@ -131,7 +132,7 @@ class RunJudge:
             recording = self._writer.session.load(entry).recording
         except InputError:
             return
-        (one,) = runs_of(self._writer.session, [(entry, recording)], self._model)
+        one = run_of(self._writer.session, entry, recording, self._model, self._planned)
         into[_key(entry)] = seen(one)
 
 

@@ -5,14 +5,16 @@ Samples are not kept here: the memory of a run must not grow with its length. Wh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from dbbstation.errors import TraceError
-from dbbstation.instrument.reading import DOUBTFUL
-from dbbstation.station.detector import DWELL_BEHIND_S, live_phi_deg
+from dbbstation.instrument.reading import DOUBTFUL, OK
+from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.quality.held import AFTER_HELD, SHORTEST_S, HeldLength
+from dbbstation.station.detector import DWELL_BEHIND_S, feed_out_due_s, live_phi_deg
 from dbbstation.station.events import Sample
 from dbbstation.trace.analysis import CircleFigures, figures
 from dbbstation.trace.cut import cut, unusable_on_turn
@@ -75,6 +77,7 @@ class RunRecord:
         lost: samples that the line counted as lost, wherever in the run.
         lost_on_turn: those from feed-in to feed-out, and doubtful ones there: both are missing in the circle.
         doubtful: samples that may have been damaged on the line, wherever in the run.
+        held: how long the length has stood still on the turn; knows the noise of the runs before.
     """
 
     run: RunId
@@ -86,6 +89,7 @@ class RunRecord:
     lost: int = 0
     lost_on_turn: int = 0
     doubtful: int = 0
+    held: HeldLength = field(default_factory=HeldLength)
     _last_s: float = 0.0
     _last_mm: float | None = None
 
@@ -125,6 +129,29 @@ class RunRecord:
         if self.fed_in_s is None or not self.samples:
             return 0.0
         return live_phi_deg(self.circle, self._last_s - self.fed_in_s) + self.circle.overshoot_deg
+
+    def stands(self, sample: Sample) -> bool:
+        """Take a sample between feed-in and feed-out; return whether the gauge does not follow the machine.
+
+        The length stands still on the turn though noise would move it, or at its end though the feed-out must have.
+        """
+        if self.fed_in_s is None or sample.phi_deg is None or sample.length_mm is None or sample.status != OK:
+            return False
+        if sample.phi_deg < 0.0:  # the machine feeds in, which is no noise
+            return False
+        on_turn = sample.phi_deg <= FULL_TURN_DEG
+        self.held.add(sample.t_s, sample.length_mm, noise=on_turn)
+        if on_turn:
+            turn_s = FULL_TURN_DEG / self.circle.turning_deg_s
+            return self.held.stands(self.samples / max(sample.t_s, SHORTEST_S) * turn_s)
+        overdue_s = sample.t_s - self.fed_in_s - feed_out_due_s(self.circle)
+        return overdue_s > SHORTEST_S and self.held.held_s > SHORTEST_S
+
+    @property
+    def standing(self) -> str:
+        """What to say of a gauge that does not follow."""
+        stands = f"the length has stood at {self._last_mm:.4f} mm for {self.held.held_s:.1f} s"
+        return f"{stands} while the machine moved; {AFTER_HELD}"
 
     def left(self, t_s: float) -> bool:
         """Whether at a time since the first sample enough lies behind the feed-out."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.instrument.reading import DOUBTFUL, OK
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.plan.sampling import sampling
+from dbbstation.quality.held import HeldLength
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Command, GoTo, Judge, Note, Pause, Reject, Repeat, Resume, Skip, Start
 from dbbstation.station.detector import CircleWatch, EdgeDetector, Patience
@@ -106,6 +107,7 @@ class Sequencer:
         self._watch: CircleWatch | None = None
         self._reachable: Reachable | None = None
         self._remounted = False
+        self._held = HeldLength()
         self._unjudged = deque(waiting)
         self._waiting_since_s: float | None = None
         self._told_deg = 0.0
@@ -292,6 +294,9 @@ class Sequencer:
             self._move(Cause.FED_OUT)
         elif self.state is State.LEAVING and self._record.left(sample.t_s):
             self._move(Cause.CIRCLE_FOUND if self._complete() else Cause.CIRCLE_MISSING)
+        elif self.state is State.TURNING and self._record.stands(sample):
+            self._complete(problem=self._record.standing)
+            self._move(Cause.LENGTH_GONE)
         elif reading.gone and sample.phi_deg is not None and 0.0 <= sample.phi_deg <= FULL_TURN_DEG:
             self._complete(problem=_length_gone(reading, sample.phi_deg))
             self._move(Cause.LENGTH_GONE)
@@ -317,7 +322,8 @@ class Sequencer:
         # Only now is it certain that a ball stands: a start that comes to nothing leaves no mounting.
         self._run = run = self.schedule.mounted(self._announced(), remounted=self._remounted)
         self._flush()
-        self._record = RunRecord(run, self._circle(), reading.t_s)
+        self._held.restart()
+        self._record = RunRecord(run, self._circle(), reading.t_s, held=self._held)
         self._waiting_since_s = reading.t_s
         self._out.append(events.RunStarted(run, self._programs.get((run.test, run.direction), "")))
         self._move(Cause.BAR_OUTSIDE)

@@ -1,7 +1,8 @@
 """Sound sessions of the plant, and single runs of them spoilt by a known amount.
 
 `python -m tests.quality.sabotage` prints the table of docs/circles.md: how often each finding is made of runs that are spoilt by
-half its limit, by its limit and by twice its limit, and how often of runs that are sound.
+half its limit, by its limit and by twice its limit, and how often of runs that are sound. `--equipment 3` prints the table of what goes
+wrong with balls, programs and gauges, and `--drifting 1000` how often good circles on drifting days have a finding.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ import argparse
 import collections
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
@@ -29,12 +31,16 @@ from dbbstation.trace.cut import edges_of, progress_deg
 from dbbstation.trace.recording import Recording
 from tests.cli.conftest import call
 from tests.plant.mechanisms.backlash import Backlash
+from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.servo import ServoLag
+from tests.plant.mechanisms.thermal import ThermalFrame, ThermalStruts
+from tests.plant.mechanisms.warming import Warming
 from tests.plant.noise import Noise
 from tests.plant.plan import subset, table_ii_plan
-from tests.plant.session import record
+from tests.plant.run import Slot
+from tests.plant.session import Reprogram, record
 
 SHARES = (0.5, 1.0, 2.0)
 """Sizes of what is spoilt, as shares of the limit."""
@@ -61,7 +67,15 @@ class Sound:
         return SessionRuns([*self.runs[:run], one, *self.runs[run + 1 :]]).judge(one)
 
 
-def sound(folder: Path, seed: int, tests: str = "abcdefghijklmno", rate_hz: float = 50.0) -> Sound:
+def sound(
+    folder: Path,
+    seed: int,
+    tests: str = "abcdefghijklmno",
+    rate_hz: float = 50.0,
+    also: Sequence[Mechanism] = (),
+    noise: Noise = NOISE,
+    reprogram: Reprogram | None = None,
+) -> Sound:
     """Kinematic errors, gravity, backlash and lag of a machine of its own, usual scatter of balls and bar, noise."""
     rng = np.random.default_rng([seed, 35])
     plan = subset(table_ii_plan(seed), list(tests))
@@ -72,7 +86,8 @@ def sound(folder: Path, seed: int, tests: str = "abcdefghijklmno", rate_hz: floa
         Backlash(gap_um=tuple(rng.uniform(0.0, 3.0, 6))),
         ServoLag(tuple(rng.uniform(2.0, 3.0, 6))),
     ]
-    record(folder, seed=seed, plan=plan, mechanisms=mechanisms, noise=NOISE, rate_hz=rate_hz)
+    mechanisms += also
+    record(folder, seed=seed, plan=plan, mechanisms=mechanisms, noise=noise, rate_hz=rate_hz, reprogram=reprogram)
     return read(folder)
 
 
@@ -84,7 +99,7 @@ def read(folder: Path, model: IdentifiedModel | None = None) -> Sound:
 
 def calibrated(folder: Path, seed: int) -> Sound:
     """A session whose circles are expected where its own calibration puts them."""
-    sound(folder / "spoilt", seed, "abdfhjkn")
+    sound(folder / "spoilt", seed, TESTS)
     outcome = call("calibrate", folder / "spoilt", "--out", folder / "model.yaml")
     assert outcome.code == 0, outcome.err
     return read(folder / "spoilt", read_model(folder / "model.yaml", every_source(())))
@@ -153,6 +168,15 @@ def mirrored(recording: Recording, circle: Circle, share: float) -> Recording:
     return replace(recording, length_mm=recording.length_mm + np.where(on_arc, share * (back - forth), 0.0))
 
 
+def begun_elsewhere(recording: Recording, circle: Circle, by_deg: float) -> Recording:
+    """The turn begun at an angle that is not the plan's: its form is found turned by as much."""
+    phi = progress(recording, circle)
+    on_arc = (phi > -circle.overshoot_deg) & (phi < 360.0 + circle.overshoot_deg)
+    there = np.interp(np.mod(phi + by_deg, 360.0), *_turn(recording, phi))
+    here = np.interp(np.mod(phi, 360.0), *_turn(recording, phi))
+    return replace(recording, length_mm=recording.length_mm + np.where(on_arc, there - here, 0.0))
+
+
 def _turn(recording: Recording, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Form of the turn up to eight undulations: what is mirrored is form, not noise."""
     turn = (phi >= 0.0) & (phi < 360.0)
@@ -207,6 +231,99 @@ def finding_of(judgement: Judgement, name: Name) -> Finding | None:
     return next((finding for finding in judgement.findings if finding.name is name), None)
 
 
+DRIFTS_UM_MIN, WARMINGS_K_H = (0.0, 1.0), (0.0, 1.0)
+"""Bar's drift and warming of struts and frame, from and to, that good circles have [µm/min, K/h]."""
+
+
+def drifting_session(folder: Path, seed: int) -> Sound:
+    """A good session on a day of its own: drift, warming, and noise that is white or remembers."""
+    rng = np.random.default_rng([seed, 134])
+    rise_k, slow_s = 100.0 * rng.uniform(*WARMINGS_K_H), 360e3
+    warming = Warming(rise_k=rise_k, time_constant_s=slow_s)
+    white_um, correlated_um = float(rng.uniform(0.1, 0.6)), float(rng.choice([0.0, 0.4]))
+    noise = Noise(white_um=white_um, correlated_um=correlated_um, correlation=float(rng.uniform(0.5, 0.9)))
+    also = (ThermalStruts(warming=warming), ThermalFrame(warming=warming))
+    whole = sound(folder, seed, also=also, noise=noise)
+    um_s = rng.uniform(*DRIFTS_UM_MIN) / 60.0
+    return Sound([seen(replace(one.run, recording=_warmed(one.run, um_s))) for one in whole.runs])
+
+
+def _warmed(run: Run, um_s: float) -> Recording:
+    assert run.started_s is not None
+    return _longer(run.recording, um_s * (run.started_s + run.recording.t_s))
+
+
+class Fault(StrEnum):
+    """What goes wrong with the equipment, as whole: not how large the number of a finding comes out."""
+
+    OTHER_TEST = "program and ball of another test"
+    TILT = "wrong tilt"
+    START = "wrong start"
+    DIRECTION = "wrong direction"
+    KNOCKED = "knocked ball"
+    STUCK = "stuck length"
+    CLIPPED = "clipped length"
+
+
+SIZES: dict[Fault, tuple[float, ...]] = {
+    Fault.TILT: (1.0, 5.0, 15.0),
+    Fault.START: (5.0, 30.0, 180.0),
+    Fault.KNOCKED: (1.0, 2.0, 5.0),
+    Fault.STUCK: (1.0, 2.0, 5.0),
+    Fault.CLIPPED: (1.0, 2.0, 5.0),
+}
+"""Tilt and start are off by so many degrees, a ball by as many limits, a length stands still for as many limits."""
+
+
+class When(StrEnum):
+    """What the session knows already."""
+
+    FIRST = "first pair"
+    LATER = "later"
+    REPEATED = "after a repeat"
+
+
+def before(whole: Sound, spoilt: Seen, when: When) -> list[Seen]:
+    """Runs that count before a run is judged."""
+    own = [one for one in whole.runs if one.run.test == spoilt.run.test and one.run.repeat == 1]
+    own = [one for one in own if one.run.circle.direction is not spoilt.run.circle.direction]
+    rest = [one for one in whole.runs if one.run.test != spoilt.run.test]
+    return [*rest, *own] if when is When.LATER else own
+
+
+def faulty(whole: Sound, tilted: dict[float, Sound], run: int, fault: Fault, size: float, known: list[Seen]) -> Seen:
+    """One run with a fault of a size."""
+    one = whole.runs[run].run
+    if fault is Fault.OTHER_TEST:
+        return seen(replace(one, recording=whole.runs[int(size)].run.recording))
+    if fault is Fault.TILT:
+        return seen(replace(one, recording=tilted[size].runs[run].run.recording))
+    if fault is Fault.START:
+        return seen(replace(one, recording=begun_elsewhere(one.recording, one.circle, size)))
+    if fault is Fault.DIRECTION:
+        return seen(replace(one, recording=mirrored(one.recording, one.circle, 1.0)))
+    name = Name.OTHER_DIRECTION if fault is Fault.KNOCKED else Name.HELD
+    found = finding_of(SessionRuns([*known, whole.runs[run]]).judge(whole.runs[run]), name)
+    limit = 0.0 if found is None or found.limit is None else found.limit
+    if fault is Fault.KNOCKED:
+        # A shift d shows as d / sqrt 2 in the rms of the form, on top of what is there.
+        return seen(replace(one, recording=elsewhere(one.recording, one.circle, np.sqrt(2.0) * size * limit)))
+    return seen(
+        replace(one, recording=standing(one.recording, one.circle, size * limit, clipped=fault is Fault.CLIPPED))
+    )
+
+
+def standing(recording: Recording, circle: Circle, held_s: float, *, clipped: bool) -> Recording:
+    """A length that stands still for a while in the middle of the turn, or that goes no farther than what it has there."""
+    phi = progress(recording, circle)
+    first = int(np.searchsorted(phi, 140.0))
+    last = int(np.searchsorted(recording.t_s, recording.t_s[first] + held_s))
+    length_mm = recording.length_mm.copy()
+    inside = slice(first, last + 1)
+    length_mm[inside] = np.quantile(length_mm[inside], 0.02) if clipped else length_mm[first]
+    return replace(recording, length_mm=length_mm)
+
+
 @dataclass(frozen=True)
 class Spoilt:
     """One run, spoilt by a share of a limit."""
@@ -224,12 +341,23 @@ def spoil(whole: Sound, run: int, name: Name) -> Iterator[Spoilt]:
     before = finding_of(whole.judged()[run], name)
     assert before is not None
     assert before.limit is not None, before.text
+    limit = _limit_of_fault(whole, run, name, before.limit)
     for share in SHARES:
-        judged = _spoilt(whole, run, name, _size(whole, run, name, share * before.limit))
+        judged = _spoilt(whole, run, name, _size(whole, run, name, share * limit))
         after = finding_of(judged, name)
         others = tuple(f"{f.name}" for f in judged.wrong if f.name is not name)
         verdict = Verdict.CANNOT_TELL if after is None else after.verdict
-        yield Spoilt(name, share, None if after is None else after.value, before.limit, verdict, others)
+        yield Spoilt(name, share, None if after is None else after.value, limit, verdict, others)
+
+
+def _limit_of_fault(whole: Sound, run: int, name: Name, limit: float) -> float:
+    """The limit in the direction in which a fault moves the form, where that has a direction: that of a large one."""
+    if name not in {Name.OTHER_DIRECTION, Name.REPEAT}:
+        return limit
+    found = finding_of(_spoilt(whole, run, name, 5.0 * limit), name)
+    assert found is not None
+    assert found.limit is not None
+    return found.limit
 
 
 def _spoilt(whole: Sound, run: int, name: Name, size: float) -> Judgement:
@@ -281,11 +409,112 @@ ROUNDS = 8
 """Corrections of a fault's size: some faults join what noise shows already, and their value is not quite proportional."""
 
 
+TESTS = "abdfhjkn"
+"""Tests of the sessions that are spoilt: three heights, tilted and level."""
+
+
+def tilted_by(folder: Path, seed: int, degrees: float) -> Sound:
+    """The same machine and the same day, all circles tilted by so much more about X."""
+
+    def more(_slot: Slot, poses: np.ndarray) -> np.ndarray:
+        return poses + np.array([0.0, 0.0, 0.0, degrees, 0.0, 0.0])
+
+    return sound(folder, seed, TESTS, reprogram=more)
+
+
+Row = collections.Counter[tuple[Fault, float, When, bool, str]]
+
+
+def equipment(folder: Path, seed: int) -> Row:
+    """Judge each run of a session with each fault, as it would be judged at the machine; count what comes of it."""
+    counted: Row = collections.Counter()
+    modelled = calibrated(folder, seed)
+    for with_model in (False, True):
+        whole = modelled if with_model else read(folder / "spoilt")
+        tilted = {
+            degrees: tilted_by(folder / f"t{degrees}{with_model}", seed, degrees) for degrees in SIZES[Fault.TILT]
+        }
+        runs = [k for k, one in enumerate(whole.runs) if one.run.repeat == 1]
+        # The second direction of each test: the first has been accepted.
+        seconds = [k for n, k in enumerate(runs) if n % 2 == 1]
+        for run in seconds:
+            for when in When:
+                _count(counted, whole, tilted, run, when, with_model=with_model)
+    return counted
+
+
+def _count(counted: Row, whole: Sound, tilted: dict[float, Sound], run: int, when: When, *, with_model: bool) -> None:
+    one = whole.runs[run]
+    known = before(whole, one, when)
+    alike = [
+        k
+        for k, o in enumerate(whole.runs)
+        if o.run.test != one.run.test and o.run.repeat == 1 and o.run.circle.direction is one.run.circle.direction
+    ]
+    for fault in Fault:
+        for size in alike if fault is Fault.OTHER_TEST else SIZES.get(fault, (1.0,)):
+            spoilt = faulty(whole, tilted, run, fault, size, known)
+            if when is When.REPEATED:
+                # The run before was wrong in the same way, and rejected; this is its repeat.
+                spoilt = replace(spoilt, run=replace(spoilt.run, repeat=2))
+            judged = SessionRuns([*known, spoilt]).judge(spoilt)
+            shown = 0.0 if fault is Fault.OTHER_TEST else size
+            counted[fault, shown, when, with_model, "of"] += 1
+            counted[fault, shown, when, with_model, "found"] += bool(judged.wrong)
+
+
+def print_equipment(counted: Row) -> None:
+    """The table of docs/circles.md: found, of how many."""
+    heads = [(when, with_model) for with_model in (False, True) for when in When]
+    titles = [f"{when}{', model' if with_model else ''}" for when, with_model in heads]
+    sys.stdout.write(f"| fault | size | {' | '.join(titles)} |\n|{' --- |' * (len(heads) + 2)}\n")
+    for fault in Fault:
+        for size in sorted({key[1] for key in counted if key[0] is fault}):
+            cells = [f"{counted[fault, size, *head, 'found']} of {counted[fault, size, *head, 'of']}" for head in heads]
+            shown = f"{size:g}" if fault in SIZES else ""
+            sys.stdout.write(f"| {fault} | {shown} | {' | '.join(cells)} |\n")
+
+
+def false_alarms(folder: Path, seed: int, wanted: int) -> None:
+    """Good circles on drifting days, each judged at the machine, beside those before it, and in the end, beside all."""
+    seen_so_far = 0
+    alarms: dict[str, collections.Counter[str]] = {
+        "at the machine": collections.Counter(),
+        "in the end": collections.Counter(),
+    }
+    while seen_so_far < wanted:
+        whole = drifting_session(folder / f"drift{seed}", seed)
+        session = SessionRuns(whole.runs)
+        for k, one in enumerate(whole.runs[: wanted - seen_so_far]):
+            live = SessionRuns(whole.runs[: k + 1]).judge(one)
+            for name, judged in (("at the machine", live), ("in the end", session.judge(one))):
+                alarms[name]["circles"] += bool(judged.wrong)
+                alarms[name].update(str(f.name) for f in judged.wrong)
+                for f in judged.wrong:
+                    sys.stderr.write(f"{seed} {name} {one.run.label}: {f.name} {f.value} > {f.limit}: {f.text}\n")
+        seen_so_far += min(len(whole.runs), wanted - seen_so_far)
+        seed += 1
+    for name, counted in alarms.items():
+        sys.stdout.write(f"{wanted} good circles on drifting days, {name}: {dict(counted)}\n")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--clean", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--drifting", type=int, default=0, help="good circles on drifting days, in place of all else")
+    parser.add_argument("--equipment", type=int, default=0, help="sessions whose equipment fails, in place of all else")
     given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        if given.drifting:
+            false_alarms(Path(folder), given.seed, given.drifting)
+        counted: Row = collections.Counter()
+        for seed in range(given.seed, given.seed + given.equipment):
+            counted.update(equipment(Path(folder) / str(seed), 1000 + seed))
+        if given.equipment:
+            print_equipment(counted)
+    if given.drifting or given.equipment:
+        return
     wrong: collections.Counter[str] = collections.Counter()
     untold: collections.Counter[str] = collections.Counter()
     seen = alarmed = 0

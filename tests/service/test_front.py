@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import time
 from dataclasses import replace
@@ -115,6 +116,28 @@ def test_choices_are_remembered(front: Front, session: Path, tmp_path: Path) -> 
         remembered = remembered.with_session(tmp_path / str(number), REAL)
     assert len(remembered.sessions) == MOST
     assert remembered.sessions[0][0] == tmp_path / str(2 * MOST - 1)
+
+
+def test_a_virtual_machine_is_never_offered_unless_it_is_asked_for(front: Front, session: Path) -> None:
+    """Somebody tried it, and then measures: the session goes on by what it was measured by, or asks."""
+    tried = front.under / "virtual"
+    virtual = front.virtual_choice().line
+    front.memory.write(Remembered(line=REAL).with_session(tried, virtual))
+    assert front.goes_on_with(tried).line == virtual
+    assert front.first_choice().line == REAL
+    assert front.goes_on_with(session).line == REAL
+    front.memory.write(Remembered().with_session(tried, virtual))
+    assert Part.PORT in front.first_choice().missing()
+    assert Part.PORT in front.goes_on_with(session).missing()
+    # As a program before this one wrote it.
+    text = front.memory.path.read_text()
+    front.memory.path.write_text(_with_last_line(text, virtual))
+    assert Part.PORT in front.first_choice().missing()
+
+
+def _with_last_line(text: str, line: Line) -> str:
+    said = json.loads(text)
+    return json.dumps({**said, "line": line.model_dump()})
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b'{"machine": 7}', b"\xff\xfe", b'{"unknown": 1}'])

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dbbstation.errors import MachineError, TraceError
-from dbbstation.files.recordings.entries import RunState
-from dbbstation.model.expected import expected_circle
+from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.model.expected import SECTORS, expected_circle
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.observation import Observation
+from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.quality.judge import Judgement, judge
-from dbbstation.quality.knowledge import Run
+from dbbstation.quality.knowledge import Planned, Run
 from dbbstation.sources.registry import known_sources
+from dbbstation.trace.circle import RawCircle
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.plan.circle import Circle
     from dbbstation.quality.knowledge import Expected
     from dbbstation.trace.recording import Recording
 
@@ -50,10 +55,26 @@ def runs_of(
     session: SessionFolder, wanted: Sequence[tuple[RunEntry, Recording]], model: IdentifiedModel | None = None
 ) -> tuple[Run, ...]:
     """Return runs of a session as they are judged; arguments as of `judge_session`."""
-    return tuple(_run(session, run, recording, model) for run, recording in wanted)
+    planned = planned_circles(session, model)
+    return tuple(run_of(session, run, recording, model, planned) for run, recording in wanted)
 
 
-def _run(session: SessionFolder, run: RunEntry, recording: Recording, model: IdentifiedModel | None) -> Run:
+def run_of(
+    session: SessionFolder,
+    run: RunEntry,
+    recording: Recording,
+    model: IdentifiedModel | None,
+    planned: tuple[Planned, ...],
+) -> Run:
+    """Return one run of a session as it is judged.
+
+    Args:
+        session: the session.
+        run: which.
+        recording: of it.
+        model: of the machine; None: only the usual sizes of what machines have are known.
+        planned: of `planned_circles`.
+    """
     circle, recording = session.circle(run), replace(recording, name=run.label)
     return Run(
         test=run.test,
@@ -63,7 +84,43 @@ def _run(session: SessionFolder, run: RunEntry, recording: Recording, model: Ide
         recording=recording,
         expected=_expected(session, run, recording, model),
         largest_loss_percent=session.plan.largest_loss_percent,
+        # Compensated programs are there to make all circles alike: what one looks like says nothing.
+        planned=() if run.program is not None else planned,
+        started_s=session.started_s(run),
     )
+
+
+def planned_circles(session: SessionFolder, model: IdentifiedModel | None) -> tuple[Planned, ...]:
+    """Return all circles of a session's plan as a model has them; none without a model, to which they all look alike."""
+    if model is None:
+        return ()
+    found = []
+    for name, test in session.plan.tests.items():
+        for direction in test.directions:
+            run = RunEntry(
+                test=name,
+                direction=direction,
+                repeat=0,
+                mounting=None,
+                state=RunState.RECORDING,
+                reason="",
+                started=None,
+                path=session.folder,
+                sha256="",
+                program=None,
+                centre_mm=None,
+            )
+            with suppress(MachineError):
+                found.append(
+                    Planned(name, test.run(direction), _expected_of(session, run, _ideal(session.circle(run)), model))
+                )
+    return tuple(found)
+
+
+def _ideal(circle: Circle) -> RawCircle:
+    """The turn of a circle whose readings nobody has taken."""
+    phi_deg = (np.arange(SECTORS) + 0.5) * FULL_TURN_DEG / SECTORS
+    return RawCircle("", circle, phi_deg / circle.turning_deg_s, phi_deg, np.full(SECTORS, circle.bar_mm))
 
 
 def _expected(
@@ -73,15 +130,18 @@ def _expected(
 
     A compensated program is there to put the circle where it is planned: that is where it is expected.
     """
-    nominal = MachineModel(session.machine)
-    known_by = nominal if model is None or run.program is not None else model
     try:
-        raw = cut(recording, session.circle(run))
-        setup = session.setup(run, raw.temperature_degc)
-        if session.bar is None:
-            # A bar that nobody calibrated is as long in all runs of the session: one that reads another length is found.
-            setup = replace(setup, bar_uncertainty_mm=0.0)
-        observation = Observation(run.test, run.repeat, raw, setup)
-        return expected_circle(observation, known_by, known_sources().values())
+        return _expected_of(session, run, cut(recording, session.circle(run)), None if run.program else model)
     except (TraceError, MachineError):
         return None
+
+
+def _expected_of(session: SessionFolder, run: RunEntry, raw: RawCircle, model: IdentifiedModel | None) -> Expected:
+    setup = session.setup(run, raw.temperature_degc)
+    if session.bar is None:
+        # A bar that nobody calibrated is as long in all runs of the session: one that reads another length is found.
+        setup = replace(setup, bar_uncertainty_mm=0.0)
+    observation = Observation(run.test, run.repeat, raw, setup, started_s=session.started_s(run) or 0.0)
+    return expected_circle(
+        observation, MachineModel(session.machine) if model is None else model, known_sources().values()
+    )

@@ -1,0 +1,141 @@
+"""A length that stands still though its gauge is read: a plunger that sticks, a gauge at its stop, a display that holds.
+
+Readings scatter. With a white part of standard deviation sigma and a step r in which they come, the next reading is any given value
+with a probability of r / (sigma sqrt(2 pi)) at the most, the greatest density of a normal variable times the step, whatever the form
+of the circle and whatever else the noise remembers. n equal readings in a row are therefore less likely than that to the power n - 1.
+Where the step is not finer than the noise the bound is no bound, and equal readings say nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, inf, log, pi, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.quality.finding import Finding, Name, found, undecided
+from dbbstation.quality.limits import SHARE, quantile
+
+if TYPE_CHECKING:
+    from dbbstation.trace.circle import RawCircle
+
+SHORTEST_S = 1.0
+"""Readings that are equal for less say nothing: displays that are asked more often than they are renewed repeat themselves, the slowest
+twice a second [s]."""
+
+SECOND_DIFFERENCE = 6.0
+"""Variance of x(k-1) - 2 x(k) + x(k+1) over that of white x: 1 + 4 + 1. Slow forms have next to none."""
+
+INDEPENDENT_SHARE = 18.0 / 35.0
+"""Degrees of freedom of a mean square of second differences, as share of their number: 36 / (36 + 2 (16 + 1)), from their correlations of
+-4/6 and 1/6."""
+
+ROUNDED = 1.0 / 12.0
+"""Variance that rounding to a step adds to readings, in steps squared [GUM 4.3.7]."""
+
+
+def equal_limit(squares_mm2: float, count: int, step_mm: float, readings: float) -> float:
+    """Return how many equal readings in a row a sound turn has with probability SHARE at the most.
+
+    Args:
+        squares_mm2: sum of the squares of second differences where the length does not stand still [mm²].
+        count: how many of them there are.
+        step_mm: smallest difference of two readings [mm].
+        readings: of a turn.
+
+    Returns:
+        Their number; infinite where the step is not finer than the noise, by the lower limit of what is known of it.
+    """
+    if not count or not 0.0 < step_mm < inf:
+        return inf
+    known = max(1.0 - quantile(inf) / sqrt(2.0 * INDEPENDENT_SHARE * count), 0.0)
+    variance = known**2 * squares_mm2 / count / SECOND_DIFFERENCE - ROUNDED * step_mm**2
+    finer = sqrt(max(variance, 0.0) * 2.0 * pi) / step_mm
+    return 1.0 + ceil(log(max(readings, 1.0) / SHARE) / log(finer)) if finer > 1.0 else inf
+
+
+@dataclass
+class HeldLength:
+    """Takes readings of a turn one by one, and tells when they have stood still for longer than sound ones do.
+
+    Attributes:
+        since_s: time of the first of the last equal readings [s].
+        equal: how many of them there are.
+        step_mm: smallest difference of two readings so far [mm]; infinite before two differ.
+    """
+
+    since_s: float = 0.0
+    equal: int = 0
+    step_mm: float = inf
+    _last_s: float = 0.0
+    _last: float | None = None
+    _before: float | None = None
+    _squares: float = 0.0
+    _count: int = 0
+    _pending: float = 0.0
+
+    def restart(self) -> None:
+        """Begin another run; what is known of the noise is kept."""
+        self.equal, self._last, self._before, self._pending = 0, None, None, 0.0
+
+    def add(self, t_s: float, length_mm: float, *, noise: bool = True) -> None:
+        """Take the next reading; noise is read where the length moves at least once a second.
+
+        Args:
+            t_s: when it was taken [s].
+            length_mm: reading [mm].
+            noise: whether differences may be noise; False where the machine feeds out.
+        """
+        if self._last is None or length_mm != self._last:
+            if self._last is not None and noise:
+                self.step_mm = min(self.step_mm, abs(length_mm - self._last))
+            if noise and self.held_s < SHORTEST_S:
+                self._count += self.equal
+                self._squares += self._pending
+            self.since_s, self.equal, self._pending = t_s, 0, 0.0
+        if noise and self._last is not None and self._before is not None:
+            self._pending += (length_mm - 2.0 * self._last + self._before) ** 2
+        self.equal += 1
+        self._before, self._last, self._last_s = self._last, length_mm, t_s
+
+    @property
+    def held_s(self) -> float:
+        """How long the length has stood still [s]."""
+        return self._last_s - self.since_s if self.equal else 0.0
+
+    def stands(self, readings: float) -> bool:
+        """Whether the length stands still though sound readings would not.
+
+        Args:
+            readings: of a whole turn, about.
+        """
+        if self.held_s < SHORTEST_S:
+            return False
+        return self.equal > equal_limit(self._squares, self._count, self.step_mm, readings)
+
+
+def held(raw: RawCircle) -> Finding:
+    """Return the longest stretch of the turn over which all readings are the same."""
+    ends = np.flatnonzero(np.diff(raw.length_mm) != 0.0)
+    if not len(ends):
+        return undecided(Name.HELD, "all readings of the turn are the same: the step is not finer than the noise", "s")
+    first, last = np.append(0, ends + 1), np.append(ends, len(raw) - 1)
+    durations = raw.t_s[last] - raw.t_s[first]
+    longest = int(np.argmax(durations))
+    moving = np.repeat(durations < SHORTEST_S, last - first + 1)[1:-1]
+    squares = np.diff(raw.length_mm, 2)[moving] ** 2
+    step_mm = float(np.min(np.abs(np.diff(raw.length_mm))[ends]))
+    most = equal_limit(float(squares.sum()), len(squares), step_mm, len(raw))
+    value, place = float(durations[longest]), f"{raw.theta_deg[first[longest]]:.0f} degrees"
+    if most == inf:
+        return undecided(
+            Name.HELD, f"at most {value:.1f} s; the step of the readings is not finer than their noise", "s", value
+        )
+    limit = max(SHORTEST_S, most * float(np.median(np.diff(raw.t_s))))
+    stated = f"the length stands still for {value:.1f} s at {place}"
+    return found(Name.HELD, value, limit, "s", "the length never stands still", f"{stated}: {AFTER_HELD}")
+
+
+AFTER_HELD = "look after plunger, stroke and plug of the gauge, and repeat the run"
+"""What to do about a length that stands still."""

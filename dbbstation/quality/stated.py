@@ -1,0 +1,97 @@
+"""What two runs may differ by: what plan, machine file and session state, or what machines usually have.
+
+Runs share causes: the same machine, the same putting-up of a ball, the same bar. What they share cancels in their difference as far
+as it acts alike on both; what each has of its own does not. The covariance of the difference follows [GUM 5.2.2].
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.quality.limits import length_quantile, scaled_length_quantile
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.quality.knowledge import Expected, Seen
+
+
+def apart_by_causes(one: Expected, other: Expected) -> NDArray[np.float64]:
+    """Return the covariance of the difference of two forms by all causes that are known, shape (7, 7) [µm²]."""
+    covariance = np.zeros((len(one.form_um), len(one.form_um)))
+    for key in dict.fromkeys([*one.effects_um, *other.effects_um]):
+        mine, theirs = one.effects_um.get(key), other.effects_um.get(key)
+        if mine is not None and theirs is not None and mine.shape == theirs.shape:
+            covariance += (mine - theirs) @ (mine - theirs).T
+            continue
+        for effect in (mine, theirs):
+            if effect is not None:
+                covariance += effect @ effect.T
+    return covariance
+
+
+def covariance_apart(one: Seen, other: Seen) -> NDArray[np.float64] | None:
+    """Return the covariance of the difference of two runs of one circle, noise included, shape (7, 7) [µm²].
+
+    The place of a ball is known no better than its plan states: what moves the form by less does not count against a run.
+
+    Returns:
+        None where nothing is known of one of them.
+    """
+    if one.run.expected is None or other.run.expected is None:
+        return None
+    covariance = apart_by_causes(one.run.expected, other.run.expected)
+    covariance += unseen_um2(one, other) * np.eye(len(covariance))
+    covariance[0, 0] += drifted_um(one, other) ** 2
+    return covariance
+
+
+def sigmas_apart(one: Seen, other: Seen) -> float | None:
+    """Return how far two runs of one circle differ, in standard deviations of what is stated; None where nothing is."""
+    covariance = covariance_apart(one, other)
+    if covariance is None:
+        return None
+    off = one.coefficients_um - other.coefficients_um
+    return float(np.sqrt(off @ np.linalg.solve(covariance, off)))
+
+
+def drifted_um(one: Seen, other: Seen) -> float:
+    """Standard deviation of what the mean reading grew by from one run to the other, if it went on as on their turns [µm]."""
+    if one.run.started_s is None or other.run.started_s is None:
+        return 0.0
+    rate = float(np.sqrt(0.5 * (one.drift_um_s**2 + other.drift_um_s**2)))
+    return rate * abs(one.run.started_s - other.run.started_s)
+
+
+def unseen_um2(one: Seen, other: Seen) -> float:
+    """Variance of each coefficient of the difference by noise and by what the plan leaves open of the ball's place [µm²]."""
+    expected = one.run.expected
+    place_um = 0.0 if expected is None else expected.place_um
+    # A shift d moves two coefficients, by d / sqrt 2 each.
+    return one.u_um**2 + other.u_um**2 + 0.5 * place_um**2
+
+
+def limit_along(covariance: NDArray[np.float64], off: NDArray[np.float64]) -> float:
+    """Return how long a sound vector may be in the direction of `off`: the ellipsoid that it leaves with probability SHARE.
+
+    Args:
+        covariance: of a sound vector, shape (n, n).
+        off: shape (n,).
+    """
+    size = float(np.linalg.norm(off))
+    along = off / size if size > 0.0 else np.eye(len(off))[0]
+    return length_quantile(len(off)) / float(np.sqrt(along @ np.linalg.solve(covariance, along)))
+
+
+def limit_of_length(covariance: NDArray[np.float64]) -> float:
+    """Return how long a sound vector may be in whatever direction [Box, Ann. Math. Stat. 25 (1954) 290].
+
+    The square of its length is taken as a scaled chi-square variable of the same mean and variance.
+
+    Args:
+        covariance: of a sound vector, shape (n, n).
+    """
+    trace, squares = float(np.trace(covariance)), float(np.sum(covariance**2))
+    return scaled_length_quantile(trace**2 / squares) * float(np.sqrt(squares / trace)) if trace > 0.0 else 0.0

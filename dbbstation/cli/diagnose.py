@@ -143,7 +143,7 @@ def _print(summary: Mapping[str, Any]) -> None:
     echo(summary["unexplained"]["text"])
     if summary["unexplained"]["curve"]:
         _print_curve(summary["unexplained"]["curve"])
-    if not summary["second_start_agrees"]:
+    if summary["second_start_agrees"] is False:
         echo("A second search came to another set of causes: several explain these recordings, take it with care.")
     _print_next_tests(summary)
 

@@ -89,7 +89,7 @@ def diagnose(
         unexplained=with_exact_wave(rest, after),
         shifts=shifts_between(before, after),
         second_start_agrees=settled.second_start_agrees(),
-        next_tests=next_tests(explained, findings, elsewhere),
+        next_tests=() if settled.at_limit else next_tests(explained, findings, elsewhere),
     )
 
 
@@ -139,6 +139,11 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
     curve = curve_of(explained.channel, settled, member)
     where = f"strut {shape.strut}" if shape.strut else "no single strut"
     text = f"An unmodelled effect, organised by {curve.variable}, {where}."
+    if settled.at_limit:
+        text = (
+            "Nothing that is listed explains these recordings down to the noise. The strongest unmodelled effect is organised by "
+            f"{curve.variable}, {where}; other causes are at work beside it, or its curve has another form."
+        )
     rms_um = 1e3 * left.rms if is_missing_physics(left) else curve.unconcealed_um
     gain = settled.best.log_factor(member.cause.name)
     return Unexplained(rms_um, shape.strut, curve.follows, gain, text, curve)

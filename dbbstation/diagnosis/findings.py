@@ -226,7 +226,7 @@ class Diagnosis:
         sources: best first.
         unexplained: what is left.
         shifts: largest first.
-        second_start_agrees: a second search came to the same set of causes.
+        second_start_agrees: a second search came to the same set of causes; None where the comparison ended at its limit.
         next_tests: best first, each beside those before it; empty where nothing is to be asked.
     """
 
@@ -242,5 +242,5 @@ class Diagnosis:
     sources: tuple[SourceFinding, ...]
     unexplained: Unexplained
     shifts: tuple[Shift, ...]
-    second_start_agrees: bool
+    second_start_agrees: bool | None
     next_tests: tuple[NextTest, ...]

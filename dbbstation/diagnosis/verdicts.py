@@ -36,6 +36,12 @@ PRIOR = float(expit(NAMED_ODDS))
 
 OPEN = "These tests leave it open: they neither show nor exclude it."
 
+NO_NAME = (
+    "No name is given: nothing that is listed explains these recordings down to the noise, and beside what is not listed no cause can "
+    "be judged."
+)
+"""Text of every cause where the comparison ended at its limit."""
+
 
 def judge(explained: Explained) -> tuple[SourceFinding, ...]:
     """One finding per named cause, most probable first."""
@@ -69,6 +75,11 @@ class _Judge:
 
     def findings(self) -> tuple[SourceFinding, ...]:
         """All of them."""
+        if self._settled.at_limit:
+            return tuple(
+                replace(self._finding(c), verdict=Verdict.NOT_TESTABLE, text=NO_NAME, probability=PRIOR)
+                for c in self._named.values()
+            )
         found = [self._finding(cause) for cause in self._named.values()]
         found += [_refused(name, why) for name, why in self._settled.refused.items()]
         order = [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT]

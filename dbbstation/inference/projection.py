@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.square_root import Columns
 
 MARGIN = 512
-"""Columns for which room is made at first."""
+"""Columns for which room is made at first, where nobody says how many there will be."""
 
 
 class CauseColumns:
@@ -29,6 +29,7 @@ class CauseColumns:
 
     Args:
         base: columns of the base, shape (n, k).
+        room: columns for which room is made at first; more need a copy of all. Room that stays empty takes no memory.
 
     Attributes:
         base: the same.
@@ -37,10 +38,10 @@ class CauseColumns:
         on_axes: columns of the base along these, shape (k, k).
     """
 
-    def __init__(self, base: NDArray[np.float64]) -> None:
+    def __init__(self, base: NDArray[np.float64], room: int = MARGIN) -> None:
         self.base = base
         self.axes, self.on_axes = np.linalg.qr(base)
-        self._buffer = np.empty((len(base), MARGIN), order="F")
+        self._buffer = np.empty((len(base), room), order="F")
         self._products = np.zeros((0, 0))
         self._along = np.zeros((self.axes.shape[1], 0))
         self.count = 0
@@ -81,6 +82,19 @@ class CauseColumns:
         self._buffer[:, first:last] = columns
         self.count = last
         return np.arange(first, last)
+
+    def but_for(self, rows: NDArray[np.bool_]) -> CauseColumns:
+        """The same causes as all other rows show them, the columns themselves shared; targets must be zero in these rows.
+
+        Args:
+            rows: that are held back, shape (n,).
+        """
+        kept = CauseColumns(np.where(rows[:, None], 0.0, self.base), 0)
+        out = self.samples[rows]
+        kept._buffer, kept.count = self._buffer, self.count
+        kept._products = self.gram - out.T @ out
+        kept._along = kept.axes.T @ self.samples
+        return kept
 
 
 class BesideBase:

@@ -134,6 +134,10 @@ class Channel:
         """Source that a form of a cause is of: a cause may have one form over time, and one by thermometers."""
         return self.sources[name, variant.law]
 
+    def happens_once(self, name: str) -> bool:
+        """Whether a cause acts once in a session, so that no other tests can show it again."""
+        return any(source.happens_once for own, source in self.sources.items() if own[0] == name)
+
     def to_whole(self, variant: Variant) -> NDArray[np.float64]:
         """Amplitudes of a form to all amplitudes of its cause: some of these, or one for all of them, shape (p, q)."""
         if not len(variant.whole):

@@ -131,7 +131,7 @@ def coverage_of_calibration(
 def _numbered(cases: Sequence[Case], seed: int, number: int) -> Figures:
     """One draw by its number: cases take turns with each seed; empty where the fit says that it found no end, and states nothing."""
     try:
-        found = _drawn(cases[number % len(cases)], seed + number // len(cases))
+        found = drawn_figures(cases[number % len(cases)], seed + number // len(cases))
     except CalibrationError:
         return {}
     return {
@@ -140,7 +140,7 @@ def _numbered(cases: Sequence[Case], seed: int, number: int) -> Figures:
     }
 
 
-def _drawn(case: Case, seed: int) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def drawn_figures(case: Case, seed: int) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Found less true values of one machine [mm, µm/kN], and their stated standard uncertainties, NaN for none, by figure."""
     with tempfile.TemporaryDirectory() as folder:
         plan = table_ii_plan(seed)

@@ -77,7 +77,7 @@ class Channel:
         self.readings = [calibration.model.bar(motion) for motion in self.motions]
         ends = np.cumsum([0, *(len(reading.length_mm) for reading in self.readings)])
         self.runs = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-        self.columns = CauseColumns(self._base(), ROOM)
+        self.columns = CauseColumns(self._base(), room=ROOM)
         self.sources = {(source.name, source.varies_with): source for source in sources}
         self.set_up = self._outsize()
         self._laid: dict[tuple[str, str], tuple[Variant, ...]] = {}

@@ -7,6 +7,7 @@ best values: exact columns, tangents, and what its formula may be off by.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,7 @@ from dbbstation.inference.square_root import compress, solve
 from dbbstation.inference.uneven import log_student, most_probable_tails, most_probable_variance
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Sequence
+    from collections.abc import Callable, Container, Iterable, Sequence
 
     from numpy.typing import NDArray
     from scipy.sparse import csr_array
@@ -87,7 +88,7 @@ class Bank:
         self.spread = np.ones(len(channel.target))
         self.trust = np.ones(len(channel.target))
         self.tails, self.grows_with = np.inf, ""
-        self._columns = CauseColumns(channel.base.samples[channel.kept])
+        self._columns = CauseColumns(channel.base.samples[channel.kept], self._whitener())
         self._everywhere: list[NDArray[np.float64]] = []
         self._of_patterns: dict[str, Cause] = {}
         self._of_laws = {law.name: Cause(law.name, self._on_a_grid(law), law.log_odds) for law in channel.laws}
@@ -148,7 +149,7 @@ class Bank:
 
     def fitted(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
         """Columns over the kept rows, whitened, shape (m, p)."""
-        return np.asarray(self._columns.samples[:, columns], dtype=np.float64)
+        return np.asarray(self._columns.of(columns), dtype=np.float64)
 
     def beside(self) -> BesideBase:
         """Causes beside the base."""
@@ -316,14 +317,17 @@ class Bank:
             even = diags_array(1.0 / spread).tocsr()
             self.whitening = even if self.whitening is None else self.whitening @ even
             self.whitening = diags_array(trust).tocsr() @ self.whitening
-        self._columns = CauseColumns(self.whitened(self.channel.base.samples))
-        if self._everywhere:
-            self._columns.add(self.whitened(np.hstack(self._everywhere)))
+        self._columns = CauseColumns(self.whitened(self.channel.base.samples), self._whitener())
+        for part in self._everywhere:
+            self._columns.add(part)
 
     def whitened(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Kept ones of all rows, shape (n, ...), with their noise made white."""
-        kept = rows[self.channel.kept]
-        return kept if self.whitening is None else np.asarray(self.whitening @ kept)
+        return _whitened(self.channel.kept, self.whitening, rows)
+
+    def _whitener(self) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+        """What does that as the noise is now, whatever it is later."""
+        return partial(_whitened, self.channel.kept, self.whitening)
 
     @property
     def target(self) -> NDArray[np.float64]:
@@ -424,7 +428,11 @@ class Bank:
 
     def _add(self, samples: NDArray[np.float64]) -> NDArray[np.int64]:
         self._everywhere.append(samples)
-        return self._columns.add(self.whitened(samples))
+        return self._columns.add(samples)
+
+
+def _whitened(kept: NDArray[np.bool_], whitening: csr_array | None, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    return rows[kept] if whitening is None else np.asarray(whitening @ rows[kept])
 
 
 def _forms(

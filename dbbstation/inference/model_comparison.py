@@ -211,13 +211,21 @@ class ModelComparison:
             )
             gram, towards = gram - across.T @ across, towards - across.T @ z
         information, along = sd[:, None] * gram * sd + np.eye(len(sd)), sd * towards
-        ends = np.cumsum([0, *(len(m.variant.columns) for m in more)])
-        found = {}
+        widths = [len(m.variant.columns) for m in more]
+        starts = np.cumsum([0, *widths])
+        of_widths: dict[tuple[int, int], list[tuple[int, int]]] = {}
         for a, b in combinations(range(len(more)), 2):
-            own = np.r_[ends[a] : ends[a + 1], ends[b] : ends[b + 1]]
-            half = cholesky(information[np.ix_(own, own)])
-            w = solve_triangular(half, along[own], lower=True, check_finite=False)
-            found[a, b] = evidence + 0.5 * float(w @ w) - float(np.log(np.diag(half)).sum())
+            of_widths.setdefault((widths[a], widths[b]), []).append((a, b))
+        found: dict[tuple[int, int], float] = {}
+        for (first, second), pairs in of_widths.items():
+            # Pairs that are alike in their widths are worked out at once.
+            a, b = starts[np.array(pairs)].T
+            own = np.hstack([a[:, None] + np.arange(first), b[:, None] + np.arange(second)])
+            halves = _factors(information[own[:, :, None], own[:, None, :]])
+            w = np.linalg.solve(halves, along[own][:, :, None])[:, :, 0]
+            squares = 0.5 * np.square(w).sum(axis=1)
+            logs = np.log(np.diagonal(halves, axis1=1, axis2=2)).sum(axis=1)
+            found |= dict(zip(pairs, (evidence + squares - logs).tolist(), strict=True))
         return found
 
     def scan(self, members: Sequence[Member], causes: Iterable[Cause]) -> Scan:
@@ -321,6 +329,14 @@ class ModelComparison:
         found = lower, z, 0.5 * float(z @ z) - float(np.log(np.diag(lower)).sum())
         self._last = tuple(members), found
         return found
+
+
+def _factors(information: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cholesky factors of several, shape (k, p, p), each as `cholesky` has it."""
+    try:
+        return np.asarray(np.linalg.cholesky(information), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return np.stack([cholesky(one) for one in information])
 
 
 def cholesky(information: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,6 +16,8 @@ from dbbstation.inference.model_comparison import ModelComparison, cholesky
 from dbbstation.inference.square_root import free_directions
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from dbbstation.inference.square_root import Columns
@@ -23,12 +25,17 @@ if TYPE_CHECKING:
 MARGIN = 512
 """Columns for which room is made at first, where nobody says how many there will be."""
 
+FEW = 0.5
+"""Share of all columns up to which some are worked out by themselves."""
+
 
 class CauseColumns:
     """Columns of causes over all samples of a channel, beside those of a base; they may become more.
 
     Args:
         base: columns of the base, shape (n, k).
+        whitened: makes columns as they are taken in, shape (m, q), those over the samples, shape (n, q); the same if None. It is
+            asked for a column when that is wanted first.
         room: columns for which room is made at first; more need a copy of all. Room that stays empty takes no memory.
 
     Attributes:
@@ -38,10 +45,18 @@ class CauseColumns:
         on_axes: columns of the base along these, shape (k, k).
     """
 
-    def __init__(self, base: NDArray[np.float64], room: int = MARGIN) -> None:
+    def __init__(
+        self,
+        base: NDArray[np.float64],
+        whitened: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+        room: int = MARGIN,
+    ) -> None:
         self.base = base
         self.axes, self.on_axes = np.linalg.qr(base)
+        self._whitened = whitened
         self._buffer = np.empty((len(base), room), order="F")
+        self._waiting: list[NDArray[np.float64]] = []
+        self._ready = 0
         self._products = np.zeros((0, 0))
         self._along = np.zeros((self.axes.shape[1], 0))
         self.count = 0
@@ -49,7 +64,27 @@ class CauseColumns:
     @property
     def samples(self) -> NDArray[np.float64]:
         """All columns, shape (n, p)."""
+        while self._waiting:
+            part = self._waiting.pop(0)  # held twice no longer than need be
+            first, last = self._ready, self._ready + part.shape[1]
+            self._buffer[:, first:last] = part if self._whitened is None else self._whitened(part)
+            self._ready = last
         return self._buffer[:, : self.count]
+
+    def of(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Some columns, shape (n, q): without making the others where these are few."""
+        if not self._waiting or len(columns) > FEW * self.count:
+            return self.samples[:, columns]
+        found = np.empty((len(self._buffer), len(columns)), order="F")
+        ready = columns < self._ready
+        found[:, ready] = self._buffer[:, columns[ready]]
+        starts = self._ready + np.cumsum([0, *(part.shape[1] for part in self._waiting)])
+        for part, start in zip(self._waiting, starts[:-1], strict=True):
+            own = (columns >= start) & (columns < start + part.shape[1])
+            if own.any():
+                picked = part[:, columns[own] - start]
+                found[:, own] = picked if self._whitened is None else self._whitened(picked)
+        return found
 
     @property
     def gram(self) -> NDArray[np.float64]:
@@ -59,7 +94,7 @@ class CauseColumns:
             # Many columns at once take a fraction of the time that they take one after the other.
             products = np.empty((self.count, self.count))
             products[:known, :known] = self._products
-            products[:, known:] = self.samples.T @ self._buffer[:, known : self.count]
+            products[:, known:] = self.samples.T @ self.samples[:, known:]
             products[known:, :known] = products[:known, known:].T
             self._products = products
         return self._products
@@ -69,17 +104,18 @@ class CauseColumns:
         """What the columns have of the axes of the base, shape (k, p)."""
         known = self._along.shape[1]
         if known < self.count:
-            self._along = np.hstack([self._along, self.axes.T @ self._buffer[:, known : self.count]])
+            self._along = np.hstack([self._along, self.axes.T @ self.samples[:, known:]])
         return self._along
 
     def add(self, columns: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Take in columns, shape (n, q), and return their numbers."""
+        """Take in columns, shape (m, q), and return their numbers."""
         first, last = self.count, self.count + columns.shape[1]
         if last > self._buffer.shape[1]:
             wider = np.empty((len(self._buffer), 2 * last), order="F")
-            wider[:, :first] = self._buffer[:, :first]
+            wider[:, : self._ready] = self._buffer[:, : self._ready]
             self._buffer = wider
-        self._buffer[:, first:last] = columns
+        # A caller may change what it handed over; what makes columns of its own copies them.
+        self._waiting.append(columns if self._whitened is not None else columns.copy())
         self.count = last
         return np.arange(first, last)
 
@@ -89,9 +125,9 @@ class CauseColumns:
         Args:
             rows: that are held back, shape (n,).
         """
-        kept = CauseColumns(np.where(rows[:, None], 0.0, self.base), 0)
+        kept = CauseColumns(np.where(rows[:, None], 0.0, self.base), room=0)
         out = self.samples[rows]
-        kept._buffer, kept.count = self._buffer, self.count
+        kept._buffer, kept.count, kept._ready = self._buffer, self.count, self.count
         kept._products = self.gram - out.T @ out
         kept._along = kept.axes.T @ self.samples
         return kept
@@ -126,11 +162,22 @@ class BesideBase:
         # Of what lies along the axes of the base, how much its fit takes, given its priors.
         self._taken = np.linalg.qr(np.vstack([columns, priors]))[0][: len(base)].T
 
-    def comparison(self, target: NDArray[np.float64]) -> ModelComparison:
-        """Compare causes on a target, shape (n,)."""
-        of_base = self._taken @ self._causes.along
-        gram = self._causes.gram - of_base.T @ of_base
-        towards = self._causes.samples.T @ target - of_base.T @ (self._taken @ (self._causes.axes.T @ target))
+    def comparison(self, target: NDArray[np.float64], only: NDArray[np.int64] | None = None) -> ModelComparison:
+        """Compare causes on a target, shape (n,).
+
+        Args:
+            target: shape (n,).
+            only: columns that are asked for; all if None.
+        """
+        causes = self._causes
+        columns = causes.samples if only is None else causes.of(only)
+        of_base = self._taken @ (causes.along if only is None else causes.axes.T @ columns)
+        gram = (causes.gram if only is None else columns.T @ columns) - of_base.T @ of_base
+        towards = columns.T @ target - of_base.T @ (self._taken @ (causes.axes.T @ target))
+        if only is not None:
+            some = gram, towards
+            gram, towards = np.zeros((causes.count, causes.count)), np.zeros(causes.count)
+            gram[np.ix_(only, only)], towards[only] = some
         return ModelComparison(gram / self._noise**2, towards / self._noise**2)
 
     def left(self, targets: NDArray[np.float64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -142,12 +189,13 @@ class BesideBase:
         """
         causes, axes = self._causes, self._causes.axes
         used = np.flatnonzero(sd > 0.0)
-        size = sd[used] / self._noise
-        of_base = self._taken @ (causes.along[:, used] * size)
-        gram = size[:, None] * causes.gram[np.ix_(used, used)] * size - of_base.T @ of_base
-        towards = size[:, None] * (causes.samples.T @ targets)[used] - of_base.T @ (self._taken @ (axes.T @ targets))
+        columns, size = causes.of(used), sd[used] / self._noise
+        every = len(used) > FEW * causes.count
+        along = causes.along[:, used] if every else axes.T @ columns
+        products = causes.gram[np.ix_(used, used)] if every else columns.T @ columns
+        of_base = self._taken @ (along * size)
+        gram = size[:, None] * products * size - of_base.T @ of_base
+        towards = size[:, None] * (columns.T @ targets) - of_base.T @ (self._taken @ (axes.T @ targets))
         values = cho_solve((cholesky(gram + np.eye(len(used))), True), towards)
-        every = np.zeros((len(sd), targets.shape[1]))
-        every[used] = size[:, None] * values
-        left = np.asarray(targets - causes.samples @ every, dtype=np.float64)
+        left = np.asarray(targets - columns @ (size[:, None] * values), dtype=np.float64)
         return left - axes @ (self._taken.T @ (self._taken @ (axes.T @ left)))

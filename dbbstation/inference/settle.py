@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.alternatives import in_place_of
-from dbbstation.inference.bank import Bank, alike, amplitudes_of
+from dbbstation.inference.bank import SETTLED, Bank, alike, amplitudes_of
 from dbbstation.inference.hypotheses import Hypothesis, search
 from dbbstation.inference.patterns import patterns
 from dbbstation.inference.seen import MOVED, places_anew, seen
@@ -89,16 +89,15 @@ def settle(
     if not rivals:
         return _settled(_begun(channel, options), options, progress)
     found: list[Settled] = []
+    laid_out = _begun(channel, options)
     if beside_all := [one for one in beginnings if one not in BESIDE_NOTHING]:
         # What stands beside everything is worked out once, and gone on with under each kind of noise.
-        bank = _begun(channel, options)
+        bank = deepcopy(laid_out)
         begun = _settled(bank, options, progress)
-        found += [
-            _from(*deepcopy((bank, begun.best.members)), begun.refused, one, options, progress) for one in beside_all
-        ]
-    found += [
-        _from(_begun(channel, options), (), {}, one, options, progress) for one in beginnings if one in BESIDE_NOTHING
-    ]
+        for one in beside_all:
+            found.append(_from(*deepcopy((bank, begun.best.members)), begun.refused, one, options, progress, found))
+    for one in [one for one in beginnings if one in BESIDE_NOTHING]:
+        found.append(_from(deepcopy(laid_out), (), {}, one, options, progress, found))
     found.sort(key=lambda one: -one.log_probability)
     return replace(found[0], others=tuple(found[1:]))
 
@@ -114,11 +113,28 @@ def _from(
     beginning: Beginning,
     options: _Options,
     progress: Callable[[str], None],
+    known: Sequence[Settled],
 ) -> Settled:
-    """What the comparison comes to from members whose noise is measured beside them."""
+    """What the comparison comes to from members whose noise is measured beside them; one that is known where it meets that."""
     bank.measures_beside_members, bank.long_tails = True, beginning in LONG_TAILS
-    settled = _settled(bank, options, progress, members, refused)
+    settled = _settled(bank, options, progress, members, refused, known)
+    if any(settled is one for one in known):
+        return replace(settled, beginning=beginning)
     return replace(settled, beginning=beginning, log_probability=_log_probability(bank, settled.best.members))
+
+
+def _known_as(settled: Settled, known: Sequence[Settled]) -> Settled:
+    """What another beginning came to where that is met; else the same."""
+    return next((one for one in known if _meets(settled, one)), settled)
+
+
+def _meets(one: Settled, other: Settled) -> bool:
+    """Whether a comparison goes on as another did: causes of the same kind do the same, so that the noise beside them is the same."""
+    kinds = [sorted(each.bank.kind_of(name) for name in each.best.names) for each in (one, other)]
+    if kinds[0] != kinds[1] or one.bank.long_tails != other.bank.long_tails:
+        return False
+    apart = one.predicted() - other.predicted()
+    return float(np.sqrt(np.mean(np.square(apart)))) < SETTLED * other.noise.sigma
 
 
 @dataclass(frozen=True)
@@ -150,6 +166,7 @@ def _settled(
     progress: Callable[[str], None],
     best: tuple[Member, ...] = (),
     impossible: Mapping[str, str] | None = None,
+    known: Sequence[Settled] = (),
 ) -> Settled:
     """Look, compare, lay out anew, until nothing changes.
 
@@ -159,6 +176,7 @@ def _settled(
         progress: called with what is being done.
         best: members to begin with.
         impossible: laws that cannot be what they would have to be, and why.
+        known: what other beginnings came to; where one is met, it is returned.
     """
     channel, look = bank.channel, options.look
     seeds: dict[frozenset[str], tuple[Member, ...]] = {}
@@ -185,7 +203,7 @@ def _settled(
         starts = [grown(comparison, causes, members) for members in (*starts, best)]
         posterior = search(comparison, causes, [*starts, *seeds.values()], options.most_expanded)
         seeds |= {h.names: h.members for h in posterior.hypotheses[:SEEDS]}
-        settled = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
+        settled = met = Settled(channel, bank, bank.noise, tuple(causes), comparison, posterior, dict(refused))
         best = posterior.best.members
         compared = settled if looking else None
         if rough := [m for m in _laws_of(settled) if m.cause.name not in laid_out]:
@@ -199,7 +217,8 @@ def _settled(
             times_placed += 1
             best = moved
             continue
-        if not look or (looking and (not options.thorough or posterior.best.names in looked)):
+        met = _known_as(settled, known)
+        if not look or met is not settled or (looking and (not options.thorough or posterior.best.names in looked)):
             break
         if looking:
             looked.add(posterior.best.names)
@@ -208,7 +227,7 @@ def _settled(
             if most_probable < before + BETTER:
                 break
         looking = look
-    return settled
+    return met
 
 
 def _placed(bank: Bank, members: tuple[Member, ...]) -> tuple[Member, ...]:
@@ -293,7 +312,8 @@ def _looked_about(
 def _log_probability(bank: Bank, members: Sequence[Member]) -> float:
     """Of the noise that there is and members together, but for what is the same for all of a channel."""
     odds = sum(member.cause.log_prior_odds + member.variant.log_weight for member in members)
-    evidence = bank.beside().comparison(bank.target).log_evidence(members)
+    own = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
+    evidence = bank.beside().comparison(bank.target, np.unique(own)).log_evidence(members)
     return bank.log_likelihood() + evidence + bank.tails_beyond(members) + odds
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from dbbstation.errors import StationError
 from dbbstation.nc.curve import Curve, felt_mm, row_and_share
 from dbbstation.nc.limits import LARGEST_CORRECTION_MM
-from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, cuts
+from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, PLANNED_WITHIN, cuts, move_mm
 from dbbstation.nc.splitting import SHORTEST_MM, Pieces, looked_at, moves_of, parts_of, rows_as_pieces, runs_of, split
 from dbbstation.nc.toolpath import Step, rounded
 
@@ -32,9 +32,12 @@ DENSELY = np.arange(1, 14) / 13.0
 """Shares of a piece at which its distance from the curve is reported: a prime number of parts, so that no wave with some
 periods in a piece is met at its zeros."""
 
-SURELY_KEPT = 1.0 + 0.9 * (KEPT - 1.0)
-"""Share of the time that a feed which is named in a refusal may take: pieces for that feed are somewhat shorter than those it
-was found with, and must keep it as well."""
+SURELY_KEPT = KEPT - PLANNED_WITHIN
+"""Share of the time that a program may take by what is reckoned of the planner here, so that it keeps its feed on the planner."""
+
+NAMED = 1.0 + 0.9 * (SURELY_KEPT - 1.0)
+"""The same of a feed that is named in a refusal: pieces for that feed are somewhat shorter than those it was found with, and must
+keep it as well."""
 
 FEED_KEPT = 1e-3
 """A feed stays as it is while the compensated move is as long as the wanted one within this share."""
@@ -230,7 +233,7 @@ def _needed_mm(toolpath: Toolpath, planner: Planner, prefer: Prefer | None) -> N
     """
     limited = planner.limited(toolpath)
     mm_s = np.where(toolpath.kind == Step.FEED, np.nan_to_num(toolpath.feed) / 60.0, 0.0)
-    mm_s = np.where(limited, np.minimum(mm_s, planner.reached_mm_s(_move_mm(toolpath))), mm_s)
+    mm_s = np.where(limited, np.minimum(mm_s, planner.reached_mm_s(move_mm(toolpath))), mm_s)
     turns = limited if prefer is Prefer.POSITION_ONLY else cuts(toolpath)
     return np.where(turns, planner.needed_mm(mm_s), 0.0)
 
@@ -270,7 +273,7 @@ def _slowest(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner, shor
         return None
     reached = planner.speed_mm_s(done)
     # A move that turns A, B and C is as slow as its length lets it be, an arc as one move.
-    own = np.where(planner.limited(toolpath), planner.reached_mm_s(_move_mm(toolpath)), np.inf)
+    own = np.where(planner.limited(toolpath), planner.reached_mm_s(move_mm(toolpath)), np.inf)
     asked = np.minimum(planner.speed_mm_s(replace(toolpath, poses=_tilt_held(toolpath))), own)
     at_feed = np.where(cuts(toolpath), toolpath.tip_mm / asked, 0.0)
     takes, took = of.lost(at_feed, np.where(cutting, done.tip_mm / reached, 0.0))
@@ -302,12 +305,12 @@ def _lost_in_ramps(toolpath: Toolpath, done: Toolpath, of: _Of, planner: Planner
         nominal, own = (_seconds(path, planner).sum() for path in slower)
         return float(own / nominal)
 
-    if share(1.0) <= KEPT:
+    if share(1.0) <= SURELY_KEPT:
         return None
     low, high = 0.0, 1.0
     for _ in range(20):
         middle = (low + high) / 2.0
-        low, high = (middle, high) if share(middle) <= SURELY_KEPT else (low, middle)
+        low, high = (middle, high) if share(middle) <= NAMED else (low, middle)
     takes, took = of.lost(_seconds(toolpath, planner), _seconds(done, planner))
     row = int(np.argmax((of.before == int(np.argmax(takes - took))) & (toolpath.kind == Step.FEED)))
     feed = float(toolpath.feed[row])

@@ -28,6 +28,8 @@ a cycle. Without it lines in pieces that fit exactly ran 0.5 % slow, circles at 
 KEPT = 1.01
 """A program keeps its feed while it takes no longer than this share of the time of the program that it was made from."""
 
+PLANNED_WITHIN = 0.0015
+"""Share of the time by which LinuxCNC may be slower than it is reckoned to be here: 0.0012 at most in the programs of docs/nc.md."""
 
 STOPS = (Step.RAPID, Step.DWELL, Step.PAUSE, Step.OPTIONAL_STOP)
 """What a stretch at feed ends at. Rapids are no part of it, and their corners with it are left out."""
@@ -95,7 +97,7 @@ class Planner:
         cutting = cuts(toolpath)
         asked = np.where(cutting, toolpath.feed, 60.0) / 60.0
         at_most = np.where(
-            self.limited(toolpath), self.reached_mm_s(way_mm), np.sqrt(self.acceleration_mm_s2 * stretch_mm)
+            self.limited(toolpath), self.reached_mm_s(move_mm(toolpath)), np.sqrt(self.acceleration_mm_s2 * stretch_mm)
         )
         return np.where(cutting, np.minimum(asked, at_most), 1.0)
 
@@ -104,7 +106,8 @@ class Planner:
 
         A stretch is what lies between stops. Where the control looks ahead, it begins and ends with a ramp, and corners are
         rounded by an arc that leaves them by what is allowed. Where not, each piece has its own trapezoid of half the
-        acceleration; the next one begins with the shorter of the two ramps between them, or when the corner allows it.
+        acceleration; the next one begins with the shorter of the two ramps between them, or when the corner allows it. The chords of
+        an arc are one piece.
         """
         rows = np.flatnonzero(cuts(toolpath))
         seconds = np.where(toolpath.kind == Step.RAPID, 0.0, toolpath.duration_s)
@@ -147,12 +150,12 @@ class Planner:
         lost = sum((each - corner) ** 2 / (2.0 * a * each) for each in (speed[:-1], speed[1:]))
         both = np.maximum((ramp_s[:-1] + ramp_s[1:]) / 2.0 - lost, 0.0)
         saved: NDArray[np.float64] = np.where(limited[:-1] & limited[1:], np.fmin(ramp, blended), both)
+        move = moves_of(toolpath)[rows]
+        saved = np.where(limited[:-1] & (move[1:] == move[:-1]), ramp, saved)
         # Between a move that turns and one that does not, that one slows down with half its acceleration as well, which is a ramp
         # of v/2a more. They overlap over the way in which the shorter of the two, an arc as one move, gets up to speed: a chord hardly.
-        move = moves_of(toolpath)
-        move_mm: NDArray[np.float64] = np.bincount(move, weights=toolpath.tip_mm)[move[rows]].astype(np.float64)
         slower = np.minimum(speed[:-1], speed[1:])
-        alone = np.minimum(speed, self.reached_mm_s(move_mm))
+        alone = np.minimum(speed, self.reached_mm_s(move_mm(toolpath)[rows]))
         overlap = np.fmin(2.0 * np.minimum(alone[:-1], alone[1:]) ** 2 / (a * slower), blended)
         mixed = overlap - np.where(limited[:-1], speed[1:], speed[:-1]) / (2.0 * a)
         return np.where(limited[:-1] != limited[1:], mixed, saved)
@@ -164,6 +167,12 @@ def cuts(toolpath: Toolpath) -> NDArray[np.bool_]:
     How fast those are is a matter of the angles' own acceleration, which is not known here.
     """
     return (toolpath.kind == Step.FEED) & (toolpath.tip_mm > LEAST_MM_PER_DEG * toolpath.turn_deg)
+
+
+def move_mm(toolpath: Toolpath) -> NDArray[np.float64]:
+    """Length of the written move that each row belongs to, shape (n,) [mm]: LinuxCNC runs an arc as one."""
+    number = moves_of(toolpath)
+    return np.asarray(np.bincount(number, weights=toolpath.tip_mm)[number], dtype=np.float64)
 
 
 LOOKS_AHEAD = Planner(1000.0, None)

@@ -265,16 +265,18 @@ def unseen(blocks: Sequence[Block], layout: Layout, noise: Noise) -> NDArray[np.
 def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64], share: float) -> float:
     """Share of a step to take.
 
-    Gauss-Newton leaves out the curvature that a parameter of shape has while its amplitude is small, so that full
-    steps swing to and fro about the answer. Two steps that differ by the ratio q after a share s was taken say that
-    s / (1 - q) would have hit it (Aitken's rule); the most cautious of these is taken.
+    Gauss-Newton leaves out the curvature that a parameter of shape has while its amplitude is small, and that of combinations
+    which the runs hardly see, so that full steps swing to and fro about the answer. Two steps that differ by the ratio q after a
+    share s was taken say that s / (1 - q) would have hit it (Aitken's rule); the most cautious of these is taken: of parameters of
+    shape, and of the whole step along the last.
     """
     shaped = np.array([bool(p.shape) for term in layout.terms for p in term.parameters])
-    now, last = step[shaped], before[shaped]
-    swinging = now * last < 0.0
-    if not swinging.any():
+    now, last = step / layout.known.scale, before / layout.known.scale
+    along = float(now @ last) / max(float(last @ last), 1e-300)
+    ratios = [along, *(now[shaped] / np.where(last[shaped] == 0.0, np.inf, last[shaped])).tolist()]
+    ratio = min(ratios)
+    if ratio >= 0.0:
         return min(1.0, 1.5 * share)
-    ratio = float(np.min(now[swinging] / last[swinging]))
     return float(np.clip(share / (1.0 - ratio), SMALLEST_SHARE, 1.0))
 
 

@@ -13,14 +13,14 @@ from tests.plant.session import record
 KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
 
 
-def diagnosed(folder, hidden, candidates, seed):
-    record(folder, seed=seed, mechanisms=[KINEMATICS, hidden], rate_hz=25.0)
+def diagnosed(folder, hidden, candidates, seed, rate_hz):
+    record(folder, seed=seed, mechanisms=[KINEMATICS, hidden], rate_hz=rate_hz)
     return diagnose_sessions([folder], candidates, (), lambda _: None)
 
 
 @pytest.mark.slow
 def test_a_bent_scale_is_identified_and_what_resembles_it_does_not_predict(tmp_path):
-    found = diagnosed(tmp_path / "s", BarScale(curved_um=2.0), ("bar-scale", "joint-runout"), 1509).diagnosis
+    found = diagnosed(tmp_path / "s", BarScale(curved_um=2.0), ("bar-scale", "joint-runout"), 1509, 10.0).diagnosis
     scale = next(f for f in found.sources if f.name == "bar-scale")
     assert scale.verdict is Verdict.IDENTIFIED
     bow = scale.parameters["curved_um"]
@@ -36,7 +36,7 @@ def test_a_bent_scale_is_identified_and_what_resembles_it_does_not_predict(tmp_p
 @pytest.mark.slow
 def test_a_bump_happened(tmp_path):
     """Between the two directions of a test, so that one mounting sees both sides of it."""
-    told = diagnosed(tmp_path / "s", BumpedJig(from_run=15), ("jig-bump", "joint-runout"), 1510)
+    told = diagnosed(tmp_path / "s", BumpedJig(from_run=15), None, 1510, 25.0)
     bump = next(f for f in told.diagnosis.sources if f.name == "jig-bump")
     assert bump.verdict is Verdict.HAPPENED
     for name, true in (("x_um", 2.33), ("y_um", -6.43)):

@@ -100,7 +100,7 @@ def read_answers(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path) -> None:
-    begun = time.perf_counter()
+    begun, begun_processor = time.perf_counter(), time.process_time()
     verdict: dict[str, Any] = {"session": path.name}
     try:
         verdict["summary"] = diagnose_sessions([path], candidates, (), _quiet).summary()
@@ -109,6 +109,7 @@ def _judge(path: Path, *, candidates: tuple[str, ...], kept: Path) -> None:
     except Exception as error:  # noqa: BLE001 - a diagnosis that breaks is a result of the study, and the worst one
         verdict["error"] = f"{type(error).__name__}: {error}"
     verdict["seconds"] = time.perf_counter() - begun
+    verdict["processor_s"] = time.process_time() - begun_processor
     write_text(kept / f"{path.name}.json", json.dumps(verdict, indent=1) + "\n", force=True)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.diagnosis.verdicts import PRIOR
+from dbbstation.inference.verdict import ABSENT
 from studies.coverage import wilson
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def forecasts(
     for source in sources:
         if source.get("probability") is None:
             continue
-        if source["verdict"] == "not-testable" and source["probability"] <= PRIOR:
+        if source["verdict"] == "not-testable" and source["probability"] <= ABSENT:
             continue
         names = equivalents(source)
         if names not in best or source["probability"] > best[names]["probability"]:

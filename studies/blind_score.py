@@ -26,6 +26,9 @@ SIZES = ((0.0, 2.0), (2.0, 5.0), (5.0, np.inf))
 EXACT = ("clean", "outside")
 """Kinds of session in which nothing has a law to be off from."""
 
+NAMED = frozenset({"identified", "happened"})
+"""Verdicts that give a name: a bump or a bad mounting is there as surely as a law, though no other tests can confirm it."""
+
 NO_CANDIDATE = "not-a-candidate"
 """Kind of a session whose listed effects were not all looked for: they are then as good as outside the list."""
 
@@ -46,7 +49,7 @@ class Outcome:
         sizes: of each, in testable limits.
         error: why there is no diagnosis; empty where there is one.
         detected: the diagnosis says that something is missing.
-        identified: names that it gives.
+        identified: names that it gives, `identified` or `happened`.
         declared: names that it says it cannot tell apart, with those that each is not told from.
         named: each hidden effect is identified.
         within: each hidden effect is identified or in a declared ambiguity of at most three: it with its own rivals, all
@@ -145,7 +148,7 @@ def compare(answer: Mapping[str, Any], verdict: Mapping[str, Any], candidates: S
     effects = answer["effects"]
     summary = verdict.get("summary") or _NOTHING
     by_name = {source["name"]: source for source in summary["sources"]}
-    identified = tuple(name for name, source in by_name.items() if source["verdict"] == "identified")
+    identified = tuple(name for name, source in by_name.items() if source["verdict"] in NAMED)
     declared = {n: tuple(s["ambiguous_with"]) for n, s in by_name.items() if s["verdict"] == "ambiguous"}
     listed = {effect["name"] for effect in effects if effect["listed"]}
     kind = answer["kind"] if candidates is None or listed <= set(candidates) else NO_CANDIDATE

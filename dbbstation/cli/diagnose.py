@@ -60,7 +60,8 @@ def diagnose(
 
     A calibration can hide gravity, drift or play in its joints: the residual is then small here, and the machine is
     wrong elsewhere. This command compares sets of causes. It fits each set together with the kinematic parameters and
-    gives the probability of each cause, given the catalogue of causes. Verdicts: identified (probability 0.95 or more),
+    gives the probability of each cause, given the catalogue of causes. Verdicts: identified (probability 0.95 or more,
+    five standard deviations out, and a gain in tests that were held back), happened (acts once), does-not-predict,
     ambiguous, ruled-out, not-testable.
 
     \b
@@ -118,14 +119,7 @@ UNPREDICTABLE_UM = 1000.0
 
 
 def _print(summary: Mapping[str, Any]) -> None:
-    if summary["mismatch"]:
-        echo(
-            f"The recordings differ from the kinematic model by {summary['misfit_rms_um']:.2f} µm rms beyond noise "
-            f"(probability by chance {_chance(summary['probability'])})."
-        )
-    else:
-        echo(f"The recordings agree with the kinematic model (probability {summary['probability']:.2g}).")
-    echo()
+    _print_mismatch(summary)
     for outlier in summary["outliers"]:
         echo(f"outlier, kept out of the fits: {outlier['text']}")
     _print_sources(summary["sources"])
@@ -143,9 +137,23 @@ def _print(summary: Mapping[str, Any]) -> None:
     echo(summary["unexplained"]["text"])
     if summary["unexplained"]["curve"]:
         _print_curve(summary["unexplained"]["curve"])
-    if not summary["second_start_agrees"]:
+    if summary["second_start_agrees"] is False:
         echo("A second search came to another set of causes: several explain these recordings, take it with care.")
     _print_next_tests(summary)
+
+
+def _print_mismatch(summary: Mapping[str, Any]) -> None:
+    """Print whether the recordings differ from the kinematic model; before that, where what was found predicts worse."""
+    if summary["held_out_worse"]:
+        echo("Held-out tests are predicted worse than by the kinematic calibration alone. Nothing is identified.\n")
+    if summary["mismatch"]:
+        echo(
+            f"The recordings differ from the kinematic model by {summary['misfit_rms_um']:.2f} µm rms beyond noise "
+            f"(probability by chance {_chance(summary['probability'])})."
+        )
+    else:
+        echo(f"The recordings agree with the kinematic model (probability {summary['probability']:.2g}).")
+    echo()
 
 
 def _print_workspace(elsewhere: Mapping[str, Any]) -> None:
@@ -228,6 +236,8 @@ def _print_gain(summary: Mapping[str, Any]) -> None:
     residual, held_out = summary["residual_rms_um"], summary["held_out_rms_um"]
     echo(f"\nresidual within mountings {residual['before']:.2f} -> {residual['after']:.2f} µm rms")
     normalised = summary["held_out_normalised"]
+    if summary["held_out"] == "not-tested" and any(source["verdict"] == "identified" for source in summary["sources"]):
+        echo("too few tests to hold some back: whether what is identified predicts others was not tested")
     if max(held_out.values()) > UNPREDICTABLE_UM:
         echo("held-out tests cannot be predicted: the other tests are too few to identify the machine")
     else:
@@ -257,7 +267,7 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
         "not distinguished from",
     ]
     print_table(titles, rows)
-    named = [source for source in sources if source["verdict"] in {"identified", "ambiguous"}]
+    named = [source for source in sources if source["verdict"] in SAID]
     if named:
         echo("\nvalue ± u (one standard uncertainty)")
         for source in named:
@@ -266,6 +276,10 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
                 value, uncertainty = f"{number['value']:.4g}", f"{number['uncertainty']:.2g}"
                 echo(f"{source['name']}: {name} {value} ± {uncertainty} {number['unit']}")
             echo(f"  {source['text']}")
+
+
+SAID = frozenset({"identified", "happened", "does-not-predict", "ambiguous"})
+"""Verdicts of causes whose values are printed."""
 
 
 def _chance(probability: float) -> str:

@@ -45,6 +45,9 @@ SET_UP = ("mounting", "ball-coordinate", "bar-offset")
 OUTSIZE = 20.0
 """Size of such an effect in units of the stated one, one standard deviation."""
 
+ROOM = 2048
+"""Columns of causes for which room is made: thirty circles have 1100 to 1500, laid out anew and looked for twice."""
+
 DRAWS = 4
 """Draws of white noise from which it is seen how much of the noise a model takes out."""
 
@@ -74,7 +77,7 @@ class Channel:
         self.readings = [calibration.model.bar(motion) for motion in self.motions]
         ends = np.cumsum([0, *(len(reading.length_mm) for reading in self.readings)])
         self.runs = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-        self.columns = CauseColumns(self._base())
+        self.columns = CauseColumns(self._base(), room=ROOM)
         self.sources = {(source.name, source.varies_with): source for source in sources}
         self.set_up = self._outsize()
         self._laid: dict[tuple[str, str], tuple[Variant, ...]] = {}
@@ -131,6 +134,10 @@ class Channel:
         """Source that a form of a cause is of: a cause may have one form over time, and one by thermometers."""
         return self.sources[name, variant.law]
 
+    def happens_once(self, name: str) -> bool:
+        """Whether a cause acts once in a session, so that no other tests can show it again."""
+        return any(source.happens_once for own, source in self.sources.items() if own[0] == name)
+
     def to_whole(self, variant: Variant) -> NDArray[np.float64]:
         """Amplitudes of a form to all amplitudes of its cause: some of these, or one for all of them, shape (p, q)."""
         if not len(variant.whole):
@@ -138,9 +145,15 @@ class Channel:
         same = (variant.whole[:, None] == variant.columns).astype(np.float64)
         return same if same.any() else np.ones((len(variant.whole), 1))
 
-    def beside_base(self, noise_mm: float, scatter: float = 1.0) -> BesideBase:
-        """Causes beside the base at a noise of one sample [mm], balls scattering `scatter` times as stated."""
-        return BesideBase(self.columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
+    def beside_base(
+        self, noise_mm: float, scatter: float = 1.0, but_for: NDArray[np.bool_] | None = None
+    ) -> BesideBase:
+        """Causes beside the base at a noise of one sample [mm], balls scattering `scatter` times as stated.
+
+        Rows that are held back, shape (n,), say nothing; targets must be zero there.
+        """
+        columns = self.columns if but_for is None else self.columns.but_for(but_for)
+        return BesideBase(columns, self._scattering(scatter), self.held, max(noise_mm, SMALLEST_NOISE_MM))
 
     def target(self, fit: Calibration) -> NDArray[np.float64]:
         """What readings say of base and causes, about a fit of the base and of causes laid out at its values, (n,).

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.stray_balls import beside
+from dbbstation.diagnosis.chosen_anew import chosen_anew
 from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained, Verdict
 from dbbstation.diagnosis.left_out import found_again, predicted
@@ -64,6 +65,10 @@ def diagnose(
     explained = explain(machine, runs, sources, progress)
     progress("verdicts")
     explained, findings = judged(explained)
+    progress("held-out tests")
+    anew = chosen_anew(explained)
+    if anew is not None:
+        findings = judge(explained, anew)
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
     again = found_again(explained, [f.name for f in sorted(findings, key=lambda f: -f.gain)[:RIVALS]])
@@ -71,7 +76,6 @@ def diagnose(
     rest = _unexplained(explained, settled.left)
     found = [explained.channel.source_of(m.cause.name, m.variant) for m in members]
     mismatch = is_missing_physics(explained.first) or bool(members) or bool(outliers) or rest.variable is not None
-    progress("held-out tests")
     held_out = predicted(explained)
     elsewhere = workspace_error(before, after) if members else None
     progress("next test")
@@ -82,6 +86,7 @@ def diagnose(
         before=before,
         after=after,
         held_out=held_out,
+        chosen_anew=anew,
         outliers=tuple(beside(outlier, after) for outlier in outliers),
         workspace=elsewhere,
         locations=locations_of(before, after, found, explained.first, rest.variable) if mismatch else (),
@@ -89,7 +94,7 @@ def diagnose(
         unexplained=with_exact_wave(rest, after),
         shifts=shifts_between(before, after),
         second_start_agrees=settled.second_start_agrees(),
-        next_tests=next_tests(explained, findings, elsewhere),
+        next_tests=() if settled.at_limit else next_tests(explained, findings, elsewhere),
     )
 
 
@@ -139,6 +144,11 @@ def _unexplained(explained: Explained, left: Misfit) -> Unexplained:
     curve = curve_of(explained.channel, settled, member)
     where = f"strut {shape.strut}" if shape.strut else "no single strut"
     text = f"An unmodelled effect, organised by {curve.variable}, {where}."
+    if settled.at_limit:
+        text = (
+            "Nothing that is listed explains these recordings down to the noise. The strongest unmodelled effect is organised by "
+            f"{curve.variable}, {where}; other causes are at work beside it, or its curve has another form."
+        )
     rms_um = 1e3 * left.rms if is_missing_physics(left) else curve.unconcealed_um
     gain = settled.best.log_factor(member.cause.name)
     return Unexplained(rms_um, shape.strut, curve.follows, gain, text, curve)

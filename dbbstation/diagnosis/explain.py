@@ -46,6 +46,10 @@ SEEDS = 3
 GRID = 0.3
 """Share to which nonlinear parameters are known from the grid of the comparison, about its spacing, in a second try."""
 
+MOST_MEMBERS = 12
+"""Causes of a hypothesis at which the comparison ends without a name. Each takes part of what none of them is, and the next one is
+called in for what they leave: hypotheses grew to 61 members. Sessions that the list explains have at most 8."""
+
 STEPS = 2
 """Times that the nonlinear parameters of a rival are improved."""
 
@@ -64,6 +68,9 @@ class Settled:
         noise: measured on what all causes together leave.
         left: misfit of the joint fit.
         refused: causes that cannot be what these recordings show, and why.
+        at_limit: nothing listed explains the recordings down to the noise: `after` is the base fit, no cause is named, and `best` has
+            the strongest unmodelled effect alone.
+        scatter: how many times as much as stated balls scatter.
     """
 
     after: Calibration
@@ -75,10 +82,17 @@ class Settled:
     noise: Spectrum
     left: Misfit
     refused: Mapping[str, str] = field(default_factory=dict)
+    at_limit: bool = False
+    scatter: float = 1.0
 
-    def second_start_agrees(self) -> bool:
-        """Whether a search that begins with nothing, about the same fit, comes to the same most probable set of causes."""
-        return search(self.comparison, self.causes).best.names == self.posterior.best.names
+    def second_start_agrees(self) -> bool | None:
+        """Whether a search that begins with nothing, about the same fit, comes to the same most probable set of causes.
+
+        None where the comparison ended at its limit: there is no such set.
+        """
+        if self.at_limit:
+            return None
+        return search(self.comparison, self.causes, most_members=MOST_MEMBERS).best.names == self.posterior.best.names
 
     @property
     def members(self) -> tuple[Member, ...]:
@@ -127,6 +141,7 @@ def explain(
     if explained.settled.members and outliers:
         belonging, staying = in_place_after_all(explained.settled.after, runs, outliers)
         if len(staying) < len(outliers):
+            del explained  # its columns fill as much memory as the next ones will
             return _with_set_up(fit, fit(belonging), staying, sources, progress)
     return explained
 
@@ -161,6 +176,7 @@ def _with_set_up(
         if step is None:
             return explained
         outliers, before = (*outliers, step[0]), step[2]
+        del channel, settled, explained  # their columns fill as much memory as the next ones will
 
 
 def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
@@ -186,10 +202,14 @@ def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
         comparison = beside.comparison(target)
         causes = (*(c for c in channel.named if c.name not in refused), *channel.set_up, *unmodelled.causes)
         named_causes = [cause for cause in causes if cause.named]
-        posterior = search(comparison, causes, seeds.values())
+        posterior = search(comparison, causes, seeds.values(), most_members=MOST_MEMBERS)
+        if posterior.at_limit:
+            return _without_a_name(channel, unmodelled, noise, scatter)
         best = _steady(posterior, fitted)
         seeds |= {h.names: h.members for h in (best, *posterior.hypotheses[:SEEDS])}
-        settled = Settled(fit, posterior, best, comparison, causes, unmodelled, noise, misfit_of(fit, noise), refused)
+        settled = Settled(
+            fit, posterior, best, comparison, causes, unmodelled, noise, misfit_of(fit, noise), refused, scatter=scatter
+        )
         usual = _usual_scatter(fit) if any(m.cause.setup for m in best.members) else scatter
         named_members = [m for m in best.members if m.cause.named]
         pairs = [(m, m) for m in named_members]
@@ -223,6 +243,25 @@ def _settle(channel: Channel, progress: Callable[[str], None]) -> Settled:
             unmodelled.look(fit, [m for m in best.members if m.cause.named], noise_mm)
             looked = True
     return _fitted_as_named(channel, settled)
+
+
+def _without_a_name(channel: Channel, unmodelled: Unmodelled, noise: Spectrum, scatter: float) -> Settled:
+    """What is said where nothing listed explains the recordings: the base fit, and the strongest unmodelled effect beside it.
+
+    Names of a set that has grown to its limit were wrong wherever that was tried.
+    """
+    fit = channel.calibration
+    comparison = channel.beside_base(float(np.sqrt(noise.power[0])), scatter).comparison(channel.target(fit))
+    scan = comparison.scan((), unmodelled.causes)
+    worth = scan.log_factor + np.array([cause.log_prior_odds for cause in scan.causes])
+    strongest = int(worth.argmax())
+    alone = Hypothesis((scan.best[strongest],), float(worth[strongest]), (float(scan.log_factor[strongest]),))
+    posterior = Posterior(
+        (alone, Hypothesis((), 0.0)), {alone.names: alone.log_posterior, frozenset(): 0.0}, at_limit=True
+    )
+    causes = (*channel.named, *channel.set_up, *unmodelled.causes)
+    left = misfit_of(fit, noise)
+    return Settled(fit, posterior, alone, comparison, causes, unmodelled, noise, left, at_limit=True, scatter=scatter)
 
 
 def _negative(fit: Calibration, channel: Channel) -> dict[str, str]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.inference.verdict import Acts, Gains, Value, Verdict
 
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
+    from dbbstation.diagnosis.chosen_anew import ChosenAnew
     from dbbstation.diagnosis.shapes import Follows
     from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.inference.harmonics import Misfit
@@ -48,6 +49,9 @@ class SourceFinding:
         stability: selection frequency: share of draws of seven tenths of the tests in which it is found again; None where
             it was not tried.
         equivalent: causes that are observationally equivalent to it, itself among them; empty where there are none.
+        acts: in the whole session, or once.
+        sigmas: norm of its effect over its standard deviation; 0 for a cause that the most probable set has not.
+        gains: what it brought in groups of tests that were held back; None where they were not asked.
     """
 
     name: str
@@ -62,6 +66,9 @@ class SourceFinding:
     probability: float
     stability: float | None = None
     equivalent: tuple[str, ...] = ()
+    acts: Acts = Acts.ALWAYS
+    sigmas: float = 0.0
+    gains: Gains | None = None
 
 
 @dataclass(frozen=True)
@@ -220,13 +227,14 @@ class Diagnosis:
         before: fit of the base model.
         after: joint fit; the same as `before` where nothing was found.
         held_out: predictions of left-out tests, before and after [mm].
+        chosen_anew: what was found without each group of tests; None where nothing was named, or there are too few tests.
         outliers: balls and runs that do not belong, kept from pulling the fits.
         workspace: how far the earlier calibration was off elsewhere; None where nothing was found.
         locations: largest share first.
         sources: best first.
         unexplained: what is left.
         shifts: largest first.
-        second_start_agrees: a second search came to the same set of causes.
+        second_start_agrees: a second search came to the same set of causes; None where the comparison ended at its limit.
         next_tests: best first, each beside those before it; empty where nothing is to be asked.
     """
 
@@ -236,11 +244,12 @@ class Diagnosis:
     before: Calibration
     after: Calibration
     held_out: tuple[HeldOut, HeldOut]
+    chosen_anew: ChosenAnew | None
     outliers: tuple[Outlier, ...]
     workspace: WorkspaceError | None
     locations: tuple[Location, ...]
     sources: tuple[SourceFinding, ...]
     unexplained: Unexplained
     shifts: tuple[Shift, ...]
-    second_start_agrees: bool
+    second_start_agrees: bool | None
     next_tests: tuple[NextTest, ...]

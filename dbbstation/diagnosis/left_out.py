@@ -27,8 +27,7 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
     channel, settled = explained.channel, explained.settled
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     single = max(_single_noise_mm(channel.observations, noise_mm, fine_noise_mm(settled.after)), SMALLEST_NOISE_MM)
-    tests = _tests_of(channel.observations)
-    groups = [test % min(FOLDS, max(tests) + 1) for test in tests]
+    groups = groups_of(channel.observations)
     variants = [member.variant for member in settled.members]
     known = channel.known_with(variants)
     blocks = channel.blocks(channel.columns_of(variants), channel.target(settled.after))
@@ -61,6 +60,12 @@ def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
         max(settled.noise_mm, SMALLEST_NOISE_MM),
         np.random.default_rng(len(channel.observations)),
     )
+
+
+def groups_of(observations: Sequence[Observation]) -> list[int]:
+    """Group of each run, in which its test is left out together with every fifth other one."""
+    tests = _tests_of(observations)
+    return [test % min(FOLDS, max(tests) + 1) for test in tests]
 
 
 def _tests_of(observations: Sequence[Observation]) -> list[int]:

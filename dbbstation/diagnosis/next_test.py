@@ -9,9 +9,10 @@ import numpy as np
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
 from dbbstation.diagnosis.findings import NextTest, Verdict
-from dbbstation.diagnosis.verdicts import TESTABLE_SHARE, TESTABLE_SIGMA
+from dbbstation.diagnosis.verdicts import TESTABLE_SHARE
 from dbbstation.errors import MachineError
 from dbbstation.inference.square_root import solve
+from dbbstation.inference.verdict import OUT
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Circle, Direction
@@ -197,7 +198,7 @@ def _sigmas(covariance: NDArray[np.float64], variant: Variant) -> NDArray[np.flo
 
 def _worth_it(now: NDArray[np.float64], then: NDArray[np.float64]) -> bool:
     """Whether a source becomes testable, or a combination of its amplitudes half as uncertain."""
-    testable = [bool(np.mean(sigmas <= 1.0 / TESTABLE_SIGMA) >= TESTABLE_SHARE) for sigmas in (now, then)]
+    testable = [bool(np.mean(sigmas <= 1.0 / OUT) >= TESTABLE_SHARE) for sigmas in (now, then)]
     return testable == [False, True] or bool(np.any(then <= HALVED * now))
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft
+from scipy.linalg import qr
 from scipy.sparse import csr_array
 
 from dbbstation.diagnosis.shapes import (
@@ -32,7 +33,7 @@ from dbbstation.inference.square_root import free_directions
 from dbbstation.machine.geometry import STRUTS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -53,6 +54,9 @@ SHORTEST_MM = 4.0
 
 PIECES = 8192
 """Of time, at the most."""
+
+AT_ONCE = 32
+"""Directions of the base whose transforms are held at once: a hundred megabytes with all of a joint fit."""
 
 SHORTEST_S = 3.0
 """Shortest wave of time that is looked for; four pieces where the recordings last longer than that allows [s]."""
@@ -102,15 +106,19 @@ class Sums:
         base = (flat @ self.base.reshape(pieces, -1)).reshape(many, count, *self.base.shape[1:])
         pairs = (curves[:, :, :, None] * curves[:, :, None, :]).reshape(pieces, -1)
         gains = (pairs.T @ self.gains.reshape(pieces, -1)).reshape(many, count, count, *self.gains.shape[1:])
-        return _solved(rest, base, gains)
+        return _solved(rest, _taken(base), gains)
 
 
-def _solved(rest: NDArray[np.float64], base: NDArray[np.float64], gains: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Explained sums of squares from products with curves: (m, p, d), (m, p, d, k) and (m, p, p, d, d)."""
+def _taken(base: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What directions of the base take from the products of curves, (m, p d, p d), from its products with them, (m, p, d, k)."""
+    side = base.reshape(len(base), base.shape[1] * base.shape[2], -1)
+    return np.asarray(side @ side.transpose(0, 2, 1))
+
+
+def _solved(rest: NDArray[np.float64], taken: NDArray[np.float64], gains: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Explained sums of squares from products with curves: (m, p, d), as `_taken` has them, and (m, p, p, d, d)."""
     many, size = len(rest), rest.shape[1] * rest.shape[2]
-    side = base.reshape(many, size, -1)
-    normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - side @ side.transpose(0, 2, 1)
-    normal = normal + np.eye(size)
+    normal = gains.transpose(0, 1, 3, 2, 4).reshape(many, size, size) - taken + np.eye(size)
     right = rest.reshape(many, size, 1)
     return np.asarray((right * np.linalg.solve(normal, right)).sum(axis=(1, 2)))
 
@@ -121,7 +129,7 @@ class Look:
     Args:
         runs: as shapes see them.
         residual: per run, what the fit leaves, shape (n,) [mm].
-        jacobian: per run, of all base columns, shape (n, k).
+        jacobian: per run, of all base columns, shape (n, k); each is asked for once.
         base: what is known of these.
         held: directions that are kept at nominal.
         noise_mm: of one sample [mm].
@@ -131,21 +139,23 @@ class Look:
         self,
         runs: Sequence[Samples],
         residual: Sequence[NDArray[np.float64]],
-        jacobian: Sequence[NDArray[np.float64]],
+        jacobian: Iterable[NDArray[np.float64]],
         base: Columns,
         held: NDArray[np.float64],
         noise_mm: float,
     ) -> None:
         self._runs, self._noise = runs, noise_mm
-        whole = np.vstack(jacobian)
         random, fitted = np.flatnonzero(base.random), np.flatnonzero(~base.random)
-        columns = np.hstack([whole[:, fitted] @ free_directions(base, fitted, held), whole[:, random]]) / noise_mm
-        priors = np.zeros((len(random), columns.shape[1]))
-        priors[np.arange(len(random)), columns.shape[1] - len(random) + np.arange(len(random))] = (
-            1.0 / base.prior[random]
-        )
+        free = free_directions(base, fitted, held)
+        ends = np.cumsum([0, *(len(own) for own in residual)])
+        # Filled run by run and made orthonormal in place: copies of all columns would need more memory than all else here.
+        columns = np.zeros((ends[-1] + len(random), free.shape[1] + len(random)), order="F")
+        for own, start, stop in zip(jacobian, ends[:-1], ends[1:], strict=True):
+            columns[start:stop, : free.shape[1]] = own[:, fitted] @ (free / noise_mm)
+            columns[start:stop, free.shape[1] :] = own[:, random] / noise_mm
+        np.fill_diagonal(columns[ends[-1] :, free.shape[1] :], 1.0 / base.prior[random])
         # Readings only: what the rows of the priors take part in is no reading.
-        self._base = np.linalg.qr(np.vstack([columns, priors]))[0][: len(whole)]
+        self._base = qr(columns, overwrite_a=True, mode="economic", check_finite=False)[0][: ends[-1]]
         self._rest = np.concatenate(residual) / noise_mm
 
     def sums(
@@ -316,14 +326,17 @@ def _waves_of_time(strut: int | None, moves: str, sums: Sums, low: float, width:
     grid = np.arange(first, last) / (size * width)
     directions = sums.rest.shape[1]
     rest = transformed(sums.rest, 1)
-    base = transformed(sums.base.reshape(len(place), -1), 1).reshape(len(grid), directions, -1)
+    taken = np.zeros((len(grid), 2 * directions, 2 * directions))
+    for first_column in range(0, sums.base.shape[2], AT_ONCE):
+        some = sums.base[:, :, first_column : first_column + AT_ONCE].reshape(len(place), -1)
+        taken += _taken(_sides(transformed(some, 1).reshape(len(grid), directions, -1)))
     twice = transformed(sums.gains.reshape(len(place), -1), 2).reshape(len(grid), directions, directions)
     mean = sums.gains.sum(axis=0)
     gains = np.empty((len(grid), 2, 2, directions, directions))
     # cos² = (1 + cos 2x) / 2, sin² = (1 - cos 2x) / 2, sin cos = sin 2x / 2; a transform has exp(-ix).
     gains[:, 0, 0], gains[:, 1, 1] = (mean + twice.real) / 2.0, (mean - twice.real) / 2.0
     gains[:, 0, 1] = gains[:, 1, 0] = -twice.imag / 2.0
-    explained = _solved(_sides(rest), _sides(base), gains)
+    explained = _solved(_sides(rest), taken, gains)
     return _finer("time", strut, moves, sums, grid, explained)
 
 

@@ -370,4 +370,5 @@ def _usual(name: str, extent: Ranges, strut: int | None) -> Form:
         return Proportional(float(np.max(np.abs([low, high]))))
     if name in OF_STRUTS and strut is not None:
         return Hats(low[strut - 1], high[strut - 1])
-    return Hats(low, high)
+    # All struts alike follow one curve: the same length or force does the same to each.
+    return Hats(low.min(), high.max())

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.calibration.outliers.outlier import SOURCE_OF, Kind
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.summary import outlier_summary
+from dbbstation.inference.verdict import Acts, Verdict
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.findings import Diagnosis, Location, NextTest, SourceFinding
+    from dbbstation.inference.verdict import Gains
 
 
 def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[str, Any]:
@@ -35,6 +37,8 @@ def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[
         },
         "held_out_rms_um": {when: 1e3 * of.rms for when, of in zip(WHEN, diagnosis.held_out, strict=True)},
         "held_out_normalised": {when: of.normalised for when, of in zip(WHEN, diagnosis.held_out, strict=True)},
+        "held_out": "not-tested" if diagnosis.chosen_anew is None else "tested",
+        "held_out_worse": None if diagnosis.chosen_anew is None else diagnosis.chosen_anew.worse,
         "circularity_um": _circularity(diagnosis),
         "workspace": _workspace(diagnosis),
         "outliers": [outlier_summary(outlier) for outlier in diagnosis.outliers],
@@ -114,7 +118,8 @@ def _seats(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             entries.append(
                 {
                     **_lacking(name, "; ".join(outlier.text for outlier in told)),
-                    "verdict": "ambiguous" if alike else "identified",
+                    "verdict": str(Verdict.AMBIGUOUS if alike else Verdict.HAPPENED),
+                    "acts": Acts.ONCE.name.lower(),
                     "ambiguous_with": alike,
                     "parameters": {
                         _of(outlier): {"value": outlier.size_um, "uncertainty": outlier.uncertainty_um, "unit": "µm"}
@@ -167,11 +172,23 @@ def _source(source: SourceFinding) -> dict[str, Any]:
         "probability": source.probability,
         "class": list(source.equivalent),
         "log_evidence": source.gain,
+        "acts": source.acts.name.lower(),
+        "sigmas": source.sigmas,
+        "gains": None if source.gains is None else _gains(source.gains),
         "parameters": {
             name: {"value": v.value, "uncertainty": v.uncertainty, "unit": v.unit}
             for name, v in source.parameters.items()
         },
         "text": source.text,
+    }
+
+
+def _gains(gains: Gains) -> dict[str, Any]:
+    return {
+        "parts": list(gains.parts),
+        "with_gain": gains.with_gain,
+        "total": gains.total,
+        "predicts": gains.predicts,
     }
 
 
@@ -186,6 +203,9 @@ def _lacking(name: str, why: str) -> dict[str, Any]:
         "probability": None,
         "class": [],
         "log_evidence": None,
+        "acts": None,
+        "sigmas": None,
+        "gains": None,
         "parameters": {},
         "text": why,
     }

@@ -59,12 +59,10 @@ class Unmodelled:
             noise_mm: of one sample [mm].
         """
         channel = self.channel
-        samples, known = channel.columns.base, channel.base
-        if members:
-            columns = np.concatenate([member.columns for member in members])
-            samples = np.hstack([samples, channel.columns.samples[:, columns]])
-            known = with_random(known, np.concatenate([member.sd for member in members]))
-        base = [samples[rows] for rows in channel.runs]
+        taken = np.concatenate([np.zeros(0, dtype=np.int64), *(member.columns for member in members)])
+        known = with_random(channel.base, np.concatenate([np.zeros(0), *(member.sd for member in members)]))
+        own = channel.columns
+        base = (np.hstack([own.base[rows], own.samples[rows][:, taken]]) for rows in channel.runs)
         noise_mm = max(noise_mm, SMALLEST_NOISE_MM)
         look = Look(self.runs, list(fit.residual_mm), base, known, channel.held, noise_mm)
         self._add(looked_for(look, ranges(self.runs)))

@@ -6,44 +6,50 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import expit
 
-from dbbstation.diagnosis.channel import NAMED_ODDS
 from dbbstation.diagnosis.findings import SourceFinding, Value, Verdict
 from dbbstation.diagnosis.held import uncertainties, unseen
-from dbbstation.inference.alternatives import EVEN, Alternatives, standing_out
+from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.square_root import free_directions
-from dbbstation.inference.verdict import SURE
+from dbbstation.inference.verdict import ABSENT, OUT, Acts, claim
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
+    from dbbstation.diagnosis.chosen_anew import ChosenAnew
     from dbbstation.diagnosis.explain import Explained, Settled
     from dbbstation.inference.model_comparison import Cause, Member, Variant
-
-TESTABLE_SIGMA = 5.0
-"""An amplitude of the plausible size must stand so far out of its standard deviation for a cause to be testable."""
+    from dbbstation.inference.verdict import Gains
 
 TESTABLE_SHARE = 0.5
 """Share of the combinations of a cause's amplitudes that must be seen for the cause to be ruled out."""
 
-PRIOR = float(expit(NAMED_ODDS))
-"""Probability that a cause has before anything is measured: what is more probable afterwards is not ruled out."""
-
 OPEN = "These tests leave it open: they neither show nor exclude it."
 
+NO_NAME = (
+    "No name is given: nothing that is listed explains these recordings down to the noise, and beside what is not listed no cause can "
+    "be judged."
+)
+"""Text of every cause where the comparison ended at its limit."""
 
-def judge(explained: Explained) -> tuple[SourceFinding, ...]:
-    """One finding per named cause, most probable first."""
-    return _Judge(explained).findings()
+
+def judge(explained: Explained, anew: ChosenAnew | None = None) -> tuple[SourceFinding, ...]:
+    """One finding per named cause, those that are there first.
+
+    Args:
+        explained: what the comparison came to.
+        anew: what held-out tests say; None: they were not asked, and what is identified is so without them.
+    """
+    return _Judge(explained, anew).findings()
 
 
 class _Judge:
-    def __init__(self, explained: Explained) -> None:
+    def __init__(self, explained: Explained, anew: ChosenAnew | None) -> None:
+        self._anew = anew
         self._channel = explained.channel
         self._settled: Settled = explained.settled
         self._best = explained.settled.best
@@ -69,10 +75,14 @@ class _Judge:
 
     def findings(self) -> tuple[SourceFinding, ...]:
         """All of them."""
+        if self._settled.at_limit:
+            return tuple(
+                replace(self._finding(c), verdict=Verdict.NOT_TESTABLE, text=NO_NAME, probability=ABSENT)
+                for c in self._named.values()
+            )
         found = [self._finding(cause) for cause in self._named.values()]
         found += [_refused(name, why) for name, why in self._settled.refused.items()]
-        order = [Verdict.IDENTIFIED, Verdict.AMBIGUOUS, Verdict.NOT_TESTABLE, Verdict.RULED_OUT]
-        return tuple(sorted(found, key=lambda f: (order.index(f.verdict), -f.gain)))
+        return tuple(sorted(found, key=lambda f: (f.verdict.rank, -f.gain)))
 
     def _finding(self, cause: Cause) -> SourceFinding:
         name = cause.name
@@ -88,6 +98,8 @@ class _Judge:
         signature = self._signature(name)
         if verdict is Verdict.IDENTIFIED:
             text = f"{source.texts.what} {source.texts.confirm}"
+        elif verdict in {Verdict.HAPPENED, Verdict.DOES_NOT_PREDICT}:
+            text = f"{source.texts.what} {text} {source.texts.confirm}"
         elif verdict is Verdict.AMBIGUOUS:
             text = f"{text} {source.texts.confirm}"
         return SourceFinding(
@@ -102,6 +114,9 @@ class _Judge:
             text=text,
             probability=probability,
             equivalent=equal,
+            acts=self._acts(name),
+            sigmas=self._sigmas_of(name),
+            gains=self._gains(name),
         )
 
     def _verdict(self, name: str) -> tuple[Verdict, tuple[str, ...], tuple[str, ...], str]:
@@ -127,7 +142,7 @@ class _Judge:
         """The same of a cause that is rather not there."""
         if not self._testable(name):
             return Verdict.NOT_TESTABLE, (), (), self._why_not_testable(name)
-        if self._probability((name,)) > PRIOR:
+        if self._probability((name,)) > ABSENT:
             return Verdict.NOT_TESTABLE, (), (), OPEN
         return Verdict.RULED_OUT, (), (), "It would have been seen at its plausible size and was not needed."
 
@@ -136,12 +151,38 @@ class _Judge:
         equal = self._classes[name]
         shown = self._with_a_name(equal)
         shown = shown if len(shown) > 1 else ()
-        if self._probability(equal) >= SURE:
-            return Verdict.IDENTIFIED, (), shown, ""
+        gains, acts = self._gains(name), self._acts(name)
+        worse = self._anew is not None and self._anew.worse
+        verdict = claim(self._probability(equal), self._sigmas_of(name), acts, gains, worse=worse)
+        if verdict is not Verdict.AMBIGUOUS:
+            return verdict, (), shown, _why(verdict, gains)
+        if name not in self._ambiguities:
+            text = f"Its effect is only {self._sigmas_of(name):.2g} standard deviations out."
+            return (Verdict.AMBIGUOUS, (), shown, text) if shown else (Verdict.NOT_TESTABLE, (), (), text)
         others = tuple(other for other in self._ambiguities[name] if other != name)
         if not others and not shown:
             return Verdict.NOT_TESTABLE, (), (), OPEN
         return Verdict.AMBIGUOUS, others, shown, _either(others)
+
+    def _acts(self, name: str) -> Acts:
+        """When a cause is at work."""
+        return Acts.ONCE if self._channel.happens_once(name) else Acts.ALWAYS
+
+    def _gains(self, name: str) -> Gains | None:
+        """What a cause of the most probable hypothesis, or one of its class, brought in held-out tests; None: not asked."""
+        if self._anew is None or name not in self._classes:
+            return None
+        return self._anew.gains(self._classes[name])
+
+    def _sigmas_of(self, name: str) -> float:
+        """By how many standard deviations the norm of an effect beside the base is out; 0 for what the hypothesis has not."""
+        member = next((m for m in self._settled.members if m.cause.name == name), None)
+        if member is None:
+            return 0.0
+        columns, comparison = member.variant.columns, self._settled.comparison
+        found = comparison.estimates([member, *self._best.without(name)])
+        own = len(columns)
+        return norm_over_sigma(comparison.beside((), columns), found.values[:own], found.covariance[:own, :own])
 
     def _with_a_name(self, names: Iterable[str]) -> tuple[str, ...]:
         return tuple(name for name in names if name in self._named)
@@ -159,7 +200,7 @@ class _Judge:
     def _testable(self, name: str) -> bool:
         """Whether plausible amplitudes would be seen beside base and causes; half of their combinations at least."""
         whole = max(self._named[name].variants, key=lambda v: len(v.columns))
-        return bool(np.mean(self._sigmas(whole, self._best.without(name)) >= TESTABLE_SIGMA) >= TESTABLE_SHARE)
+        return bool(np.mean(self._sigmas(whole, self._best.without(name)) >= OUT) >= TESTABLE_SHARE)
 
     def _sigmas(self, variant: Variant, others: tuple[Member, ...]) -> NDArray[np.float64]:
         """By how many standard deviations combinations of plausible amplitudes stand out beside base and others, least first."""
@@ -167,7 +208,7 @@ class _Judge:
 
     def _why_not_testable(self, name: str) -> str:
         for member in self._settled.members:
-            if self._sigmas(self._named[name].variants[0], self._best.without(member.cause.name))[-1] >= TESTABLE_SIGMA:
+            if self._sigmas(self._named[name].variants[0], self._best.without(member.cause.name))[-1] >= OUT:
                 return f"Beside {member.cause.name}, and what its formula may be off by, these tests would not show it."
         return "These tests would not show it at its plausible size: the fitted parameters conceal it."
 
@@ -223,6 +264,18 @@ class _Judge:
             p.name: Value(float(values[k]), float(np.sqrt(max(covariance[k, k], 0.0))), p.unit)
             for k, p in enumerate(amplitudes)
         }
+
+
+def _why(verdict: Verdict, gains: Gains | None) -> str:
+    """What is said of a cause that these tests show for sure, and others do not confirm."""
+    if verdict is Verdict.HAPPENED:
+        return "It happened once: no other tests can confirm it."
+    if verdict is not Verdict.DOES_NOT_PREDICT or gains is None:
+        return ""
+    text = f"It was found in these tests; of {len(gains.parts)} groups of tests that were held back {gains.with_gain} gain by it."
+    if gains.predicts:
+        text += " Everything together predicts them worse than the kinematic calibration."
+    return text
 
 
 def _either(others: Sequence[str]) -> str:

@@ -152,6 +152,23 @@ def standing_out(products: NDArray[np.float64], plausible: NDArray[np.float64]) 
     return np.sqrt(np.maximum(np.linalg.eigvalsh(plausible[:, None] * products * plausible), 0.0))
 
 
+def norm_over_sigma(
+    products: NDArray[np.float64], values: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> float:
+    """By how many standard deviations the norm of an effect is out, to first order.
+
+    Args:
+        products: of its columns beside a base, each by the noise, shape (p, p).
+        values: of its amplitudes, shape (p,).
+        covariance: of these, shape (p, p).
+    """
+    norm = float(np.sqrt(np.maximum(values @ products @ values, 0.0)))
+    if norm == 0.0:
+        return 0.0
+    slope = products @ values / norm
+    return norm / float(np.sqrt(np.maximum(slope @ covariance @ slope, 1e-300)))
+
+
 def _inclusions(posterior: Posterior) -> tuple[NDArray[np.bool_], NDArray[np.float64], dict[str, int]]:
     """Sets of causes that count, shape (s, c): which cause is in which; their probabilities, shape (s,); places of causes."""
     top = max(posterior.weights.values())

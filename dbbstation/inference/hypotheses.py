@@ -38,6 +38,13 @@ MOST_EXPANDED = 40
 SWEEPS = 2
 """Times that every member is given the variant and size that suit it best beside the others."""
 
+NEGLIGIBLE = 40.0
+"""Log odds against the best hypothesis from which on a first score is not kept: a million of such sets have a probability of
+4e-12 together, and their names are what a search without end fills the memory with."""
+
+MOST_SCORES = 20_000
+"""First scores that are kept before those that became negligible meanwhile are dropped."""
+
 MANY = 6
 """Members from which on their sizes are settled all at once where each has one form only: one inversion for all of them."""
 
@@ -81,11 +88,14 @@ class Posterior:
 
     Attributes:
         hypotheses: that were looked at, most probable first.
-        weights: log posterior of every set of names that was scored.
+        weights: log posterior of every set of names that was scored and is not negligible.
+        at_limit: the search ended early: a set of as many causes as were allowed was the most probable one, and each of them was
+            worth its odds. Nothing that was listed explains the target down to the noise, and names mean nothing then.
     """
 
     hypotheses: tuple[Hypothesis, ...]
     weights: dict[frozenset[str], float]
+    at_limit: bool = False
 
     @property
     def best(self) -> Hypothesis:
@@ -113,6 +123,7 @@ def search(
     causes: Sequence[Cause],
     seeds: Iterable[Sequence[Member]] = (),
     most_expanded: int = MOST_EXPANDED,
+    most_members: int | None = None,
 ) -> Posterior:
     """Posterior over sets of causes.
 
@@ -122,20 +133,39 @@ def search(
         seeds: members of hypotheses to look at beside those that the search finds itself, such as those of an earlier one
             about another linearisation.
         most_expanded: hypotheses whose neighbours are looked at, at the most.
+        most_members: causes of a hypothesis at which the search ends; None: hypotheses may grow as they like.
     """
-    return _Search(comparison, causes, most_expanded).run(seeds)
+    return _Search(comparison, causes, most_expanded, most_members).run(seeds)
+
+
+class _AtLimitError(Exception):
+    """The most probable hypothesis has as many members as are allowed."""
 
 
 class _Search:
-    def __init__(self, comparison: ModelComparison, causes: Sequence[Cause], most_expanded: int) -> None:
+    def __init__(
+        self, comparison: ModelComparison, causes: Sequence[Cause], most_expanded: int, most_members: int | None
+    ) -> None:
         self._comparison = comparison
         self._causes = {cause.name: cause for cause in causes}
         self._seen: dict[frozenset[str], Hypothesis] = {}
         self._scored: dict[frozenset[str], float] = {}
-        self._most = most_expanded
+        self._most, self._most_members = most_expanded, most_members
+        self._room = MOST_SCORES
         self._top = -np.inf  # log posterior of the most probable hypothesis so far
 
     def run(self, seeds: Iterable[Sequence[Member]]) -> Posterior:
+        """Look at hypotheses until none is likely that was not looked at, or one is at the limit."""
+        at_limit = False
+        try:
+            self._grow(seeds)
+        except _AtLimitError:
+            at_limit = True
+        self._drop_negligible()
+        weights = {**self._scored, **{key: h.log_posterior for key, h in self._seen.items()}}
+        return Posterior(tuple(sorted(self._seen.values(), key=lambda h: -h.log_posterior)), weights, at_limit)
+
+    def _grow(self, seeds: Iterable[Sequence[Member]]) -> None:
         """Look at neighbours of the most probable hypothesis not yet looked at, until none is likely."""
         self._look_at(())
         for members in seeds:
@@ -159,8 +189,6 @@ class _Search:
                 break
             challenged.add(best.names)
             self._challenge(best)
-        weights = {**self._scored, **{key: h.log_posterior for key, h in self._seen.items()}}
-        return Posterior(tuple(sorted(self._seen.values(), key=lambda h: -h.log_posterior)), weights)
 
     def _expand(self, hypothesis: Hypothesis) -> None:
         """Look at neighbours: one more, one less, one in the place of another."""
@@ -191,10 +219,17 @@ class _Search:
 
     def _score(self, members: Sequence[Member], log_posterior: float, worth: float = 1.0) -> None:
         """Keep a first score, and look at the hypothesis where it is likely and its last member is worth its odds."""
-        key = frozenset(member.cause.name for member in members)
-        self._scored.setdefault(key, log_posterior)
+        if log_posterior > self._top - NEGLIGIBLE:
+            self._scored.setdefault(frozenset(member.cause.name for member in members), log_posterior)
+            if len(self._scored) > self._room:
+                self._drop_negligible()
         if worth > 0.0 and log_posterior > self._top - LIKELY:
             self._look_at(members)
+
+    def _drop_negligible(self) -> None:
+        """Forget first scores that became negligible since they were kept."""
+        self._scored = {key: score for key, score in self._scored.items() if score > self._top - NEGLIGIBLE}
+        self._room = max(MOST_SCORES, 2 * len(self._scored))
 
     def _pairs(self, members: Sequence[Member]) -> None:
         """Look at the best pairs of named causes beside members: each may show only beside the other."""
@@ -244,7 +279,10 @@ class _Search:
             return
         found = self._settled(list(members))
         self._seen[key] = found
-        self._top = max(self._top, found.log_posterior)
+        if found.log_posterior > self._top:
+            self._top = found.log_posterior
+            if self._most_members is not None and found.lean and len(members) >= self._most_members:
+                raise _AtLimitError
         if not found.lean:
             worth = [f + m.cause.log_prior_odds for m, f in zip(found.members, found.log_factors, strict=True)]
             self._look_at(found.without(found.members[int(np.argmin(worth))].cause.name))

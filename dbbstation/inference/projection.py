@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.square_root import Columns
 
 MARGIN = 512
-"""Columns for which room is made at first."""
+"""Columns for which room is made at first, where nobody says how many there will be."""
 
 FEW = 0.5
 """Share of all columns up to which some are worked out by themselves."""
@@ -36,6 +36,7 @@ class CauseColumns:
         base: columns of the base, shape (n, k).
         whitened: makes columns as they are taken in, shape (m, q), those over the samples, shape (n, q); the same if None. It is
             asked for a column when that is wanted first.
+        room: columns for which room is made at first; more need a copy of all. Room that stays empty takes no memory.
 
     Attributes:
         base: the same.
@@ -45,12 +46,15 @@ class CauseColumns:
     """
 
     def __init__(
-        self, base: NDArray[np.float64], whitened: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
+        self,
+        base: NDArray[np.float64],
+        whitened: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+        room: int = MARGIN,
     ) -> None:
         self.base = base
         self.axes, self.on_axes = np.linalg.qr(base)
         self._whitened = whitened
-        self._buffer = np.empty((len(base), MARGIN), order="F")
+        self._buffer = np.empty((len(base), room), order="F")
         self._waiting: list[NDArray[np.float64]] = []
         self._ready = 0
         self._products = np.zeros((0, 0))
@@ -60,11 +64,11 @@ class CauseColumns:
     @property
     def samples(self) -> NDArray[np.float64]:
         """All columns, shape (n, p)."""
-        for part in self._waiting:
+        while self._waiting:
+            part = self._waiting.pop(0)  # held twice no longer than need be
             first, last = self._ready, self._ready + part.shape[1]
             self._buffer[:, first:last] = part if self._whitened is None else self._whitened(part)
             self._ready = last
-        self._waiting.clear()
         return self._buffer[:, : self.count]
 
     def of(self, columns: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -114,6 +118,19 @@ class CauseColumns:
         self._waiting.append(columns if self._whitened is not None else columns.copy())
         self.count = last
         return np.arange(first, last)
+
+    def but_for(self, rows: NDArray[np.bool_]) -> CauseColumns:
+        """The same causes as all other rows show them, the columns themselves shared; targets must be zero in these rows.
+
+        Args:
+            rows: that are held back, shape (n,).
+        """
+        kept = CauseColumns(np.where(rows[:, None], 0.0, self.base), room=0)
+        out = self.samples[rows]
+        kept._buffer, kept.count, kept._ready = self._buffer, self.count, self.count
+        kept._products = self.gram - out.T @ out
+        kept._along = kept.axes.T @ self.samples
+        return kept
 
 
 class BesideBase:

@@ -12,6 +12,7 @@ from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.calibration.reporting.residual_map import residual_map
 from dbbstation.diagnosis.per_test import gains_by_test
 from dbbstation.diagnosis.source_curves import found_sources, source_curves
+from dbbstation.inference.verdict import Verdict
 from dbbstation.plan.circle import Direction
 from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, QUARTERS, ROW_IN, draw_maps, in_style
 from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
@@ -63,7 +64,7 @@ def draw_diagnosis(diagnosis: Diagnosis) -> Figure:
 def _headline(diagnosis: Diagnosis) -> str:
     if not diagnosis.mismatch:
         return "The recordings agree with the kinematic model"
-    told = [s for s in diagnosis.sources if str(s.verdict) in {"identified", "ambiguous"}]
+    told = [s for s in diagnosis.sources if s.verdict.rank <= Verdict.AMBIGUOUS.rank]
     modelled = found_sources(diagnosis)
     # What is only mistaken for one of them stands in the table, and may be many.
     named = [f"{s.name} ({s.verdict})" for s in told if s.name in modelled or not modelled]

@@ -406,6 +406,8 @@ class ErrorSource(ABC):
     builds_up: ClassVar[bool] = False
     """True where errors build up over many rows, as those of a lag. To find a command for them by trial would take a trial
     for each row; such a source answers `undone`."""
+    happens_once: ClassVar[bool] = False
+    """True for what acts once in a session, such as a bump: no other tests can show it again, and it is never called identified."""
     candidate: ClassVar[bool] = True
     """Whether a diagnosis may name it; False for what only describes an error and is no cause of one."""
 

@@ -245,6 +245,8 @@ MISMATCH = "The recordings differ from the kinematic model by {rms:.2f} µm rms 
 NO_MISMATCH = "The recordings agree with the kinematic model; noise {noise:.2f} µm."
 VERDICT_WORDS: Mapping[str, str] = {
     "identified": "Identified causes",
+    "happened": "Happened in this session",
+    "does-not-predict": "Found here, not confirmed by tests that were held back",
     "ambiguous": "Ambiguous",
     "not-testable": "These tests cannot tell",
 }

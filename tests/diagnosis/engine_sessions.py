@@ -12,6 +12,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from tests.plant.mechanisms.backlash import Backlash
+from tests.plant.mechanisms.disturbances import BarScale, BumpedJig, KinkedStrut, RingingStrut, WanderingBar
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.screw import ScrewCyclic, ScrewLead
@@ -77,6 +78,31 @@ def screw_wave_under_coloured_noise(folder: FilePath) -> Truth:
     return _recorded(folder, 1506, ScrewCyclic(amplitudes_um), noise=COLOURED)
 
 
+def bar_that_wanders(folder: FilePath) -> Truth:
+    """A bar whose zero takes a random walk: no catalogue has it, and any curve over time explains a little more of it."""
+    return _recorded(folder, 1507, WanderingBar())
+
+
+def strut_with_a_kink(folder: FilePath) -> Truth:
+    """One strut whose scale changes at one length: no smooth curve, wave or bump is it."""
+    return _recorded(folder, 1508, KinkedStrut())
+
+
+def curved_scale_of_the_bar(folder: FilePath) -> Truth:
+    """A bar whose scale is bent, read over a tenth of a millimetre either way."""
+    return _recorded(folder, 1509, BarScale())
+
+
+def jig_bumped_once(folder: FilePath, from_run: int = 14) -> Truth:
+    """All balls stand 7 µm elsewhere from the eighth test on."""
+    return _recorded(folder, 1510, BumpedJig(from_run=from_run))
+
+
+def strut_that_rings(folder: FilePath) -> Truth:
+    """One strut oscillates after each of its reversals."""
+    return _recorded(folder, 1511, RingingStrut())
+
+
 RECIPES: dict[str, Callable[[FilePath], Truth]] = {
     recipe.__name__.replace("_", "-"): recipe
     for recipe in (
@@ -86,6 +112,11 @@ RECIPES: dict[str, Callable[[FilePath], Truth]] = {
         warm_up_in_two_stages,
         warm_up_in_two_stages_and_warm_frame,
         screw_wave_under_coloured_noise,
+        bar_that_wanders,
+        strut_with_a_kink,
+        curved_scale_of_the_bar,
+        jig_bumped_once,
+        strut_that_rings,
     )
 }
 """By the name of the folder that the module writes."""

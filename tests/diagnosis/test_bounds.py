@@ -11,6 +11,7 @@ from dbbstation.diagnosis.channel import Channel
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import AWAY_MM, TOWARDS, Spring, ranges, samples_of, shapes
 from dbbstation.diagnosis.verdicts import _Judge
+from dbbstation.inference.verdict import Acts
 from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
 from tests.plant.mechanisms.gravity import Gravity
@@ -106,6 +107,8 @@ def _still(folder, *mechanisms):
 def test_only_a_group_of_which_one_is_there_is_ambiguous(group, verdict):
     judge = object.__new__(_Judge)
     judge._probability = lambda names: 0.7 if "play" in names else 0.0
+    judge._sigmas_of, judge._gains = lambda _: 9.0, lambda _: None
+    judge._acts, judge._anew = lambda _: Acts.ALWAYS, None
     judge._named = {"play": None, "backlash": None}
     judge._classes, judge._ambiguities = {"play": ("play",)}, {"play": ("play", *group)}
     found, others, _, text = judge._verdict_of_member("play")

@@ -30,7 +30,9 @@ def test_a_drift_of_nobody_knows_what_is_named_by_nobody_and_not_modelled(tmp_pa
     recorded = load_sessions([tmp_path / "s"])
     sources = sources_named(NAMES)
     explained = explain(recorded.machine, [thinned(one) for one in recorded.observations], sources, lambda _: None)
-    assert doubtful(explained, judge(explained)) == {"thermal-frame"}
+    # Which of the three stands in the most probable set is chance.
+    (doubted,) = doubtful(explained, judge(explained))
+    assert doubted in NAMES[1:]
     explained, findings = judged(explained)
     modelled = {term.source.name for term in explained.settled.after.layout.terms} & set(NAMES)
     assert modelled == {"gravity"}

@@ -25,6 +25,11 @@ def test_answers_name_what_is_hidden(tmp_path):
         "warm-up-in-two-stages": ["thermal-struts"],
         "warm-up-in-two-stages-and-warm-frame": ["thermal-struts", "thermal-frame"],
         "screw-wave-under-coloured-noise": ["screw-cyclic"],
+        "bar-that-wanders": ["wandering-bar"],
+        "strut-with-a-kink": ["kinked-strut"],
+        "curved-scale-of-the-bar": ["bar-scale"],
+        "jig-bumped-once": ["bumped-jig"],
+        "strut-that-rings": ["ringing-strut"],
     }
     assert all((tmp_path / name / "session.yaml").exists() for name in RECIPES)
 

@@ -54,7 +54,7 @@ def test_a_bar_that_was_set_wrongly_is_no_warm_plate(tmp_path, offset_um):
     assert found.size_um == pytest.approx(offset_um, abs=3 * np.hypot(found.uncertainty_um, 0.5))
     assert 0 < found.uncertainty_um < 2.0
     told = next(source for source in diagnosis_summary(diagnosis, {})["sources"] if source["name"] == "bar-offset")
-    assert told["verdict"] == "identified"
+    assert told["verdict"] == "happened"
     (value,) = told["parameters"].values()
     assert value["value"] == found.size_um
 

@@ -279,6 +279,8 @@ def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys
             "parameter_shift": [{"parameter": "joint", "shift_um": 1.0}],
             "unexplained": {"text": "Nothing is left beyond noise.", "curve": None},
             "second_start_agrees": True,
+            "held_out": "tested",
+            "held_out_worse": False,
             "next_test": None,
             "further_tests": [],
         }

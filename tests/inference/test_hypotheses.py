@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dbbstation.inference.hypotheses import LIKELY, search
+from dbbstation.inference.hypotheses import LIKELY, NEGLIGIBLE, search
 from dbbstation.inference.model_comparison import FLEXIBLE, Member
 from tests.inference.dense import Dense, cause, variant
 from tests.inference.subsets import inclusion, log_posteriors
@@ -48,7 +48,7 @@ def test_probabilities_are_those_of_all_sets_and_all_sizes(rng, alike, noise):
 
 def test_a_single_cause_is_scored_exactly(rng):
     columns = rng.normal(size=(40, 6))
-    problem = Dense(BASE, columns, columns[:, 2] + rng.normal(0, 0.5, 40), 0.5)
+    problem = Dense(BASE, columns, 0.5 * columns[:, 2] + rng.normal(0, 0.5, 40), 0.5)
     causes = one_column_each(6)
     posterior, full = search(problem.comparison(), causes), log_posteriors(problem, causes[:3])
     for key, expected in full.items():
@@ -144,3 +144,29 @@ def test_no_cause_at_all():
     posterior = search(problem.comparison(), [])
     assert posterior.best.names == frozenset()
     assert posterior.probability(["c0"]) == 0.0
+
+
+def test_a_search_ends_where_the_most_probable_set_is_as_large_as_allowed(rng):
+    """Ten loud causes: with room for six of them nothing that is found is the truth, and the answer says so."""
+    columns = rng.normal(size=(40, 10))
+    problem = Dense(BASE, columns, columns.sum(axis=1) + rng.normal(0, 0.01, 40), 0.01)
+    causes = one_column_each(10)
+    ended = search(problem.comparison(), causes, most_members=6)
+    assert ended.at_limit
+    assert len(ended.best.members) == 6
+    whole = search(problem.comparison(), causes, most_members=11)
+    assert not whole.at_limit
+    assert whole.best.names == {c.name for c in causes}
+    assert whole.weights == search(problem.comparison(), causes).weights
+
+
+def test_scores_that_count_for_nothing_are_not_kept(rng):
+    columns = rng.normal(size=(40, 12))
+    problem = Dense(BASE, columns, 3.0 * columns[:, 4] + rng.normal(0, 0.1, 40), 0.1)
+    posterior = search(problem.comparison(), one_column_each(12))
+    looked_at = {h.names for h in posterior.hypotheses}
+    top = posterior.best.log_posterior
+    scored = {key: weight for key, weight in posterior.weights.items() if key not in looked_at}
+    assert posterior.best.names == {"c4"}
+    assert scored
+    assert min(scored.values()) > top - NEGLIGIBLE

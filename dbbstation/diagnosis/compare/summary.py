@@ -40,6 +40,7 @@ def comparison_summary(found: Comparison, notes: Sequence[str]) -> dict[str, Any
         "beyond_chance_rms_um": 1e3 * found.found_rms_mm,
         "noise_rms_um": 1e3 * found.noise_mm,
         "strut_change_noticed_um": 1e3 * found.noticed_mm,
+        "held_out": "not-tested",
         "held_out_rms_um": {when: 1e3 * of.rms for when, of in zip(("before", "after"), found.held_out, strict=True)},
         "runs": [_run(run) for run in largest_first],
         "directions": None if halves is None else {"same_um": 1e3 * halves[0], "opposite_um": 1e3 * halves[1]},

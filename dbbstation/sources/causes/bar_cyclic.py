@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.laws.encoder import reading_without_noise_mm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -94,31 +95,9 @@ class BarCyclic(ErrorSource):
         A period of zero (or less, which a fit may try) makes no wave.
         """
         self.require(motion)
-        reading = _without_noise(motion)
+        reading = reading_without_noise_mm(motion)
         if period_um <= 0.0:
             return np.zeros((len(reading), 2)), np.zeros(len(reading))
         place_um = (reading - np.round(np.median(reading))) / MM_PER_UM
         phase_rad = 2.0 * np.pi * place_um / period_um
         return np.column_stack([np.sin(phase_rad), np.cos(phase_rad)]), -phase_rad / period_um
-
-
-WINDOWS = 40
-"""Stretches of a run over which its readings are a cubic: nine degrees of a circle."""
-
-
-def _without_noise(motion: Motion) -> NDArray[np.float64]:
-    """What the bar showed, less most of its noise, shape (n,) [mm].
-
-    A wave taken at readings with their noise in them resembles that noise, and would be found where there is none.
-    """
-    reading = np.array(motion.reading_mm, dtype=np.float64)
-    own = reading[motion.kept]
-    window = 2 * (len(own) // (2 * WINDOWS)) + 1
-    if motion.reading_is_measured and window > CUBIC:
-        from scipy.signal import savgol_filter  # noqa: PLC0415 - takes half a second; every command knows all sources
-
-        reading[motion.kept] = savgol_filter(own, window, CUBIC)
-    return reading
-
-
-CUBIC = 3

@@ -1,0 +1,65 @@
+"""Error source: the scale of the bar's encoder is bent."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Effect, LinearSource, Motion, Need, Owner, Parameter, Texts
+from dbbstation.sources.laws.encoder import reading_without_noise_mm
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+REACH_MM = 0.1
+"""Way of the encoder for which its errors are stated [mm]."""
+
+
+class BarScale(LinearSource):
+    """The reading is off by the square of its way from the bar's nominal length.
+
+    The way is counted from the whole millimetre that a run's readings lie about. Where that is not the length at which the bar was
+    set, the square has a part in proportion and a constant besides. What is in proportion to the way is not asked for: kinematic
+    errors that are as much larger look the same, and what they leave of the readings is the readings' own noise, which such an
+    effect would follow. A machine whose circles deviate by a few micrometres does not show a bent scale either.
+    """
+
+    name = "bar-scale"
+    belongs_to = Owner.INSTRUMENT
+    needs = frozenset({Need.READING})
+    varies_with = "reading"
+    form_uncertainty = 0.1  # a scale is bent in more ways than a parabola
+    texts = Texts(
+        what="The encoder in the bar does not show the same millimetre everywhere: its error is curved along its way.",
+        shows="Readings far from the bar's nominal length are off, the same at the same reading wherever the circle is: the more, "
+        "the larger the circle's deviations are.",
+        confirm="Move the bar by tenths of a millimetre on both sides of its nominal length against a better length gauge.",
+        cure="Let the encoder be calibrated over its way, not in one point; measure with a bar whose readings stay near its nominal "
+        "length, as they do once the machine is calibrated.",
+        equation="reading = distance + b (x/r)², x: reading less its whole millimetre, r = 0.1 mm",
+        origin="calibration curve of a length encoder to second order",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """Its bow; a good gauge is straight to half a micrometre over a tenth of a millimetre."""
+        return (
+            Parameter(
+                "curved_um", "µm", 0.5, "error of the reading 0.1 mm away from the nominal length, on either side"
+            ),
+        )
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """By the bow.
+
+        Raises:
+            ModelError: the motion has no reading.
+        """
+        self.require(motion)
+        reading = reading_without_noise_mm(motion)
+        way = (reading - np.round(np.median(reading))) / REACH_MM
+        return Effect(reading_mm=MM_PER_UM * way[:, None] ** 2)

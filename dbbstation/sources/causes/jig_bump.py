@@ -1,0 +1,92 @@
+"""Error source: the jig plate was bumped once during the session."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.sources.contract import Effect, ErrorSource, Motion, Need, Owner, Parameter, Texts
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.machine.geometry import Machine
+
+MM_PER_UM = 1e-3
+
+MOST_RUNS = 120
+"""Runs of a session after which a bump is looked for."""
+
+
+class JigBump(ErrorSource):
+    """From one run of the session on, all balls on the table stand elsewhere, by the same shift.
+
+    A bump between two tests looks like balls that were put up badly from then on; many of them in one direction are less probable than one
+    bump. A bump between the directions of one test shows in that test at once.
+    """
+
+    name = "jig-bump"
+    belongs_to = Owner.SESSION
+    needs = frozenset({Need.TIME})
+    happens_once = True
+    form_uncertainty = 0.05  # the plate turns a little, too
+    texts = Texts(
+        what="Somebody or something knocked against jig plate or table: from one run on, all balls stand elsewhere.",
+        shows="Circles before a certain run and those after it differ by one shift, in all places alike.",
+        confirm="Repeat a test from before the bump: its centre has moved by the shift.",
+        cure="Clamp the plate better; repeat what was measured before or after it, whichever is less.",
+        equation="db = (x, y, z) from run n on, 0 before; runs of the session counted from 0",
+        origin="rigid shift of the jig plate",
+    )
+
+    def parameters(self, machine: Machine) -> tuple[Parameter, ...]:  # noqa: ARG002
+        """The shift, and the number of runs before it."""
+        return (
+            *(
+                Parameter(f"{axis}_um", "µm", 5.0, f"shift of all balls along {axis.upper()}, machine frame")
+                for axis in "xyz"
+            ),
+            Parameter(
+                "after_runs",
+                "runs",
+                1.0,
+                "runs of the session before the bump",
+                shape=tuple(float(k) for k in range(1, MOST_RUNS)),
+                listed=True,
+            ),
+        )
+
+    def shows(self, motions: Sequence[Motion], nonlinear: Sequence[float]) -> bool:
+        """Whether there are runs before and after it."""
+        after = [_number(motion) >= nonlinear[0] for motion in motions]
+        return any(after) and not all(after)
+
+    def effect(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """Shift of the ball.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        self.require(motion)
+        return Effect(fixed_ball_mm=MM_PER_UM * values[:3] * float(_number(motion) >= values[3]))
+
+    def derivative(self, motion: Motion, machine: Machine, values: NDArray[np.float64]) -> Effect:  # noqa: ARG002
+        """By the shift; the number of runs before it is none that a fit could move.
+
+        Raises:
+            ModelError: the motion has no time.
+        """
+        self.require(motion)
+        return Effect(fixed_ball_mm=MM_PER_UM * np.eye(3, 4) * float(_number(motion) >= values[3]))
+
+
+def _number(motion: Motion) -> int:
+    """Number of the run in its session, from 0; 0 where nothing is known of the session."""
+    if motion.setup is None or motion.time_s is None or not motion.setup.moving_s:
+        return 0
+    begins = [begin for begin, _ in motion.setup.moving_s]
+    middle_s = float(np.median(motion.time_s))
+    return max(int(np.searchsorted(begins, middle_s, side="right")) - 1, 0)

@@ -1,0 +1,32 @@
+"""The place of the bar's encoder: what the bar shows, without the noise in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from dbbstation.sources.contract import Motion
+
+WINDOWS = 40
+"""Stretches of a run over which its readings are a cubic: nine degrees of a circle."""
+
+CUBIC = 3
+
+
+def reading_without_noise_mm(motion: Motion) -> NDArray[np.float64]:
+    """What the bar showed, less most of its noise, shape (n,) [mm].
+
+    An error taken at readings with their noise in them resembles that noise, and would be found where there is none.
+    """
+    reading = np.array(motion.reading_mm, dtype=np.float64)
+    own = reading[motion.kept]
+    window = 2 * (len(own) // (2 * WINDOWS)) + 1
+    if motion.reading_is_measured and window > CUBIC:
+        from scipy.signal import savgol_filter  # noqa: PLC0415 - takes half a second; every command knows all sources
+
+        reading[motion.kept] = savgol_filter(own, window, CUBIC)
+    return reading

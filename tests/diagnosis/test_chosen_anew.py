@@ -1,0 +1,52 @@
+"""A name earns its place in tests that were held back; what happens once is said to have happened."""
+
+from __future__ import annotations
+
+import pytest
+
+from dbbstation.diagnosed import diagnose_sessions
+from dbbstation.diagnosis.findings import Verdict
+from tests.plant.mechanisms.disturbances import BarScale, BumpedJig
+from tests.plant.mechanisms.kinematics import RandomKinematics
+from tests.plant.session import record
+
+KINEMATICS = RandomKinematics(length_sd_mm=0.05, base_sd_mm=0.05)
+
+
+def diagnosed(folder, hidden, candidates, seed, rate_hz):
+    record(folder, seed=seed, mechanisms=[KINEMATICS, hidden], rate_hz=rate_hz)
+    return diagnose_sessions([folder], candidates, (), lambda _: None)
+
+
+@pytest.mark.slow
+def test_a_bent_scale_is_identified_and_what_resembles_it_does_not_predict(tmp_path):
+    found = diagnosed(tmp_path / "s", BarScale(curved_um=2.0), ("bar-scale", "joint-runout"), 1509, 10.0).diagnosis
+    scale = next(f for f in found.sources if f.name == "bar-scale")
+    assert scale.verdict is Verdict.IDENTIFIED
+    bow = scale.parameters["curved_um"]
+    assert bow.value == pytest.approx(2.0, abs=4.0 * bow.uncertainty)
+    assert bow.uncertainty < 0.5
+    assert len(scale.gains.parts) == 5
+    assert scale.gains.predicts
+    assert not found.chosen_anew.worse
+    alone = diagnose_sessions([tmp_path / "s"], ("joint-runout",), (), lambda _: None)
+    assert [f.verdict for f in alone.diagnosis.sources] != [Verdict.IDENTIFIED]
+
+
+@pytest.mark.slow
+def test_a_bump_happened(tmp_path):
+    """Between the two directions of a test, so that one mounting sees both sides of it."""
+    told = diagnosed(tmp_path / "s", BumpedJig(from_run=15), None, 1510, 25.0)
+    bump = next(f for f in told.diagnosis.sources if f.name == "jig-bump")
+    assert bump.verdict is Verdict.HAPPENED
+    for name, true in (("x_um", 2.33), ("y_um", -6.43)):
+        value = bump.parameters[name]
+        assert value.value == pytest.approx(true, abs=4.0 * value.uncertainty)
+        assert value.uncertainty < 1.0
+    assert bump.parameters["after_runs"].value == pytest.approx(15.0, abs=0.1)
+    others = [f for f in told.diagnosis.sources if f.name != "jig-bump"]
+    assert all(f.verdict not in {Verdict.IDENTIFIED, Verdict.HAPPENED} for f in others)
+    summary = told.summary()
+    assert summary["held_out"] == "tested"
+    (entry,) = (s for s in summary["sources"] if s["name"] == "jig-bump")
+    assert (entry["verdict"], entry["acts"]) == ("happened", "once")

@@ -103,7 +103,7 @@ STAGES = {"speed and acceleration": 0, "sets of causes": 2, "look": 5, "held-out
 
 
 def _print(summary: Mapping[str, Any]) -> None:
-    _print_if_worse(summary["held_out"])
+    _print_if_worse(summary["held_out_rms_n"])
     if summary["mismatch"]:
         echo(
             f"Mass and viscous friction leave {summary['misfit_rms_n']:.3g} N rms beyond noise "
@@ -149,12 +149,12 @@ def _print(summary: Mapping[str, Any]) -> None:
     echo(f"band up to {signals['cutoff_hz']:.3g} Hz, {signals['samples_compared']} samples compared")
 
 
-def _print_if_worse(held: Mapping[str, Any] | str) -> None:
+def _print_if_worse(held: Mapping[str, Any] | None) -> None:
     """Say first of all that the model does not predict, where it does not."""
-    if not isinstance(held, str) and held["worse"]:
+    if held and held["worse"]:
         echo(
-            f"Everything found predicts held-out parts worse than mass and friction alone: {held['corrected_rms_n']:.3g} N rms against "
-            f"{held['reference_rms_n']:.3g} N. Nothing is identified."
+            f"Everything found predicts held-out parts worse than mass and friction alone: {held['corrected']:.3g} N rms against "
+            f"{held['reference']:.3g} N. Nothing is identified."
         )
 
 

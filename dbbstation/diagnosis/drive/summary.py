@@ -84,7 +84,8 @@ def drive_summary(diagnosis: DriveDiagnosis) -> dict[str, Any]:
             "locations": [_location(location, rest.variable or "") for location in diagnosis.rest_locations],
         },
         "cannot_tell": list(diagnosis.cannot_tell),
-        "held_out": _held_out(diagnosis.held_out),
+        "held_out": "not-tested" if diagnosis.held_out is None else "tested",
+        "held_out_rms_n": _held_out(diagnosis.held_out),
         "signals": {
             "recordings": len(recordings.signals),
             "samples": sum(len(one.t_s) for one in recordings.signals),
@@ -176,23 +177,19 @@ def _source(finding: DriveFinding) -> dict[str, Any]:
             "force_n": _values({"force_n": finding.complement.force_n})["force_n"],
             "t_s": [list(stretch) for stretch in finding.complement.t_s],
         },
-        "held_out": NOT_TESTED
+        "gains": None
         if finding.gains is None
         else {"with_gain": finding.gains.with_gain, "predicts": finding.gains.predicts},
         "text": finding.text,
     }
 
 
-NOT_TESTED = "not-tested"
-"""Held-out parts were not asked for."""
-
-
-def _held_out(held: HeldOut | None) -> dict[str, Any] | str:
+def _held_out(held: HeldOut | None) -> dict[str, Any] | None:
     if held is None:
-        return NOT_TESTED
+        return None
     return {
         "parts": held.parts,
-        "reference_rms_n": held.reference_n,
-        "corrected_rms_n": held.corrected_n,
+        "reference": held.reference_n,
+        "corrected": held.corrected_n,
         "worse": held.is_worse,
     }

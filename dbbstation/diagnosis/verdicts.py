@@ -175,11 +175,14 @@ class _Judge:
         return self._anew.gains(self._classes[name])
 
     def _sigmas_of(self, name: str) -> float:
-        """By how many standard deviations the norm of an effect beside the base is out; 0 for what the hypothesis has not."""
+        """By how many standard deviations the norm of an effect beside the base is out; 0 for what the hypothesis has not.
+
+        What the formula is off by is part of the effect: how much of it belongs to the amplitude need not be known.
+        """
         member = next((m for m in self._settled.members if m.cause.name == name), None)
         if member is None:
             return 0.0
-        columns, comparison = member.variant.columns, self._settled.comparison
+        columns, comparison = member.columns, self._settled.comparison
         found = comparison.estimates([member, *self._best.without(name)])
         own = len(columns)
         return norm_over_sigma(comparison.beside((), columns), found.values[:own], found.covariance[:own, :own])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.inference.alternatives import EVEN, Alternatives, standing_out
+from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigma, standing_out
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.named_values import named_values, with_jackknife
 from dbbstation.inference.patterns import Family
@@ -362,12 +362,7 @@ class _Judge:
 
     def _sigmas(self, member: Member, values: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
         """By how many standard deviations the norm of an effect beside the base is out."""
-        products = self._settled.comparison.beside((), member.columns)
-        norm = float(np.sqrt(np.maximum(values @ products @ values, 0.0)))
-        if norm == 0.0:
-            return 0.0
-        slope = products @ values / norm
-        return norm / float(np.sqrt(np.maximum(slope @ covariance @ slope, 1e-300)))
+        return norm_over_sigma(self._settled.comparison.beside((), member.columns), values, covariance)
 
     def _concealed(self, effect: NDArray[np.float64]) -> tuple[float, float, float]:
         """Root mean square of an effect about its mean, that of what the base leaves of it, and the share that this takes up."""

@@ -27,7 +27,8 @@ def predicted(explained: Explained) -> tuple[HeldOut, HeldOut]:
     channel, settled = explained.channel, explained.settled
     noise_mm = max(settled.noise_mm, SMALLEST_NOISE_MM)
     single = max(_single_noise_mm(channel.observations, noise_mm, fine_noise_mm(settled.after)), SMALLEST_NOISE_MM)
-    groups = groups_of(channel.observations)
+    tests = tests_of(channel.observations)
+    groups = [test % min(FOLDS, max(tests) + 1) for test in tests]
     variants = [member.variant for member in settled.members]
     known = channel.known_with(variants)
     blocks = channel.blocks(channel.columns_of(variants), channel.target(settled.after))
@@ -53,7 +54,7 @@ def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
     columns, causes = renumbered([cause for cause in settled.causes if cause.name in wanted])
     return selection_frequency(
         channel.blocks(columns, channel.target(settled.after)),
-        _tests_of(channel.observations),
+        tests_of(channel.observations),
         channel.base,
         channel.held,
         causes,
@@ -62,13 +63,7 @@ def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
     )
 
 
-def groups_of(observations: Sequence[Observation]) -> list[int]:
-    """Group of each run, in which its test is left out together with every fifth other one."""
-    tests = _tests_of(observations)
-    return [test % min(FOLDS, max(tests) + 1) for test in tests]
-
-
-def _tests_of(observations: Sequence[Observation]) -> list[int]:
+def tests_of(observations: Sequence[Observation]) -> list[int]:
     """Number of the test of each run, counted in the order of recording."""
     order = {name: k for k, name in enumerate(dict.fromkeys(o.test for o in observations))}
     return [order[o.test] for o in observations]

@@ -8,7 +8,6 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.compare.summary import comparison_summary
 from dbbstation.diagnosis.diagnose import usable_sources
@@ -17,8 +16,9 @@ from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.diagnosis.drive.summary import drive_summary
 from dbbstation.files.recordings.drive_csv import read_drive
 from dbbstation.processes import each
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.load import load_sessions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence

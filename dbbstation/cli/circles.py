@@ -58,7 +58,6 @@ def circles(
       dbbstation circles session --test a --budget --json
       dbbstation circles session --test a --quick-look
     """
-    from dbbstation.circled import circled_summary, load_circles, quick_looks
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
@@ -66,6 +65,8 @@ def circles(
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.table_csv import table_csv
+    from dbbstation.results.circles import circled_summary, quick_looks
+    from dbbstation.tasks.circles import load_circles
 
     if model is not None and not findings:
         raise click.UsageError("--model says where circles are expected: give --findings too")

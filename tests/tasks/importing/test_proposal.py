@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.imported.proposal import Proposed, proposed, stated
+from dbbstation.tasks.importing.proposal import Proposed, proposed, stated
 
 
 @pytest.mark.parametrize(

@@ -216,7 +216,7 @@ def _processes_for(sessions: Sequence[Path]) -> int:
 
 def _session_data(path: Path) -> dict[str, Any] | str:
     """Return what is kept of a session, or why it cannot be read."""
-    from dbbstation.session_figures import session_figures  # noqa: PLC0415 - whoever opens an index does not wait for the compiler
+    from dbbstation.tasks.session_figures import session_figures  # noqa: PLC0415 - whoever opens an index does not wait for the compiler
 
     try:
         data = asdict(session_figures(path.parent))
@@ -228,7 +228,7 @@ def _session_data(path: Path) -> dict[str, Any] | str:
 
 def _model_data(path: Path, source_files: Sequence[Path]) -> dict[str, Any] | str:
     """Return what is kept of a model, or why it cannot be read."""
-    from dbbstation.session_figures import model_figures  # noqa: PLC0415 - the same
+    from dbbstation.tasks.session_figures import model_figures  # noqa: PLC0415 - the same
 
     try:
         return asdict(model_figures(path, source_files))

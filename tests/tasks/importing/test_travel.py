@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dbbstation.files.formats.mapping import AngleSchema
-from dbbstation.imported.travel import UnusableTravelError, machine_angles, travel
 from dbbstation.plan.circle import Circle, Direction
+from dbbstation.tasks.importing.travel import UnusableTravelError, machine_angles, travel
 
 
 def circle(direction=Direction.CCW, start_deg=30.0):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem, StationError
@@ -13,14 +16,15 @@ from dbbstation.machine.difference import differences, in_words
 from dbbstation.model.observation import Observation
 from dbbstation.nc.commanded import commanded_poses
 from dbbstation.sources.contract import Thermometer
+from dbbstation.tasks.telling import Telling, never, silent
 from dbbstation.trace.cut import cut
 from dbbstation.trace.thermometers import logged_curve
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
     from dbbstation.machine.geometry import Machine
+    from dbbstation.tasks.telling import Progress
     from dbbstation.trace.circle import RawCircle
     from dbbstation.trace.recording import Recording
 
@@ -40,6 +44,70 @@ class Recorded:
     observations: tuple[Observation, ...]
     sessions: Mapping[str, str]
     warnings: tuple[str, ...]
+
+
+Sessions = str | PathLike[str] | Iterable[str | PathLike[str]]
+"""One session or several: folders or session files."""
+
+READING = "reading runs"
+"""Stage of a task that reads sessions."""
+
+
+def load(
+    sessions: Sessions,
+    *,
+    tests: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
+) -> Recorded:
+    """Read sessions of one machine: their accepted runs, cut to circles, with what was commanded.
+
+    Args:
+        sessions: session folders or session files.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        progress: told how far it is.
+        stop: asked after each run whether to stop.
+        say: told what is noticed in the files.
+
+    Raises:
+        InputError: every fault of every file and trace; as `load_sessions`.
+        StoppedError: `stop` returned True.
+    """
+    return loaded(sessions, tests, exclude, Telling(progress, stop, say))
+
+
+def loaded(sessions: Sessions | Recorded, tests: Sequence[str], exclude: Sequence[str], telling: Telling) -> Recorded:
+    """Return sessions, read where they are not yet; of those that are, the tests that were chosen.
+
+    Args:
+        sessions: paths, or what `load` returned.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        telling: told how far it is and what was noticed.
+
+    Raises:
+        InputError: as `load_sessions`; no run of loaded sessions is left.
+    """
+    if not isinstance(sessions, Recorded):
+        found = load_sessions(paths_of(sessions), exclude, telling.counted(READING), tests)
+        telling.note(*found.warnings)
+        return found
+    if not tests and not exclude:
+        return sessions
+    left = [o for o in sessions.observations if (not tests or o.test in tests) and o.test not in exclude]
+    unknown = [name for name in (*tests, *exclude) if name not in {o.test for o in sessions.observations}]
+    if unknown or not left:
+        what = f"no session has a test {', '.join(unknown)}" if unknown else "no accepted run is left"
+        raise InputError([Problem(", ".join(sessions.sessions), 0, 0, what, "name others")])
+    return replace(sessions, observations=tuple(left))
+
+
+def paths_of(sessions: Sessions) -> list[Path]:
+    """Return sessions as paths."""
+    return [Path(sessions)] if isinstance(sessions, str | PathLike) else [Path(one) for one in sessions]
 
 
 def load_sessions(

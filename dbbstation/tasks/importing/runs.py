@@ -29,7 +29,8 @@ from dbbstation.files.formats.mapping import (
 from dbbstation.files.recordings.entries import RunState, count_in
 from dbbstation.files.recordings.new_session import FinishedRun
 from dbbstation.files.recordings.table_csv import MOST_FAULTS
-from dbbstation.imported.travel import (
+from dbbstation.plan.circle import Circle, Direction
+from dbbstation.tasks.importing.travel import (
     UnusableTravelError,
     check_span,
     machine_angles,
@@ -37,7 +38,6 @@ from dbbstation.imported.travel import (
     travel,
     unplanned_span_deg,
 )
-from dbbstation.plan.circle import Circle, Direction
 from dbbstation.trace import columns
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from dbbstation.circled import load_circles
 from dbbstation.circles.budget import budgets
 from dbbstation.circles.quantity import Quantity
 from dbbstation.files.formats.model import read_model
@@ -19,18 +18,19 @@ from dbbstation.files.recordings.anchors import anchor_of
 from dbbstation.history.order import moment_words
 from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
 from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.results.tolerances import TOLERATED, tolerated_circles
 from dbbstation.sources.contract import Owner
-from dbbstation.tolerated import TOLERATED, tolerated_circles
+from dbbstation.tasks.circles import load_circles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from dbbstation.circled import MeasuredCircle
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.plan.circle import Circle
-    from dbbstation.tolerated import ToleratedCircle
+    from dbbstation.results.circles import MeasuredCircle
+    from dbbstation.results.tolerances import ToleratedCircle
 
 
 def session_figures(folder: Path) -> SessionFigures:

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.plan import InlinePlan
     from dbbstation.files.provenance import Provenance
     from dbbstation.files.recordings.session_details import SessionDetails
-    from dbbstation.imported.runs import ImportedRun
     from dbbstation.machine.geometry import Machine
+    from dbbstation.tasks.importing.runs import ImportedRun
 
 IMPORTED = "imported"
 """Folder in the session with the files as they came, the mapping, and what the import was."""

@@ -18,10 +18,10 @@ from dbbstation.quality.conformity import Conformity, Size, conformity
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from dbbstation.circled import MeasuredCircle
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.circles.budget import Budget, SetUpKnowledge
     from dbbstation.plan.tolerance import Tolerance
+    from dbbstation.results.circles import MeasuredCircle
 
 
 @dataclass(frozen=True)

@@ -69,13 +69,14 @@ def diagnose(
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source
-    from dbbstation.tasks.diagnose import STAGES, diagnose_recordings
+    from dbbstation.tasks.diagnose import STAGES
+    from dbbstation.tasks.diagnose import diagnose as diagnosed
 
     if keep_unexplained and out is None:
         raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
     refuse_outputs((out, figure), force=force)
     with stage_bar("diagnosis", STAGES) as progress:
-        result = diagnose_recordings(
+        result = diagnosed(
             sessions,
             sources=names_in(sources or None),
             tests=tests,

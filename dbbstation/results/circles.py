@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any
 
 from dbbstation.circles.analysis import EDITION
 from dbbstation.circles.budget import budgets, pair_budgets
@@ -11,6 +12,8 @@ from dbbstation.circles.quick_look import quick_look
 from dbbstation.circles.summary import circle_summary, pair_summary, quick_look_summary
 from dbbstation.quality.limits import FALSE_ALARMS_PER_RUN
 from dbbstation.quality.summary import findings_summary
+from dbbstation.results.frame import Framed
+from dbbstation.results.serialise import Absent, AsItIs, Kept
 
 if TYPE_CHECKING:
     from dbbstation.circles.analysis import CircleAnalysis, PairAnalysis
@@ -72,6 +75,52 @@ class Circled:
     pairs: tuple[MeasuredPair, ...]
     warnings: tuple[str, ...]
     sessions: tuple[SessionFolder, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CirclesResult(Framed):
+    """Figures of measured circles after ISO 230-4, as `circles --json` prints them.
+
+    Attributes:
+        edition: of the standard.
+        filter: of G, F and H, in words.
+        reference_circle: about which each figure is taken.
+        false_alarms_per_run: that the limits of findings are made for.
+        runs: figures of each circle with their budgets, by key as docs/circles.md has them; lengths in µm.
+        pairs: the same of both directions together.
+        quick_look: signatures of serial axes; None where they were not asked for.
+        circles: the circles themselves, with their analyses.
+    """
+
+    edition: str
+    filter: str
+    reference_circle: Mapping[str, str]
+    false_alarms_per_run: float
+    runs: tuple[Mapping[str, Any], ...]
+    pairs: tuple[Mapping[str, Any], ...]
+    quick_look: Annotated[tuple[Mapping[str, Any], ...] | None, Absent] = None
+    circles: Annotated[Circled, AsItIs, Kept] = field(repr=False)
+
+    def rows(self) -> list[dict[str, object]]:
+        """Every number of every circle, one row for each."""
+        return [_flattened(run) for run in self.runs]
+
+
+def circles_result(found: Circled, chosen: Filter, *, quick_look: bool = False) -> CirclesResult:
+    """Return the figures of circles.
+
+    Args:
+        found: the circles.
+        chosen: filter that they were worked out with.
+        quick_look: look for signatures of serial axes.
+    """
+    numbers = circled_summary(found, chosen)
+    return CirclesResult(
+        **{**numbers, "runs": tuple(numbers["runs"]), "pairs": tuple(numbers["pairs"])},
+        quick_look=tuple(quick_looks(found)) if quick_look else None,
+        circles=found,
+        notes=found.warnings,
+    )
 
 
 def circled_summary(found: Circled, chosen: Filter) -> dict[str, Any]:
@@ -139,3 +188,29 @@ def quick_looks(found: Circled) -> list[dict[str, Any]]:
             }
         )
     return looks
+
+
+def _flattened(run: Mapping[str, Any]) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for key, value in run.items():
+        match value:
+            case str() | int() | float():
+                found[key] = value
+            case {"max": _, "min": _} | {"x": _, "y": _}:
+                found |= {f"{key.removesuffix('_um')}_{part}_um": number for part, number in value.items()}
+            case _:
+                pass
+    for harmonic in run.get("harmonics", ()):
+        found[f"harmonic_{harmonic['undulations']}_um"] = harmonic["amplitude_um"]
+    for step in run.get("reversal_steps", ()):
+        found[f"step_at_{step['theta_deg']:.0f}_deg_um"] = step["height_um"]
+    if run.get("closure"):
+        found["closure_um"] = run["closure"]["height_um"]
+    if run.get("noise_um"):
+        found["noise_um"] = run["noise_um"]["of_a_reading"] or ""
+    for figure, budget in run.get("uncertainty", {}).items():
+        plain = figure.lower().replace("(", "_").replace(")", "").replace(" ", "_")
+        found[f"u_{plain}_um"] = "" if budget["u_um"] is None else budget["u_um"]
+    for finding in run.get("findings", ()):
+        found[f"finding_{finding['name'].replace(' ', '_')}"] = finding["verdict"]
+    return found

@@ -15,6 +15,7 @@ from dbbstation.results.serialise import Absent, AsItIs, Kept
 
 if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.model.machine_model import MachineModel
 
 NAMES = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
 
@@ -89,14 +90,22 @@ def prediction_result(
         **{**figures, "common_shift_um": tuple(figures["common_shift_um"])},
         uncertainty_not_known_because=identified.why_unknown if unknown else None,
         directions_lost=tuple(identified.directions_lost),
-        unknown_causes=unknown_causes(identified),
+        unknown_causes=unknown_causes(identified.model),
         commanded=commanded,
         actual=actual,
         uncertainty_mm=uncertainty_mm,
     )
 
 
-def unknown_causes(identified: IdentifiedModel) -> tuple[str, ...]:
+def unknown_cause_notes(model: MachineModel) -> list[str]:
+    """Say of a model that keeps an error that its cause is unknown."""
+    return [
+        f"the model has {name}, an error whose cause is unknown; it holds where it was measured, while it lasts"
+        for name in unknown_causes(model)
+    ]
+
+
+def unknown_causes(model: MachineModel) -> tuple[str, ...]:
     """Names of the sources of a model that describe an error without a cause."""
-    own = identified.model.of_the_machine().sources
+    own = model.of_the_machine().sources
     return tuple(fitted.source.name for fitted in own if not fitted.source.candidate and fitted.values.any())

@@ -9,24 +9,76 @@ import numpy as np
 
 from dbbstation.circles.analysis import analyse, analyse_pair
 from dbbstation.circles.budget import SetUpKnowledge
+from dbbstation.circles.path import Filter
 from dbbstation.errors import InputError, Problem, TraceError
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.judged import judge_session
 from dbbstation.files.recordings.session import SessionFolder, read_session
-from dbbstation.results.circles import Circled, MeasuredCircle, MeasuredPair
-from dbbstation.tasks.load import check_named
+from dbbstation.results.circles import Circled, CirclesResult, MeasuredCircle, MeasuredPair, circles_result
+from dbbstation.tasks.load import check_named, paths_of
+from dbbstation.tasks.models import model_of
+from dbbstation.tasks.telling import Telling, never, silent
 from dbbstation.trace.cut import cut
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from dbbstation.circles.path import Filter
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.bar import Bar
     from dbbstation.quality.judge import Judgement
+    from dbbstation.tasks.load import Sessions
+    from dbbstation.tasks.models import Model
+    from dbbstation.tasks.telling import Progress
     from dbbstation.trace.recording import Recording
+
+
+def circle_figures(
+    sessions: Sessions,
+    *,
+    undulations: int = 0,
+    tests: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    findings: bool = False,
+    quick_look: bool = False,
+    model: Model | None = None,
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
+) -> CirclesResult:
+    """Work out the figures of measured circles, in the words of ISO 230-4:2005; no model is needed.
+
+    Args:
+        sessions: session folders or session files.
+        undulations: cut-off of the filter of G, F and H: 15, 30, 50 or 150 undulations per revolution; 0: none.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        findings: judge every run too.
+        quick_look: look for signatures of serial axes.
+        model: says where findings expect circles; None: the nominal machine.
+        progress: told how far it is.
+        stop: asked after each run whether to stop.
+        say: told what is noticed.
+
+    Raises:
+        InputError: every fault of every file; no accepted run; a test that is named and that no session has.
+        StoppedError: `stop` returned True.
+        ValueError: there is no such filter.
+    """
+    telling = Telling(progress, stop, say)
+    chosen = Filter(undulations)
+    found = load_circles(
+        paths_of(sessions),
+        chosen,
+        tests,
+        exclude,
+        findings=findings,
+        model=None if model is None else model_of(model),
+        progress=telling.counted("circles"),
+    )
+    telling.note(*found.warnings)
+    return circles_result(found, chosen, quick_look=quick_look)
 
 
 def load_circles(

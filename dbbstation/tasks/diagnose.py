@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from dbbstation.calibration.fit.calibrate import default_sources
 from dbbstation.calibration.reporting.evaluation import evaluate
 from dbbstation.calibration.reporting.identified import identified_model
-from dbbstation.diagnosis.diagnose import diagnose, usable_sources
+from dbbstation.diagnosis import diagnose as search
+from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.diagnosis.unexplained_model import keep_unexplained as keeping
 from dbbstation.errors import ModelError
 from dbbstation.files.own_sources import every_source
@@ -109,7 +110,7 @@ def _staged(progress: Callable[[str], None], reading: Callable[[int, int], None]
     return tell
 
 
-def diagnose_recordings(
+def diagnose(
     sessions: Sessions | Recorded,
     *,
     sources: Sequence[str] | None = None,
@@ -175,7 +176,7 @@ def _diagnosed(
             raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
     recorded = loaded(sessions, *chosen, telling)
     usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
-    found = diagnose(recorded.machine, recorded.observations, usable, telling.stage)
+    found = search.diagnose(recorded.machine, recorded.observations, usable, telling.stage)
     return Diagnosed(recorded, found, lacking)
 
 

@@ -25,6 +25,7 @@ from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN
 from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.by_temperature import not_given
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -42,6 +43,7 @@ RIVALS = 6
 """Named causes of the greatest evidence that compete in each draw of a part of the tests."""
 
 
+@with_one_thread
 def diagnose(
     machine: Machine,
     observations: Sequence[Observation],

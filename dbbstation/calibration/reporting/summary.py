@@ -18,6 +18,7 @@ from dbbstation.calibration.reporting.evaluation import Evaluation, RunFigures, 
 from dbbstation.model.identified import IdentifiedModel, known_u
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Owner
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,6 +43,7 @@ def evaluation_summary(evaluation: Evaluation) -> dict[str, Any]:
     }
 
 
+@with_one_thread
 def calibration_summary(
     calibration: Calibration, evaluation: Evaluation, outliers: Sequence[Outlier] = ()
 ) -> dict[str, Any]:

@@ -30,7 +30,7 @@ from dbbstation.threads import with_one_thread
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.diagnosis.explain import Explained, Settled
+    from dbbstation.diagnosis.explained import Explained, Settled
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.remainder import Remainder

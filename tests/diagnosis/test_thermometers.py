@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from dbbstation.diagnosed import diagnose_sessions
 from dbbstation.diagnosis.findings import Verdict
+from dbbstation.tasks.diagnose import diagnose_sessions
 from tests.plant.mechanisms.bar import BarDrift
 from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.kinematics import RandomKinematics

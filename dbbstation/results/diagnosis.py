@@ -123,6 +123,7 @@ class CauseResult:
         equivalent: causes that these recordings cannot tell apart from it; `class` in JSON.
         log_evidence: the gain, under its older name.
         acts: `always` or `once`.
+        persists: it happened once, and held-out tests tell of it, too.
         sigmas: standard deviations out.
         gains: in tests that were held back; None where none were.
         parameters: with their uncertainties.
@@ -141,6 +142,7 @@ class CauseResult:
     equivalent: Annotated[tuple[str, ...], Field(serialization_alias="class")] = ()
     log_evidence: float | None = None
     acts: str | None = None
+    persists: bool = False
     sigmas: float | None = None
     gains: HeldOutGains | None = None
     parameters: Mapping[str, Quantified] = field(default_factory=dict)

@@ -34,6 +34,7 @@ from dbbstation.results.of_currents import currents_result
 from dbbstation.results.of_evaluation import evaluated_runs
 from dbbstation.results.serialise import Quantified, plain
 from dbbstation.sources.contract import Owner
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -53,6 +54,7 @@ ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lo
 """Parts of a result that the model file holds in places of their own."""
 
 
+@with_one_thread
 def calibration_figures(
     calibration: Calibration, evaluation: Evaluation, outliers: Sequence[Outlier] = ()
 ) -> CalibrationFigures:

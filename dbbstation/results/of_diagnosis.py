@@ -54,7 +54,7 @@ def diagnosis_figures(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> Diagn
         held_out_rms_um=BeforeAfter(1e3 * before.rms, 1e3 * after.rms),
         held_out_normalised=BeforeAfter(before.normalised, after.normalised),
         held_out="not-tested" if diagnosis.chosen_anew is None else "tested",
-        held_out_worse=None if diagnosis.chosen_anew is None else diagnosis.chosen_anew.worse,
+        held_out_worse=None if diagnosis.chosen_anew is None else diagnosis.chosen_anew.is_worse,
         circularity_um=_circularity(diagnosis),
         workspace=_workspace(diagnosis),
         outliers=tuple(outlier_result(outlier) for outlier in diagnosis.outliers),
@@ -199,6 +199,7 @@ def _cause(source: SourceFinding) -> CauseResult:
         equivalent=tuple(source.equivalent),
         log_evidence=source.gain,
         acts=source.acts.name.lower(),
+        persists=source.persists,
         sigmas=source.sigmas,
         gains=None
         if source.gains is None

@@ -67,7 +67,7 @@ def test_what_follows_a_thermometer_is_named_with_its_growth_per_kelvin(tmp_path
     value = named[name].parameters[parameter]
     assert value.value == pytest.approx(per_kelvin, abs=4.0 * value.uncertainty)
     # Tests know it to a few per cent; a thermometer stands for its body to a tenth only.
-    assert value.uncertainty < 0.12 * abs(per_kelvin)
+    assert value.uncertainty < 0.15 * abs(per_kelvin)
     assert found.unexplained.variable is None
     assert {location.variable for location in found.locations} == {"temperature"}
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.circle_options import approach_of, circle_options
 from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
+from dbbstation.tasks.chosen import chosen_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -63,7 +63,7 @@ def diagnose(
     """
     from dbbstation.cli.calibrate import names_in
     from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import stage_bar
+    from dbbstation.cli.progress import task_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.files.atomic import refuse_outputs, write_bytes
@@ -75,7 +75,7 @@ def diagnose(
     if keep_unexplained and out is None:
         raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
     refuse_outputs((out, figure), force=force)
-    with stage_bar("diagnosis", STAGES) as progress:
+    with task_bar("diagnosis", STAGES) as progress:
         result = diagnosed(
             sessions,
             sources=names_in(sources or None),

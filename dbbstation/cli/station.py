@@ -117,6 +117,7 @@ def station(
     from dbbstation.cli.measure_talk import Log
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
+    from dbbstation.files.recordings.entries import ReadBy
     from dbbstation.files.shipped import shipped_folder
     from dbbstation.service.held_line import HeldLine
     from dbbstation.service.opening import opener
@@ -144,6 +145,9 @@ def station(
             rate_hz=protocol.fastest_hz(baud),
             range_mm=protocol.length.range_mm,
             model=judging_model(model_file, source_files),
+            instrument=ReadBy(
+                protocol.name, profile or "", _virtual_port(time_scale) if virtual else str(port), virtual
+            ),
         )
         job.check(str(plan_file))
         if not virtual:
@@ -188,6 +192,12 @@ def _check_options(
         raise click.UsageError(f"missing {', '.join(missing)}; or --virtual, to try it without hardware")
     if not virtual and time_scale != 1.0:
         raise click.UsageError("--time-scale goes with --virtual: real machines take their time")
+
+
+def _virtual_port(time_scale: float) -> str:
+    """What stands where a real session has the name of a port."""
+    usual = "virtual machine"
+    return usual if time_scale == 1.0 else f"{usual}, {time_scale:g} times faster"
 
 
 def _check_terminal() -> None:

@@ -20,6 +20,7 @@ from dbbstation.service.memory import VIRTUAL, Line, Memory
 from dbbstation.service.opening import opener
 from dbbstation.service.port_probe import Answer, ports, probe
 from dbbstation.service.runner import Runner
+from dbbstation.service.session_line import line_to_go_on
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.shop_temperature import note_temperature
 from dbbstation.service.virtual_place import virtual_place
@@ -109,7 +110,8 @@ class Front:
 
     def goes_on_with(self, folder: Path) -> Choice:
         """Return the choice to go on with a session: plan and machine lie in its folder, the instrument is remembered."""
-        return Choice(folder, line=self._with_given(self.memory.read().line_of(folder)))
+        line = self.memory.read().line_of(folder)
+        return Choice(folder, line=line_to_go_on(folder, line, self._with_given(line)))
 
     def new_folder(self, name: str = "session") -> Path:
         """Return a folder for a new session that is not there yet."""

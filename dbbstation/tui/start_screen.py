@@ -155,6 +155,7 @@ def _row(line: SessionLine) -> Content:
     else:
         state = texts.START_RUNS.format(accepted=line.accepted, planned=line.planned)
         state += texts.START_LEFT.format(time=duration(line.left_s)) if line.left_s else ""
+    state = f"{texts.VIRTUAL_WORD}, {state}" if line.virtual else state
     state += texts.START_UNJUDGED.format(count=line.unjudged) if line.unjudged else ""
     sign = "✓" if line.complete else "▶"
     return Content.assemble(f"{sign} {name} {when}  ", (state, "bold"))

@@ -36,6 +36,7 @@ STORED = {
     "dbb-session/3": FIXTURES / "sessions" / "sealed",
     "dbb-session/4": FIXTURES / "sessions" / "begun",
     "dbb-session/5": FIXTURES / "sessions" / "logged",
+    "dbb-session/6": FIXTURES / "sessions" / "virtual",
 }
 """One stored file of each version."""
 

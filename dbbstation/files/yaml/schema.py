@@ -62,6 +62,7 @@ SINCE: dict[str, dict[str, int]] = {
         "notes": 3,
         "job": 4,
         "log": 5,
+        "instrument": 6,
         **dict.fromkeys(_OF_BARS, 3),
     },
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},

@@ -225,7 +225,7 @@ class Board:
                 self._begin(event.run)
                 self._trace(event.run, event.samples)
             case events.RunAccepted():
-                self._judge(event.run, Verdict.ACCEPTED)
+                self._judge(event.run, Verdict.ACCEPTED, event.reason)
             case events.RunRejected():
                 self._judge(event.run, Verdict.REJECTED, event.reason)
             case events.SessionFinished():

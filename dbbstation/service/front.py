@@ -13,6 +13,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
 from dbbstation.service.after import JOINT, KINEMATIC, After
 from dbbstation.service.bar_calibration import BarCalibration, Stated
+from dbbstation.service.bar_stated import fault_of
 from dbbstation.service.candidates import Kind, candidates
 from dbbstation.service.choice import Choice, Limits, Part, Prepared, prepare
 from dbbstation.service.held_line import HeldLine, HeldOpen
@@ -226,6 +227,18 @@ class Front:
         """
         numbers = {name: _number(values, name) for name in ("calibrator_mm", "calibrator_u_um", "temp_c")}
         return Stated(values["serial_number"], values["calibrator"], certified=values["certified"], **numbers)
+
+    def fault_of_stated(self, name: str, text: str, line: Line, reads_mm: float | None) -> str:
+        """Return what is wrong with a text that was typed of bar or calibrator; empty where nothing is.
+
+        Args:
+            name: of the value, as the names of `Stated`.
+            text: as typed.
+            line: instrument; one that shows what it was told says nothing of the calibrator's length.
+            reads_mm: what it reads now [mm]; None: nothing.
+        """
+        length = load_instrument(line.instrument, line.profile or None).length
+        return fault_of(name, text, None if length.relative else reads_mm, length.stroke_mm)
 
     def off_calibrator_um(self, length_mm: float, values: Mapping[str, str]) -> float | None:
         """Return how much longer a reading is than the calibrator [µm]; None where its length is not stated yet."""

@@ -82,7 +82,7 @@ class Storage:
                 self._writer.finish_run(self._journal, counts)
                 self._journal = None
             case events.RunAccepted():
-                self._writer.judge(self._entry(event.run), accepted=True)
+                self._writer.judge(self._entry(event.run), accepted=True, reason=event.reason)
             case events.RunRejected():
                 self._writer.judge(self._entry(event.run), accepted=False, reason=event.reason)
             case events.Noted():

@@ -18,9 +18,10 @@ from dbbstation.service.board import Board
 from dbbstation.service.last_session import last_traces
 from dbbstation.service.messages import Message, Weight
 from dbbstation.service.shop_temperature import note_temperature, shop_degc
-from dbbstation.station.commands import Command, Note, Quit
+from dbbstation.service.verdicts import give_verdict
+from dbbstation.station.commands import Command, Judge, Note, Quit
 from dbbstation.station.events import Noted
-from dbbstation.station.states import FINAL, RECORDING, VERDICT
+from dbbstation.station.states import FINAL, RECORDING, VERDICT, State
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
 from dbbstation.tui.controls import show_controls
 from dbbstation.tui.explained import ExplainedScreen
@@ -28,6 +29,7 @@ from dbbstation.tui.help_screen import HelpScreen
 from dbbstation.tui.help_texts import HELP
 from dbbstation.tui.large_screen import LargeScreen
 from dbbstation.tui.measure_screen import MeasureScreen
+from dbbstation.tui.messages_screen import MessagesScreen
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import GiveUpQuestion
 from dbbstation.tui.results_screen import ResultsScreen
@@ -106,6 +108,7 @@ class StationApp(App[None]):
         ("o", "overview", "Tests"),
         ("f", "large", "Large"),
         ("c", "connect", "Connect again"),
+        Binding("j", "messages", "Messages", show=False),
         # The sentence at the end of the plan names it; until then the footer has no room.
         Binding("e", "results", "Results", show=False),
         Binding("t", "temperature", "Temperature", show=False),
@@ -269,6 +272,10 @@ class StationApp(App[None]):
 
     def show_results(self, folder: Path) -> None:
         """Show what can be done with a session that is measured; what was done before still stands there."""
+        known = self._after.get(folder)
+        if known is not None and known.busy is None and known.outdated:
+            known.close()
+            del self._after[folder]
         if folder not in self._after:
             self._after[folder] = After(folder) if self._front is None else self._front.after(folder)
         self.push_screen(ResultsScreen(self._after[folder]))
@@ -285,9 +292,29 @@ class StationApp(App[None]):
             drawn.draw()
 
     def send(self, command: Command) -> None:
-        """Pass a command on to the sequence."""
-        if self._runner is not None:
+        """Pass a command on to the sequence; a verdict also when the plan is through."""
+        if isinstance(command, Judge) and self.board.state is State.FINISHED:
+            self._judge_afterwards(command)
+        elif self._runner is not None:
             self._runner.send(command)
+
+    def _judge_afterwards(self, command: Judge) -> None:
+        """Note a verdict in the session, and begin the sequence anew: what does not count any more is measured again."""
+        runner, folder = self._runner, Path(self.board.session)
+        if runner is None:
+            return
+
+        def write() -> None:
+            runner.wait()
+            give_verdict(folder, command)
+
+        def written(_: None) -> None:
+            runner.start()
+
+        def failed(error: Exception) -> None:
+            self.board.messages.append(Message(Weight.FAULT, str(error)))
+
+        self.do(write, written, failed)
 
     def _drop_stale_question(self) -> None:
         """Take a question back whose circle has ended meanwhile: an answer to it would hit something else."""
@@ -303,10 +330,14 @@ class StationApp(App[None]):
         top = self.screen_stack[-1] if self.screen_stack else None  # none while it closes
         return self._runner is not None and not isinstance(top, RowScreen)
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+    def check_action(  # noqa: PLR0911 - a line per action, nothing nested
+        self, action: str, parameters: tuple[object, ...]
+    ) -> bool | None:
         """Only keys that mean something now stand in the footer and do something."""
         if action == "connect":
             return self.board.fault is not None and self._measuring
+        if action == "messages":
+            return self._measuring and not isinstance(self.screen_stack[-1], ModalScreen)
         if action == "temperature":
             return self._measuring and bool(self.board.session)
         if action == "results":
@@ -347,6 +378,10 @@ class StationApp(App[None]):
         explained = next((each for each in reversed(self.screen_stack) if isinstance(each, ExplainedScreen)), None)
         if explained is not None and not isinstance(self.screen, ModalScreen):
             self.push_screen(HelpScreen(explained.help_name))
+
+    def action_messages(self) -> None:
+        """Show the messages with all their words."""
+        self.push_screen(MessagesScreen(list(self.board.messages)))
 
     def action_connect(self) -> None:
         """Open instrument and session again after a fault."""

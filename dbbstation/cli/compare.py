@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from dbbstation.recorded import Recorded
 
 
-STAGES = {"candidates": 1, "sets of causes": 30, "look": 60, "verdicts": 90}
+STAGES = {"candidates": 1, "sets of causes": 30, "look": 60, "held-out tests": 80}
 """How much of a comparison is done when each stage begins [%]."""
 
 
@@ -103,6 +103,8 @@ def _both(a: Path, b: Path, tests: tuple[str, ...], exclude: tuple[str, ...]) ->
 
 
 def _print(summary: Mapping[str, Any]) -> None:
+    if summary["held_out_worse"]:
+        echo("Held-out tests are predicted worse than by the first session alone. Nothing is identified.\n")
     echo(summary["text"])
     for note in summary["notes"]:
         echo(f"- {note}")
@@ -152,6 +154,12 @@ def _tenths(value: float) -> str:
     return f"{round(value, 1) + 0.0:.1f}"
 
 
+def _groups_with_gain(cause: Mapping[str, Any]) -> str:
+    """In how many groups of tests that were held back a cause brought something; empty where no other tests can show it."""
+    gains = cause["gains"]
+    return f"{gains['with_gain']} of {len(gains['parts'])}" if gains and cause["acts"] == "always" else ""
+
+
 def _print_causes(summary: Mapping[str, Any]) -> None:
     from dbbstation.cli.output import print_table
 
@@ -166,13 +174,14 @@ def _print_causes(summary: Mapping[str, Any]) -> None:
                 f"{cause['name']}, {cause['form']}" if cause["form"] else cause["name"],
                 cause["verdict"],
                 f"{cause['probability']:.3f}",
+                _groups_with_gain(cause),
                 f"{cause['rms_um']:.2f}",
                 *(f"{100 * cause[key]:.0f} %" for key in ("share", "opposite", "taken_up")),
                 cause["where"]["text"],
             ]
             for cause in there
         ]
-        titles = ["cause", "verdict", "probability", "µm rms", "share", "opposite", "calibration", "where"]
+        titles = ["cause", "verdict", "probability", "gain in", "µm rms", "share", "opposite", "calibration", "where"]
         print_table(titles, rows)
         for cause in there:
             if cause["text"]:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
     from dbbstation.calibration.outliers.outlier import Outlier
     from dbbstation.diagnosis.findings import Diagnosis, Location, NextTest, SourceFinding
-    from dbbstation.inference.verdict import Gains
 
 
 def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[str, Any]:
@@ -38,7 +37,7 @@ def diagnosis_summary(diagnosis: Diagnosis, lacking: Mapping[str, str]) -> dict[
         "held_out_rms_um": {when: 1e3 * of.rms for when, of in zip(WHEN, diagnosis.held_out, strict=True)},
         "held_out_normalised": {when: of.normalised for when, of in zip(WHEN, diagnosis.held_out, strict=True)},
         "held_out": "not-tested" if diagnosis.chosen_anew is None else "tested",
-        "held_out_worse": None if diagnosis.chosen_anew is None else diagnosis.chosen_anew.worse,
+        "held_out_worse": None if diagnosis.chosen_anew is None else diagnosis.chosen_anew.is_worse,
         "circularity_um": _circularity(diagnosis),
         "workspace": _workspace(diagnosis),
         "outliers": [outlier_summary(outlier) for outlier in diagnosis.outliers],
@@ -173,22 +172,14 @@ def _source(source: SourceFinding) -> dict[str, Any]:
         "class": list(source.equivalent),
         "log_evidence": source.gain,
         "acts": source.acts.name.lower(),
+        "persists": source.persists,
         "sigmas": source.sigmas,
-        "gains": None if source.gains is None else _gains(source.gains),
+        "gains": None if source.gains is None else source.gains.plain(),
         "parameters": {
             name: {"value": v.value, "uncertainty": v.uncertainty, "unit": v.unit}
             for name, v in source.parameters.items()
         },
         "text": source.text,
-    }
-
-
-def _gains(gains: Gains) -> dict[str, Any]:
-    return {
-        "parts": list(gains.parts),
-        "with_gain": gains.with_gain,
-        "total": gains.total,
-        "predicts": gains.predicts,
     }
 
 
@@ -204,6 +195,7 @@ def _lacking(name: str, why: str) -> dict[str, Any]:
         "class": [],
         "log_evidence": None,
         "acts": None,
+        "persists": False,
         "sigmas": None,
         "gains": None,
         "parameters": {},

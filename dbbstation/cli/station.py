@@ -95,9 +95,15 @@ def station(
       dbbstation station                               choose on the screen what is measured
       dbbstation station --virtual                     try it without hardware
       dbbstation station --virtual --time-scale 10     the same, ten times faster
+      dbbstation station --job monday-check.yaml       one job for an operator, by its file
       dbbstation station --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
     """
+    if told["job"].endswith((".yaml", ".yml")):
+        if virtual or any(given is not None for given in (plan_file, machine_file, out)):
+            raise click.UsageError("a job says what is measured: leave out --plan, --machine, --out and --virtual")
+        _check_terminal()
+        return _operate(Path(told["job"]), judging_model(model_file, source_files))
     # The shop's instrument stands elsewhere: a virtual one brings its own line.
     port = None if virtual and from_settings("port") else port
     baud = None if virtual and from_settings("baud") else baud
@@ -238,6 +244,19 @@ def _begin(given: Choice, limits: Limits, model: IdentifiedModel | None) -> int:
         Path.cwd(), Memory(), limits, [Log()], model, given, None if named is None else Path(named).absolute()
     )
     return _shown(StationApp(None, None, front=front))
+
+
+def _operate(path: Path, model: IdentifiedModel | None) -> int:
+    """Show the screens of a job until they are closed; arguments as of `Front`, errors as of `_run`."""
+    from dbbstation.cli.measure_talk import Log
+    from dbbstation.service.front import Front
+    from dbbstation.service.memory import Memory
+    from dbbstation.service.operated import read_operated
+    from dbbstation.tui.app import StationApp
+
+    operated = read_operated(path)
+    front = Front(operated.sessions, Memory(), observers=[Log()], model=model)
+    return _shown(StationApp(None, None, front=front, operated=operated))
 
 
 def _line(

@@ -102,6 +102,35 @@ HELP = {
             "escape": "Back.",
         },
     ),
+    "job": Help(
+        "Job",
+        (
+            "One job, decided beforehand by its file. The first row begins it, or goes on with a session of it that is not complete.",
+            "The rows below it are what may be changed. Below the list stand the limits and what a person looks after before the first circle.",
+        ),
+        {"enter": "Begin, or change the row.", "up": "The row above.", "down": "The row below."},
+    ),
+    "operate": Help(
+        "Set-up and circle",
+        (
+            "Before a circle: which ball goes into which bore, tilt and bar. Enter when it stands.",
+            (
+                "During and behind the circle: the length, what happens, and what to do. GOOD and CANNOT TELL go on by Enter; REPEAT is "
+                "measured again by Enter, and nothing else can be done with it."
+            ),
+        ),
+        {key: sentence for key, sentence in _RUN_KEYS.items() if key in {"enter", "m", "r", "p"}},
+    ),
+    "answer": Help(
+        "Answer",
+        (
+            (
+                "WITHIN: every circle keeps its limit, U (k = 2) included. EXCEEDED: a circle passes its limit by more than U. CANNOT TELL: a "
+                "limit lies within U, or a circle is missing."
+            ),
+        ),
+        {"enter": "Back to the job.", "escape": "Back to the job."},
+    ),
     "start": Help(
         "Start",
         (

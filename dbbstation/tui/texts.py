@@ -59,6 +59,25 @@ NOT_NOW = "While the station is {state}, tests are looked at here; going to anot
 NO_RUN = "{test} {direction}: no run yet."
 RUN_FIGURES = "{run}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularity {circularity:.1f} µm."
 NO_CIRCLE = "{run}: no circle; {problem}"
+JOB_SAYS = "{job}: Enter begins; a row that may be changed is changed by Enter too."
+JOB_BEGINS = "Begin: session {session}"
+JOB_GOES_ON = "Go on with session {session}"
+JOB_ROWS: Mapping[str, str] = {
+    "operator": "operator",
+    "order": "order number",
+    "port": "port",
+    "temperature": "temperature [°C]",
+}
+"""What an operator may change."""
+JOB_LIMIT = "at most {largest:g} {unit} of {figure}, {tests}"
+JOB_ALL_TESTS = "all tests"
+JOB_BEFORE = "Before you begin:"
+ANSWER_TITLE = "Answer"
+ANSWER_WAITS = "The circles are held against the limits …"
+ANSWER_REPORT = "The report: {path}"
+ANSWERS = ("WITHIN", "EXCEEDED", "CANNOT TELL")
+"""The three answers, which share one size of letters."""
+
 MESSAGES_TITLE = "Messages, the newest first. Esc or J closes."
 MESSAGES_NONE = "There are none."
 VIRTUAL_WORD = "virtual"

@@ -20,6 +20,7 @@ FORMATS = {
     "dbb-model": "a model",
     "dbb-settings": "a shop's settings",
     "dbb-bar": "the calibration of a bar",
+    "dbb-job": "a job",
     "dbb-mapping": "the mapping of recordings made elsewhere",
 }
 """Every format by the name before its version, with what it is called in messages."""

@@ -60,13 +60,15 @@ class LargeFigures(Panel):
         length = self._length(board)
         # One size for all states: letters that change their size are harder to read than small ones.
         room = self.content_size
+        for_one = (room.height - _TEXTS + 1) // _TEXTS
+        _, high = usual = largest((length, NO_LENGTH, _WIDEST), room.width, for_one)
         # The longest word on a run is the exception.
-        wide, high = largest((length, NO_LENGTH, _WIDEST, state), room.width, (room.height - _TEXTS + 1) // _TEXTS)
+        sizes = (usual, min(usual, largest((state,), room.width, for_one)), usual)
         gap = min(max((room.height - _TEXTS * HIGH * high) // (_TEXTS - 1), 0), HIGH * high)
         rows: list[Content] = []
         styles = ("bold", state_style, "$text-warning" if board.state in RECORDING else "$text-success")
-        for text, style in zip((length, state, action), styles, strict=True):
-            rows += [Content.styled(row, style) for row in block_rows(text, wide, high)]
+        for text, style, size in zip((length, state, action), styles, sizes, strict=True):
+            rows += [Content.styled(row, style) for row in block_rows(text, *size)]
             rows += [Content("")] * gap
         return lines(*rows)
 

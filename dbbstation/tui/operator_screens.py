@@ -20,7 +20,7 @@ from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.jig_map import JigMap
 from dbbstation.tui.large_screen import LargeFigures
-from dbbstation.tui.now_line import NowLine
+from dbbstation.tui.now_line import OperatorNowLine
 from dbbstation.tui.panel import lines
 from dbbstation.tui.progress_line import ProgressLine
 from dbbstation.tui.reading_panel import ReadingPanel
@@ -178,7 +178,7 @@ class OperateScreen(RunScreen):
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""
         yield TitleLine(self._show.plan, id="title")
-        yield NowLine(id="now")
+        yield OperatorNowLine(id="now")
         with Vertical(id="set-up-view"):
             yield ReadingPanel(clock=self._clock, id="reading")
             with Horizontal(id="table"):
@@ -211,7 +211,7 @@ class AnswerScreen(ExplainedScreen):
 
     help_name = "answer"
 
-    BINDINGS: ClassVar[list[BindingType]] = [("enter,escape,q", "back", "Back")]
+    BINDINGS: ClassVar[list[BindingType]] = [("enter", "read", "Back"), ("escape,q", "back", "Back")]
 
     def __init__(self, answer: JobAnswer, back: Callable[[], None]) -> None:
         super().__init__()
@@ -239,9 +239,20 @@ class AnswerScreen(ExplainedScreen):
         if self._answered is None:
             self._answered = self._answer.look()
             self._draw()
+            self.refresh_bindings()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Enter leaves an answer that can be read, and not what is still worked out."""
+        if action == "read":
+            return self._answered is not None
+        return super().check_action(action, parameters)
+
+    def action_read(self) -> None:
+        """Go back to the job."""
+        self._back()
 
     def action_back(self) -> None:
-        """Go back to the job."""
+        """Go back to the job; an answer that is still worked out is given up."""
         self._back()
 
     def _draw(self) -> None:

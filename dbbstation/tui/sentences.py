@@ -29,6 +29,21 @@ def now(board: Board) -> str:
     return say(board) if say else f"The station is {board.state}."
 
 
+def now_for_operator(board: Board) -> str:
+    """Return the same for an operator of a job, who can only measure again what is wrong."""
+    completed = board.completed
+    if board.fault is not None or board.state not in {State.COMPLETE, State.FLAWED} or completed is None:
+        return now(board) if board.finished is None else _THROUGH
+    found = completed.answer
+    if found.word is Word.REPEAT:
+        return f"{found.word}  {completed.run.label}: {_ended(found.causes[0])} Enter measures it again."
+    unseen = f"Not to be seen yet: {', '.join(found.unseen)}. " if found.unseen else ""
+    return f"{found.word}  {completed.run.label}. {unseen}Enter goes on."
+
+
+_THROUGH = "Every circle is measured: the answer follows."
+
+
 def _set_up(board: Board) -> str:
     announced = board.announced
     if announced is None:

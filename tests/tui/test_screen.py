@@ -159,7 +159,7 @@ async def circle(pilot: Pilot[None], app: StationApp, key: str = "enter") -> Non
     await press(app, key)
     await until(pilot, lambda: app.board.state in {State.COMPLETE, State.FLAWED})
     if app.board.state is State.FLAWED:
-        await until(pilot, lambda: "No usable circle in low-" in said(app))
+        await until(pilot, lambda: "has no usable circle" in said(app))
         await press(app, "r")
         await until(pilot, lambda: app.board.state is not State.FLAWED)
         await circle(pilot, app)

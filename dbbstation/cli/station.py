@@ -124,10 +124,12 @@ def station(
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.recordings.entries import ReadBy
+    from dbbstation.files.recordings.session import SESSION_FILE, read_session
     from dbbstation.files.shipped import shipped_folder
     from dbbstation.service.held_line import HeldLine
     from dbbstation.service.opening import opener
     from dbbstation.station.assembly import Job
+    from dbbstation.station.opening import check_not_mixed
     from dbbstation.station.programs import load_programs
 
     def demo(what: str) -> Path:
@@ -156,6 +158,8 @@ def station(
             ),
         )
         job.check(str(plan_file))
+        if (folder / SESSION_FILE).is_file():
+            check_not_mixed(folder, read_session(folder), job.instrument)
         if not virtual:
             require_bar(job, largest_bar_age_h)
         helper = None

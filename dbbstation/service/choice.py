@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
-from dbbstation.errors import InputError
 from dbbstation.files.formats.bar import read_bar
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
@@ -21,7 +20,7 @@ from dbbstation.service.memory import Line
 from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.station.assembly import Job
 from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
-from dbbstation.station.opening import mixed
+from dbbstation.station.opening import check_not_mixed
 from dbbstation.station.programs import load_programs
 from dbbstation.station.schedule import Schedule
 
@@ -220,9 +219,7 @@ def _recorded(folder: Path, instrument: ReadBy | None) -> tuple[RunEntry, ...]:
         InputError: faults of the session; virtual and real circles would be mixed.
     """
     session = read_session(folder)
-    faults = mixed(folder, session, instrument)
-    if faults:
-        raise InputError(faults)
+    check_not_mixed(folder, session, instrument)
     return session.runs
 
 

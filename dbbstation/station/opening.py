@@ -50,12 +50,12 @@ def check_session(
         was, now = ("plain circles", "NC programs") if with_programs else ("NC programs", "plain circles")
         what = f"its runs were commanded by {was}, now {now} are asked for"
         faults.append(Problem(str(folder), 0, 0, what, "measure them into a session of their own"))
-    faults += mixed(folder, session, details.instrument)
+    faults += _mixed(folder, session, details.instrument)
     if faults:
         raise InputError(faults)
 
 
-def mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> list[Problem]:
+def _mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> list[Problem]:
     """Say that virtual and real circles would be mixed; a session of an older program does not tell which it has."""
     if instrument is None or (not session.runs and session.virtual is None):
         return []
@@ -66,6 +66,17 @@ def mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> li
     kinds = {True: "a virtual machine", False: "a real machine", None: "a machine that is not noted as virtual"}
     what = f"this session is of {kinds[session.virtual]}, and {instrument.text} is that of {kinds[instrument.virtual]}"
     return [Problem(str(folder), 0, 0, what, "measure into a session of its own: give another --out")]
+
+
+def check_not_mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> None:
+    """Refuse to measure virtual circles into a session of real ones, or the other way round.
+
+    Raises:
+        InputError: they would be mixed.
+    """
+    faults = _mixed(folder, session, instrument)
+    if faults:
+        raise InputError(faults)
 
 
 def open_session(

@@ -17,6 +17,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
 from dbbstation.service.choice import Choice, prepare
+from dbbstation.service.former_sessions import former_sessions
 from dbbstation.service.memory import Line
 from dbbstation.service.session_line import line_to_go_on
 from dbbstation.service.session_list import list_sessions
@@ -131,3 +132,11 @@ def test_times_of_a_faster_clock_do_not_lie_in_the_future() -> None:
     now = time_of_day(lambda: seconds[0])
     seconds[0] = 24 * 3600.0 * 10  # a day of measuring at ten times real time
     assert now() <= datetime.now(UTC)
+
+
+def test_no_virtual_session_stands_before_a_real_one(plan_file: Path, tmp_path: Path) -> None:
+    before = measured(plan_file, tmp_path / "before", REAL)
+    for by in (VIRTUAL, REAL):
+        now = read_session(measured(plan_file, tmp_path / f"now-{by.name}", by))
+        found = [session.folder for _, session in former_sessions(now, tmp_path)]
+        assert (before in found) is (by is REAL)

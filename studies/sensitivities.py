@@ -8,7 +8,6 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.compare.summary import comparison_summary
 from dbbstation.diagnosis.diagnose import usable_sources
@@ -19,9 +18,10 @@ from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.diagnosis.table.summary import mismatch_summary
 from dbbstation.files.recordings.drive_csv import read_drive
 from dbbstation.processes import each
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tabulated import Asked, load_tables
+from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.load import load_sessions
+from dbbstation.tasks.tables import Asked, load_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence

@@ -14,7 +14,7 @@ from dbbstation.cli.output import echo
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.recorded import Recorded
+    from dbbstation.tasks.load import Recorded
 
 
 STAGES = {"candidates": 1, "sets of causes": 30, "look": 60, "held-out tests": 80}
@@ -52,7 +52,6 @@ def compare(
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import stage_bar
-    from dbbstation.diagnosed import default_candidates
     from dbbstation.diagnosis.compare.comparison import compare as put_side_by_side
     from dbbstation.diagnosis.compare.notes import notes_of
     from dbbstation.diagnosis.compare.summary import comparison_summary
@@ -60,6 +59,7 @@ def compare(
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.report.compare_figure import compare_figure
     from dbbstation.sources.registry import known_sources, sources_named
+    from dbbstation.tasks.diagnose import default_candidates
 
     if figure is not None:
         refuse_existing(figure, force=force)
@@ -90,7 +90,7 @@ def _both(a: Path, b: Path, tests: tuple[str, ...], exclude: tuple[str, ...]) ->
     """
     from dbbstation.cli.progress import count_bar
     from dbbstation.errors import InputError, Problem
-    from dbbstation.recorded import load_sessions
+    from dbbstation.tasks.load import load_sessions
 
     with count_bar(f"reading {a.name}") as reading:
         one = load_sessions([a], exclude, reading, tests)

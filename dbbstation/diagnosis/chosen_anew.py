@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
-from dbbstation.diagnosis.explain import MOST_MEMBERS
+from dbbstation.diagnosis.explained import MOST_MEMBERS
 from dbbstation.diagnosis.left_out import groups_of
 from dbbstation.inference.chosen_anew import ChosenAnew, chosen_anew
 from dbbstation.inference.hypotheses import search
@@ -15,7 +15,7 @@ from dbbstation.inference.hypotheses import search
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from dbbstation.diagnosis.explain import Explained
+    from dbbstation.diagnosis.explained import Explained
     from dbbstation.inference.model_comparison import Member, ModelComparison
 
 

@@ -25,11 +25,12 @@ from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN
 from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.by_temperature import not_given
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.diagnosis.explain import Explained, Settled
+    from dbbstation.diagnosis.explained import Explained, Settled
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.remainder import Remainder
@@ -42,6 +43,7 @@ RIVALS = 6
 """Named causes of the greatest evidence that compete in each draw of a part of the tests."""
 
 
+@with_one_thread
 def diagnose(
     machine: Machine,
     observations: Sequence[Observation],

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.diagnosis.explain import Explained
+    from dbbstation.diagnosis.explained import Explained
     from dbbstation.inference.square_root import Solution
     from dbbstation.model.observation import Observation
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.explain import Explained, Settled
+    from dbbstation.diagnosis.explained import Explained, Settled
     from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.model_comparison import Cause, Member, Variant
     from dbbstation.inference.verdict import Gains

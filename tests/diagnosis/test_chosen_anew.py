@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.diagnosed import diagnose_sessions
 from dbbstation.diagnosis.findings import Verdict
+from dbbstation.tasks.diagnose import diagnose_sessions
 from tests.plant.mechanisms.disturbances import BarScale, BumpedJig
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.session import record

@@ -25,6 +25,7 @@ from dbbstation.inference.left_over import left_over
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.verdict import OUT, SURE
+from dbbstation.threads import with_one_thread
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
@@ -169,6 +170,7 @@ class Comparison:
         return _rms(both.mean(axis=1)), _rms(0.5 * (both[:, 0] - both[:, 1]))
 
 
+@with_one_thread
 def compare(
     machine: Machine,
     a: Sequence[Observation],

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.channel import Channel
-    from dbbstation.diagnosis.explain import Explained
+    from dbbstation.diagnosis.explained import Explained
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.inference.model_comparison import Variant

@@ -166,6 +166,15 @@ class Spreads:
             covariance[np.ix_(columns, columns)] += root @ root.T
         return covariance
 
+    def times(self, factor: NDArray[np.float64]) -> Spreads:
+        """The same with each standard deviation so many times as large, shape (k,); correlations stay."""
+        return Spreads(
+            factor[:, None] * self.shared,
+            tuple((columns, factor[columns, None] * root) for columns, root in self.own),
+            self.alone,
+            factor[self.alone] * self.prior,
+        )
+
     def square_of(self, columns: NDArray[np.int64], rows: NDArray[np.float64]) -> float:
         """Trace of rows over some of the columns, shape (r, j), times their covariance times the rows."""
         square = float(np.sum((rows @ self.shared[columns]) ** 2))

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dbbstation import circled
 from dbbstation.sources.contract import Setup
+from dbbstation.tasks import circles as circled
 
 
 def known(*mounting_um, place_known=True):

@@ -6,8 +6,8 @@ from itertools import permutations
 
 import pytest
 
-from dbbstation import historied
 from dbbstation.history.record import ModelFigures, ModelParameter, SessionFigures
+from dbbstation.tasks import history as historied
 
 SESSION = SessionFigures("monday", "ab" * 32, "hexapod", None, ())
 

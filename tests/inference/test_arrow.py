@@ -80,6 +80,10 @@ def test_the_answer_is_that_of_all_rows_at_once(rng, known, own_noise, direction
     assert np.abs(found.x - x).max() < 1e-7 * u.min()
     np.testing.assert_allclose(found.covariance, covariance, atol=1e-9 * u.max() ** 2)
     np.testing.assert_allclose(found.variance, np.diag(covariance), rtol=1e-9)
+    factor = rng.uniform(1.0, 3.0, TOTAL)
+    wider = found.spreads.times(factor)
+    np.testing.assert_allclose(wider.covariance, np.outer(factor, factor) * found.covariance, rtol=1e-12)
+    np.testing.assert_allclose(wider.variance, factor**2 * found.variance, rtol=1e-12)
     assert found.chi2 == pytest.approx(chi2, rel=1e-9)
     bounded = np.isfinite(known.prior)
     of_others = [*range(len(A) - bounded.sum() - (30 if own_noise else 0))]

@@ -21,6 +21,7 @@ FORMATS = {
     "dbb-settings": "a shop's settings",
     "dbb-bar": "the calibration of a bar",
     "dbb-mapping": "the mapping of recordings made elsewhere",
+    "dbb-simulator": "a simulator of one's own",
 }
 """Every format by the name before its version, with what it is called in messages."""
 

@@ -101,6 +101,7 @@ class Runs:
         if self.most is None:
             self.most = int(MOST_SECONDS / one) * max(self._count, 1)
         self(first)
+        self.seconds = one * self.ran
         return one
 
     def _simulated(self, asks: Sequence[Ask]) -> list[Answer]:

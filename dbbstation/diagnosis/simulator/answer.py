@@ -198,10 +198,9 @@ def _judged(one: Finding, found: Found, nonlinear: Mapping[str, float]) -> Findi
         return one
     candidate, term = inside[one.name]
     values = dict(one.values)
-    for k, name in enumerate(candidate.names):
-        shift = term.numbers[k] if k >= len(term.amplitudes) else 0.0
+    for name, number in zip(candidate.names, term.numbers, strict=True):
         if name in values:
-            values[name] = replace(values[name], value=values[name].value + shift)
+            values[name] = replace(values[name], value=number)
     one = replace(one, values=values)
     if nonlinear[one.name] > AGREE and one.verdict.rank < Verdict.AMBIGUOUS.rank:
         what = f"True and linear answer to it differ by {100.0 * nonlinear[one.name]:.0f} %: no verdict."

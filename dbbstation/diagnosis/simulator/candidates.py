@@ -1,21 +1,17 @@
-"""Candidates at the ports of a simulator: every form over every signal that is known there, as laws of a channel.
-
-A law's columns are the simulator's own answers to small doses of the term. Between the points of a grid (a time constant, a width,
-a place) answers are interpolated; the refit that follows moves such a number by simulations of its own.
-"""
+"""Candidates at the ports of a simulator: every form over every signal that is known there."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import combinations, product
+from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import BSpline
 
 from dbbstation.diagnosis.simulator.terms import DEGREE, IN_PLACE, Form, Term, bends
-from dbbstation.diagnosis.simulator.work import Direction, sizes
-from dbbstation.inference.channel import NAMED_ODDS, Law
+from dbbstation.diagnosis.simulator.work import sizes
+from dbbstation.inference.channel import NAMED_ODDS
 from dbbstation.inference.patterns import log_odds
 
 if TYPE_CHECKING:
@@ -25,7 +21,6 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.simulator.model import Port
     from dbbstation.diagnosis.simulator.own import PortSource
-    from dbbstation.diagnosis.simulator.work import State, Work
 
 ROUNDINGS = (0.01, 0.1)
 """Shares of a signal's greatest value within which a sign turns: an integrator steps over anything sharper, and what turns less sharply
@@ -55,6 +50,7 @@ class Candidate:
         grids: of its shape.
         log_odds: log prior odds.
         positive: which amplitudes cannot be negative.
+        tried: sizes at which the answer is taken, of a form that puts something in the place of a signal; empty for the others.
     """
 
     term: Term
@@ -63,6 +59,7 @@ class Candidate:
     grids: tuple[tuple[float, ...], ...]
     log_odds: float
     positive: tuple[bool, ...]
+    tried: tuple[float, ...] = ()
 
     @property
     def name(self) -> str:
@@ -106,12 +103,7 @@ def candidates(
             )
         )
     count = {form: sum(one.term.form is form for one in found) for form in Form}
-    return tuple(
-        one
-        if one.term.own
-        else Candidate(one.term, one.names, one.units, one.grids, log_odds(count[one.term.form]), one.positive)
-        for one in found
-    )
+    return tuple(one if one.term.own else replace(one, log_odds=log_odds(count[one.term.form])) for one in found)
 
 
 def _span(times: NDArray[np.float64]) -> tuple[float, float]:
@@ -158,12 +150,14 @@ def _at(port: Port, signals: Mapping[str, NDArray[np.float64]], span: tuple[floa
         widths = tuple((0.5 * float(np.ptp(values)) * np.geomspace(0.01, 0.5, LENGTHS)).tolist())
         found.append(_candidate(port, Form.SLIP, (name,), ("size", "half width"), (port.unit, unit), grid=widths))
         if unit == port.unit:
+            whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), LENGTHS + 1).tolist())
+            tried = {Form.DELAY: whiles, Form.LAG: whiles, Form.PLAY: widths}
             for form, what, of in (
                 (Form.DELAY, "dead time", "s"),
                 (Form.LAG, "time constant", "s"),
                 (Form.PLAY, "half width", unit),
             ):
-                found.append(_candidate(port, form, (name,), (what,), (of,)))
+                found.append(replace(_candidate(port, form, (name,), (what,), (of,)), tried=tried[form]))
     for one, other in combinations(signals, 2):
         units = _per(_per(port.unit, port.signals[one]), port.signals[other])
         found.append(_candidate(port, Form.PRODUCT, (one, other), ("coefficient",), (units,)))
@@ -204,84 +198,6 @@ def _curve(port: Port, values: NDArray[np.float64]) -> tuple[tuple[str, ...], tu
 def _per(unit: str, other: str, power: str = "") -> str:
     """Quotient of units."""
     return f"{unit or '1'}/{f'({other})' if ' ' in other or '/' in other else other}{power}" if other else unit
-
-
-def laws(
-    work: Work, state: State, found: Sequence[Candidate], size: float, curved_most: float
-) -> tuple[list[Law], dict[str, str]]:
-    """Candidates as laws, by the simulator's answers about a state; and those that cannot be asked, with the reason.
-
-    Args:
-        work: simulations.
-        state: about which.
-        found: candidates that are not in the state.
-        size: of the residual, root mean square.
-        curved_most: difference between the answers to two doses, over the answer, from which on a candidate cannot be asked.
-    """
-    points = [(one, point) for one in found for point in product(*one.grids)]
-    directions = [d for one, point in points for d in _directions(one, point)]
-    answers = work.answers(state, directions, size)
-    first, by_point = 0, {}
-    for one, point in points:
-        own = slice(first, first + len(one.term.amplitudes))
-        by_point[(one.name, point)] = own
-        first = own.stop
-    laid_out, refused = [], {}
-    for one in found:
-        own_points = list(product(*one.grids))
-        parts = [by_point[(one.name, point)] for point in own_points]
-        if not all(answers.seen[part].all() for part in parts):
-            refused[one.name] = "the outputs do not answer to it"
-        elif max(float(answers.curved[part].max()) for part in parts) > curved_most:
-            refused[one.name] = "the answers to two small doses of it do not agree"
-        else:
-            columns = np.stack([answers.columns[:, part] for part in parts])
-            laid_out.append(_law(one, columns, size))
-    return laid_out, refused
-
-
-def _directions(one: Candidate, point: tuple[float, ...]) -> list[Direction]:
-    amplitudes = len(one.term.amplitudes)
-    term = one.term.with_numbers([0.0] * amplitudes + list(point))
-    keys = [(one.name, str(k), *(f"{value:.12g}" for value in point)) for k in range(amplitudes)]
-    return [Direction(key, 1e-3, k, term) for k, key in enumerate(keys)]
-
-
-def _law(one: Candidate, columns: NDArray[np.float64], size: float) -> Law:
-    """Law of a candidate from its columns at all points of its grid, shape (points, n, p)."""
-    if not one.grids:
-        alone = columns[0]
-        return _named(one, lambda _point: alone, alone, size)
-    shape = tuple(len(grid) for grid in one.grids)
-    table = columns.reshape(*shape, *columns.shape[1:])
-
-    def between(point: tuple[float, ...]) -> NDArray[np.float64]:
-        found = table
-        for grid, value in zip(one.grids, point, strict=True):
-            if len(grid) == 1:
-                found = found[0]
-                continue
-            k = int(np.clip(np.searchsorted(grid, value) - 1, 0, len(grid) - 2))
-            share = float(np.clip((value - grid[k]) / (grid[k + 1] - grid[k]), 0.0, 1.0))
-            found = (1.0 - share) * found[k] + share * found[k + 1]
-        return np.asarray(found)
-
-    return _named(one, between, columns.reshape(-1, columns.shape[-1]), size)
-
-
-def _named(one: Candidate, columns: object, every: NDArray[np.float64], size: float) -> Law:
-    rms = np.sqrt(np.mean(np.square(every), axis=0))
-    return Law(
-        name=one.name,
-        columns=columns,  # type: ignore[arg-type]  # a function of a point
-        plausible=size / np.maximum(rms, 1e-300),
-        parameters=one.names,
-        units=one.units,
-        grids=one.grids,
-        positive=one.positive,
-        log_odds=one.log_odds,
-        reach=size if one.grids else None,
-    )
 
 
 def basis(term: Term, values: NDArray[np.float64]) -> NDArray[np.float64]:

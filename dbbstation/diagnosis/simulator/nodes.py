@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.diagnosis.simulator.candidates import Candidate, candidates, laws
+from dbbstation.diagnosis.simulator.candidates import Candidate, candidates
 from dbbstation.diagnosis.simulator.fit import Fitted, fit, plain
+from dbbstation.diagnosis.simulator.laws import SHARE, discrepancy, form_uncertainty, laws
+from dbbstation.diagnosis.simulator.terms import Form
 from dbbstation.diagnosis.simulator.work import AGREE, State
 from dbbstation.diagnosis.table.data import rounding_of
 from dbbstation.inference.channel import Base, Channel, Law
@@ -25,12 +27,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.simulator.fit import Weigh
+    from dbbstation.diagnosis.simulator.laws import Curves
     from dbbstation.diagnosis.simulator.own import PortSource
     from dbbstation.diagnosis.simulator.work import Work
     from dbbstation.inference.settled import Settled
 
-MOST_STEPS = 12
-"""Steps of a refit with a term put in: it begins at the answer of the linear comparison."""
+MOST_STEPS = 8
+"""Steps of a refit with a term put in: it begins at the answer of the linear comparison, and goes on where it is not settled."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +74,23 @@ class Node:
         )
 
     @cached_property
-    def asked(self) -> tuple[list[Law], dict[str, str]]:
-        """Laws of the candidates outside, and those that cannot be asked, with the reason."""
-        return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
+    def asked(self) -> tuple[list[Law], dict[str, str], Curves]:
+        """Laws of the candidates outside; those that cannot be asked, with the reason; answers to curves."""
+        inside = {
+            (one.term.port, one.term.signals[0]): self.answers_of(one.name)
+            for one in self.inside
+            if one.term.form is Form.CURVE
+        }
+        return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST, inside)
+
+    def answers_of(self, name: str) -> NDArray[np.float64]:
+        """What one more of each amplitude of a term does, shape (n, p)."""
+        first = len(self.work.model.parameters)
+        for one, term in zip(self.inside, self.fitted.state.terms, strict=True):
+            if one.name == name:
+                return self.fitted.columns[:, first : first + len(term.amplitudes)]
+            first += len(term.numbers)
+        raise KeyError(name)
 
     @cached_property
     def channel(self) -> Channel:
@@ -119,6 +136,8 @@ class Node:
             parameters=one.names,
             units=one.units,
             log_odds=one.log_odds,
+            form_uncertainty=form_uncertainty(one),
+            discrepancy=discrepancy(one, self.asked[2]),
         )
 
     def numbers_of(self, settled: Settled, one: Candidate) -> tuple[float, ...]:
@@ -132,8 +151,14 @@ class Node:
         found = settled.comparison.estimates([member, *others])
         own = len(member.columns)
         values = named_values(settled, member, found.values[:own], found.covariance[:own, :own])
+        if one.tried:
+            share = float(np.clip(values[SHARE].value, 0.0, MOST_SHARE))
+            return (values[one.names[0]].value * share,)
         return tuple(values[name].value for name in one.names)
 
+
+MOST_SHARE = 2.0
+"""Share of the largest size tried that a fit may begin at: beyond, the answer was not taken."""
 
 CURVED_MOST = 3.0 * AGREE
 """Difference of the answers to two doses, over the answer, beyond which a candidate is not asked: its answer is no column."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.diagnosis.simulator.fit import near
+from dbbstation.diagnosis.simulator.laws import discrepancy, form_uncertainty
 from dbbstation.diagnosis.simulator.nodes import noise_of
 from dbbstation.diagnosis.simulator.work import BudgetSpentError
 from dbbstation.inference.named_values import named_values
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.diagnosis.simulator.candidates import Candidate
+    from dbbstation.diagnosis.simulator.laws import Curves
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
     from dbbstation.diagnosis.simulator.work import State
     from dbbstation.inference.channel import Channel
@@ -119,7 +121,7 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
     if more:
         first = max(more, key=settled.best.log_factor)
         tried = [nodes.with_more(node, one, settled, weigh, sigma) for one in _rivals(node, settled, outside[first])]
-        costs = [_cost(nodes, one, settled) for one in tried]
+        costs = [_cost(nodes, one, settled, node.asked[2]) for one in tried]
         best = tried[int(np.argmin(costs))]
         nodes.progress(f"put in {', '.join(best.names - node.names)}")
         return best
@@ -141,26 +143,40 @@ def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidat
     return [first, *(outside[name] for name in enough[: RIVALS - 1])]
 
 
-def _cost(nodes: Nodes, node: Node, settled: Settled) -> float:
-    """Less its log posterior, of a node refitted to the rows of a comparison, in its noise [Schwarz's criterion]."""
+def _cost(nodes: Nodes, node: Node, settled: Settled, curves: Curves) -> float:
+    """Less its log posterior, of a node refitted to the rows of a comparison, in its noise [Schwarz's criterion].
+
+    What its forms may be off by is averaged over, by answers to curves.
+    """
     weigh, sigma = noise_of(settled)
-    _, residual = near(nodes.work, node.fitted, weigh, sigma)
+    state, residual = near(nodes.work, node.fitted, weigh, sigma)
     rows = weigh(residual) / sigma
     numbers = sum(len(one.names) for one in node.inside)
     odds = sum(one.log_odds for one in node.inside)
-    return 0.5 * float(rows @ rows) + 0.5 * numbers * float(np.log(len(rows))) - odds
+    off = [np.zeros((len(rows), 0))]
+    for one, term in zip(node.inside, state.terms, strict=True):
+        columns = discrepancy(one, curves)
+        if columns is not None:
+            effect = node.answers_of(one.name) @ np.array(term.amplitudes)
+            off.append(weigh(columns(effect, (), np.zeros(0))) * (form_uncertainty(one) / sigma))
+    beside = np.hstack(off)
+    products = np.eye(beside.shape[1]) + beside.T @ beside
+    towards = beside.T @ rows
+    squares = float(rows @ rows - towards @ np.linalg.solve(products, towards))
+    spread = float(np.linalg.slogdet(products)[1])
+    return 0.5 * squares + 0.5 * spread + 0.5 * numbers * float(np.log(len(rows))) - odds
 
 
 def _moves(node: Node, settled: Settled) -> float:
     """Largest move that a comparison about a node asks of a number of its terms, over its standard uncertainty."""
-    best = settled.best
-    found = settled.comparison.estimates(best.members) if best.members else None
+    members = [member for member in settled.best.members if member.cause.name in node.names]
+    found = settled.comparison.estimates(members) if members else None
     first, moves = 0, [0.0]
     terms = {one.name: (one, term) for one, term in zip(node.inside, node.fitted.state.terms, strict=True)}
-    for member in best.members:
+    for member in members:
         own = slice(first, first + len(member.columns))
         first = own.stop
-        if found is None or member.cause.name not in terms:
+        if found is None:
             continue
         one, term = terms[member.cause.name]
         values = named_values(settled, member, found.values[own], found.covariance[own, own])

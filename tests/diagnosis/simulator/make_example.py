@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 INERTIA, WEIGHT, DAMPING, DRAG = 0.012, 1.0, 0.008, 0.0012
 """kg m², N m, N m s, N m s²."""
 
-FILTER_S, NOISE, STEP_S, ROWS, SEED = 0.01, 0.002, 0.01, 800, 7
+FILTER_S, NOISE, STEP_S, ROWS, SEED = 0.01, 0.002, 0.01, 400, 7
 
 
 def recording(drag=DRAG, seed=SEED, rows=ROWS):

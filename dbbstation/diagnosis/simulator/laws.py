@@ -43,9 +43,8 @@ def laws(
     found: Sequence[Candidate],
     size: float,
     curved_most: float,
-    known: Curves,
-) -> tuple[list[Law], dict[str, str], Curves]:
-    """Candidates as laws about a state; those that cannot be asked, with the reason; answers to curves, by port and signal.
+) -> tuple[list[Law], dict[str, str]]:
+    """Candidates as laws about a state, and those that cannot be asked, with the reason.
 
     Args:
         work: simulations.
@@ -53,7 +52,6 @@ def laws(
         found: candidates that are not in the state.
         size: of the residual, root mean square.
         curved_most: difference between the answers to two doses, over the answer, from which on a candidate cannot be asked.
-        known: answers to curves that are in the state.
     """
     dosed = [one for one in found if not one.tried]
     points = [(one, point) for one in dosed for point in product(*one.grids)]
@@ -71,7 +69,7 @@ def laws(
             refused[one.name] = "the answers to two small doses of it do not agree"
         else:
             columns[one.name] = np.stack([answers.columns[:, part] for part in parts])
-    curves = dict(known) | {
+    curves = {
         (one.term.port, one.term.signals[0]): columns[one.name][0]
         for one in dosed
         if one.term.form is Form.CURVE and one.name in columns
@@ -84,20 +82,33 @@ def laws(
                 refused[one.name] = "the outputs do not answer to it, or the simulation runs away"
             else:
                 laid_out.append(law)
-    return laid_out, refused, curves
+    return laid_out, refused
+
+
+def curve_answers(work: Work, state: State, curves: Sequence[Candidate], size: float) -> Curves:
+    """Answers to curves about a state, by port and signal; those that nothing answers to are left out."""
+    answers = work.answers(state, [d for one in curves for d in _directions(one, ())], size)
+    found, first = {}, 0
+    for one in curves:
+        own = slice(first, first + len(one.term.amplitudes))
+        first = own.stop
+        if answers.seen[own].all():
+            found[(one.term.port, one.term.signals[0])] = answers.columns[:, own]
+    return found
 
 
 def form_uncertainty(one: Candidate) -> float:
     """Share of its effect by which real objects depart from a candidate's form."""
-    if one.term.form in {Form.CURVE, Form.CONSTANT, Form.OWN}:
+    if one.term.form in {Form.CONSTANT, Form.OWN}:
         return 0.0
     return LOOSE_FORM_UNCERTAINTY if one.term.form in LOOSE else FORM_UNCERTAINTY
 
 
 def discrepancy(one: Candidate, curves: Curves) -> Discrepancy | None:
-    """Columns of what a form may be off by: smooth curves over its signals at its port, each as large as the effect."""
-    own = [curves[(one.term.port, signal)] for signal in one.term.signals if (one.term.port, signal) in curves]
-    if not own or one.term.form in {Form.CURVE, Form.CONSTANT, Form.OWN}:
+    """Columns of what a form may be off by: smooth curves over the signals of its port, each as large as the effect."""
+    taken = one.term.signals if one.term.form is Form.CURVE else ()
+    own = [columns for (port, signal), columns in curves.items() if port == one.term.port and signal not in taken]
+    if not own or not form_uncertainty(one):
         return None
     columns = np.hstack(own)
     columns = columns / np.maximum(np.sqrt(np.mean(np.square(columns), axis=0)), 1e-300)

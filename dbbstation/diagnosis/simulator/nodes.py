@@ -14,7 +14,7 @@ import numpy as np
 
 from dbbstation.diagnosis.simulator.candidates import Candidate, candidates
 from dbbstation.diagnosis.simulator.fit import Fitted, fit, plain
-from dbbstation.diagnosis.simulator.laws import SHARE, discrepancy, form_uncertainty, laws
+from dbbstation.diagnosis.simulator.laws import SHARE, curve_answers, discrepancy, form_uncertainty, laws
 from dbbstation.diagnosis.simulator.terms import Form
 from dbbstation.diagnosis.simulator.work import AGREE, State
 from dbbstation.diagnosis.table.data import rounding_of
@@ -74,14 +74,23 @@ class Node:
         )
 
     @cached_property
-    def asked(self) -> tuple[list[Law], dict[str, str], Curves]:
-        """Laws of the candidates outside; those that cannot be asked, with the reason; answers to curves."""
-        inside = {
+    def asked(self) -> tuple[list[Law], dict[str, str]]:
+        """Laws of the candidates outside, and those that cannot be asked, with the reason."""
+        return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST)
+
+    @cached_property
+    def curves(self) -> Curves:
+        """Answers to curves over the signals at the ports of the terms that are put in, by port and signal."""
+        found = {
             (one.term.port, one.term.signals[0]): self.answers_of(one.name)
             for one in self.inside
             if one.term.form is Form.CURVE
         }
-        return laws(self.work, self.fitted.state, self.outside, self.size, CURVED_MOST, inside)
+        ports = {one.term.port for one in self.inside if form_uncertainty(one)}
+        curves = [
+            one for one in (self.outside if ports else ()) if one.term.form is Form.CURVE and one.term.port in ports
+        ]
+        return {**found, **curve_answers(self.work, self.fitted.state, curves, self.size)}
 
     def answers_of(self, name: str) -> NDArray[np.float64]:
         """What one more of each amplitude of a term does, shape (n, p)."""
@@ -137,7 +146,7 @@ class Node:
             units=one.units,
             log_odds=one.log_odds,
             form_uncertainty=form_uncertainty(one),
-            discrepancy=discrepancy(one, self.asked[2]),
+            discrepancy=discrepancy(one, self.curves),
         )
 
     def numbers_of(self, settled: Settled, one: Candidate) -> tuple[float, ...]:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from dbbstation.diagnosis.simulator.candidates import Candidate
-    from dbbstation.diagnosis.simulator.laws import Curves
     from dbbstation.diagnosis.simulator.nodes import Node, Nodes
     from dbbstation.diagnosis.simulator.work import State
     from dbbstation.inference.channel import Channel
@@ -121,7 +120,7 @@ def _wanted(nodes: Nodes, node: Node, settled: Settled) -> Node | None:
     if more:
         first = max(more, key=settled.best.log_factor)
         tried = [nodes.with_more(node, one, settled, weigh, sigma) for one in _rivals(node, settled, outside[first])]
-        costs = [_cost(nodes, one, settled, node.asked[2]) for one in tried]
+        costs = [_cost(nodes, one, settled) for one in tried]
         best = tried[int(np.argmin(costs))]
         nodes.progress(f"put in {', '.join(best.names - node.names)}")
         return best
@@ -143,7 +142,7 @@ def _rivals(node: Node, settled: Settled, first: Candidate) -> Sequence[Candidat
     return [first, *(outside[name] for name in enough[: RIVALS - 1])]
 
 
-def _cost(nodes: Nodes, node: Node, settled: Settled, curves: Curves) -> float:
+def _cost(nodes: Nodes, node: Node, settled: Settled) -> float:
     """Less its log posterior, of a node refitted to the rows of a comparison, in its noise [Schwarz's criterion].
 
     What its forms may be off by is averaged over, by answers to curves.
@@ -155,7 +154,7 @@ def _cost(nodes: Nodes, node: Node, settled: Settled, curves: Curves) -> float:
     odds = sum(one.log_odds for one in node.inside)
     off = [np.zeros((len(rows), 0))]
     for one, term in zip(node.inside, state.terms, strict=True):
-        columns = discrepancy(one, curves)
+        columns = discrepancy(one, node.curves)
         if columns is not None:
             effect = node.answers_of(one.name) @ np.array(term.amplitudes)
             off.append(weigh(columns(effect, (), np.zeros(0))) * (form_uncertainty(one) / sigma))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from dbbstation.errors import InputError, Problem
@@ -18,7 +18,14 @@ if TYPE_CHECKING:
 
     from dbbstation.files.yaml.text import Location, YamlDocument
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=60)]
+
+def _name(text: str) -> str:
+    if not text.isidentifier() or text.startswith("_"):
+        raise PydanticCustomError("name", "`{text}` is no name that a Python program can use", {"text": text})
+    return text
+
+
+Name = Annotated[str, AfterValidator(_name)]
 """What a Python program can call something."""
 
 BASE = "Simulator"

@@ -27,7 +27,7 @@ import numpy as np
 from dbbstation.calibration.fit import nodes
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.recorded import load_sessions
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.session import record
 

@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING
 from benchmarks.measuring import Row, show, timed  # isort: skip - sets up the environment
 
 from dbbstation.calibration.fit.calibrate import calibrate
-from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
 from dbbstation.diagnosis.findings import Verdict
-from dbbstation.recorded import Recorded, load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.load import Recorded, load_sessions
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.session import record

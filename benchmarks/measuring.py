@@ -18,7 +18,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-# As the program itself does, before NumPy is imported: threads of the linear algebra lose on narrow matrices.
+# As the command line does, before NumPy is imported: peers are measured with one thread of linear algebra, too.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 ROOT = Path(__file__).resolve().parent.parent

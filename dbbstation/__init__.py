@@ -1,3 +1,56 @@
-"""dbbstation: measure a hexapod machine tool with a double ball bar, calibrate it, find what its model lacks."""
+"""Measure, calibrate, diagnose and compensate a hexapod machine tool with a double ball bar.
+
+From Python, `import dbbstation as dbb` has a dozen names, each loaded when it is first used. They are provisional until 1.0: a change
+of theirs stands in the changelog.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
 
 __version__ = "0.1.0"
+
+_PUBLIC = {
+    "StationError": "dbbstation.errors",
+    "calibrate": "dbbstation.tasks.calibrate",
+    "circle_figures": "dbbstation.tasks.circles",
+    "compensate": "dbbstation.tasks.compensate",
+    "diagnose": "dbbstation.tasks.diagnose",
+    "evaluate": "dbbstation.tasks.evaluate",
+    "known_instruments": "dbbstation.instrument.library",
+    "known_sources": "dbbstation.tasks.known",
+    "load": "dbbstation.tasks.load",
+    "predict": "dbbstation.tasks.predict",
+    "read_model": "dbbstation.tasks.models",
+    "write_model": "dbbstation.tasks.models",
+}
+"""Public names, and the module of each; their types stand in `__init__.pyi`. `circles` and `sources` are folders of the package, so these tasks have longer names."""
+
+__all__ = [
+    "StationError",
+    "__version__",
+    "calibrate",
+    "circle_figures",
+    "compensate",
+    "diagnose",
+    "evaluate",
+    "known_instruments",
+    "known_sources",
+    "load",
+    "predict",
+    "read_model",
+    "write_model",
+]
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name when it is first used: help of the command line must not wait for SciPy."""
+    if name not in _PUBLIC:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(import_module(_PUBLIC[name]), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PUBLIC})

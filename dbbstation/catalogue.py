@@ -10,6 +10,7 @@ import difflib
 import importlib
 import importlib.metadata
 import pkgutil
+import traceback
 from dataclasses import dataclass
 from inspect import getmembers, isabstract, isclass
 from types import MappingProxyType
@@ -75,20 +76,43 @@ def classes_of(module: ModuleType, base: type[Base]) -> list[type[Base]]:
 def installed(group: str, base: type[Base], faults: list[Problem]) -> list[Found[Base]]:
     """Classes that entry points of installed packages name; what cannot be loaded is added to `faults`."""
     found = []
+    for point in loaded(group, faults):
+        if isclass(point.value) and issubclass(point.value, base):
+            found.append(Found(point.value, point.place, point.remedy))
+        else:
+            what = f"{point.named} is no class that derives from {base.__name__}"
+            faults.append(Problem(point.place.file, 0, 0, what, point.remedy))
+    return found
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What an entry point of an installed package names.
+
+    Attributes:
+        value: the thing itself.
+        named: how the entry point names it.
+        place: entry point and package.
+        remedy: what to do about its faults.
+    """
+
+    value: object
+    named: str
+    place: Problem
+    remedy: str
+
+
+def loaded(group: str, faults: list[Problem]) -> list[Loaded]:
+    """Everything that entry points of a group name; what cannot be loaded is added to `faults`."""
+    found = []
     for point in importlib.metadata.entry_points(group=group):
         package = "a package" if point.dist is None else f"the package {point.dist.name}"
         place = Problem(f"entry point {point.name} of {package}", 0, 0, "")
         remedy = f"mend or uninstall {package}"
         try:
-            kind = point.load()
+            found.append(Loaded(point.load(), point.value, place, remedy))
         except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
             faults.append(Problem(place.file, 0, 0, f"cannot be loaded: {in_words(error)}", remedy))
-            continue
-        if isclass(kind) and issubclass(kind, base):
-            found.append(Found(kind, place, remedy))
-        else:
-            what = f"{point.value} is no class that derives from {base.__name__}"
-            faults.append(Problem(place.file, 0, 0, what, remedy))
     return found
 
 
@@ -115,6 +139,12 @@ def added(
 def in_words(error: Exception) -> str:
     """Return what the code of somebody else raised, with its kind."""
     return f"{type(error).__name__}: {error}"
+
+
+def line_in(error: Exception, file: str) -> int:
+    """Return the last line of a file that an error came through; 0 where it did not."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return next((frame.lineno or 0 for frame in reversed(frames) if frame.filename == file), 0)
 
 
 def looked_up(

@@ -13,10 +13,10 @@ from concurrent.futures import as_completed
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.diagnosed import diagnose_sessions
 from dbbstation.errors import InputError, Problem, StationError
 from dbbstation.files.atomic import write_text
 from dbbstation.processes import deaf, processes
+from dbbstation.tasks.diagnose import diagnose_sessions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, calibrate
-from dbbstation.calibration.reporting.summary import identified_model
+from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.errors import CalibrationError
 from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.model.uncertainty import predicted_poses
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.load import load_sessions
 from studies.coverage_rows import row_of
 from studies.kept_draws import drawn
 from tests.plant.mechanisms.gravity import Gravity

@@ -18,7 +18,7 @@ from dbbstation.circles.signatures import Signature
 from dbbstation.plan.bar import Bar
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.plan.tolerance import CircleFigure
-from dbbstation.tolerated import sizes_of
+from dbbstation.results.tolerances import sizes_of
 from dbbstation.trace.circle import RawCircle
 from studies.coverage_rows import LEAST, MOST
 from studies.kept_draws import drawn

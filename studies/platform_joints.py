@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.diagnose import diagnose, usable_sources
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.workspace import workspace
@@ -19,6 +18,7 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.plan import Plan, PlannedTest
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.diagnose import default_candidates
 from dbbstation.virtual.truth import random_kinematics
 from studies.virtual_session import draw_session
 

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.compare.summary import comparison_summary
 from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.diagnosis.drive.identify import identify
 from dbbstation.diagnosis.drive.sources.registry import known_drive_sources
 from dbbstation.diagnosis.drive.summary import drive_summary
+from dbbstation.diagnosis.table.mismatch import find_mismatch
+from dbbstation.diagnosis.table.summary import mismatch_summary
 from dbbstation.files.recordings.drive_csv import read_drive
 from dbbstation.processes import each
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.load import load_sessions
+from dbbstation.tasks.tables import Asked, load_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -88,6 +91,15 @@ COMPARE = (
 )
 """Of `compare`."""
 
+TABLE = (
+    *ENGINE,
+    Constant("diagnosis.table.data", "REFITTED"),
+    Constant("diagnosis.table.mismatch", "FAR_STATED"),
+    Constant("inference.memory", "LATE"),
+    Constant("inference.bank", "HARDLY_TAKEN", (0.9, 0.975)),
+)
+"""Of `mismatch`. Of a share near one, what it lacks of one is halved and doubled."""
+
 
 @dataclass(frozen=True)
 class Variation:
@@ -96,14 +108,16 @@ class Variation:
     Attributes:
         constant: which is another; None: the program as it is.
         value: in its place.
-        paths: one drive recording, or the sessions A and B.
+        paths: one drive recording or table, or the sessions A and B.
         force_per_ampere: of a drive recording with a current; None: it has a force [N/A].
+        columns: measured and simulated column of a table; None for what is no table.
     """
 
     constant: Constant | None
     value: float
     paths: tuple[Path, ...]
     force_per_ampere: float | None = None
+    columns: tuple[str, str] | None = None
 
     @property
     def data(self) -> str:
@@ -153,6 +167,7 @@ def study(
     jobs: int,
     progress: Callable[[int, int], None] = lambda _done, _of: None,
     only: Collection[str] = (),
+    tables: Sequence[tuple[Path, str, str]] = (),
 ) -> list[Change]:
     """Ask for every answer with every constant as it is, halved and doubled.
 
@@ -162,14 +177,19 @@ def study(
         jobs: processes.
         progress: called with how many answers of how many there are.
         only: names of the constants to vary; all if empty.
+        tables: with the names of the measured and of the simulated column.
 
     Raises:
         StationError: a recording cannot be read, or nothing can be said of it.
     """
-    asked = [((path,), scale, DRIVE) for path, scale in drives] + [((a, b), None, COMPARE) for a, b in pairs]
+    asked: list[tuple[Variation, tuple[Constant, ...]]] = [
+        *((Variation(None, 0.0, (path,), scale), DRIVE) for path, scale in drives),
+        *((Variation(None, 0.0, pair), COMPARE) for pair in pairs),
+        *((Variation(None, 0.0, (path,), columns=(one, other)), TABLE) for path, one, other in tables),
+    ]
     variations = [
-        Variation(constant, value, paths, scale)
-        for paths, scale, constants in asked
+        replace(as_it_is, constant=constant, value=value)
+        for as_it_is, constants in asked
         for constant, value in [
             (None, 0.0),
             *(
@@ -189,7 +209,7 @@ def study(
             variation,
             variation.constant,
             answers[variation],
-            answers[Variation(None, 0.0, variation.paths, variation.force_per_ampere)],
+            answers[replace(variation, constant=None, value=0.0)],
         )
         for variation in variations
         if variation.constant is not None
@@ -198,7 +218,11 @@ def study(
 
 def answer_to(variation: Variation) -> Answer:
     """Return what the program says with another constant, which has its own value again afterwards."""
-    ask = partial(_pair_answer, *variation.paths) if len(variation.paths) > 1 else partial(_drive_answer, variation)
+    ask = partial(_drive_answer, variation)
+    if variation.columns is not None:
+        ask = partial(_table_answer, variation.paths[0], *variation.columns)
+    elif len(variation.paths) > 1:
+        ask = partial(_pair_answer, *variation.paths)
     constant = variation.constant
     if constant is None:
         return ask()
@@ -235,10 +259,20 @@ def _pair_answer(a: Path, b: Path) -> Answer:
     return answer
 
 
+def _table_answer(path: Path, measured: str, simulated: str) -> Answer:
+    table = load_tables([path], Asked(measured, simulated)).table
+    summary = mismatch_summary(find_mismatch(table))
+    answer = _answer(summary["findings"], _values({one["name"]: one["after"] for one in summary["parameters"]}))
+    for one in summary["parameters"]:
+        answer.verdicts[f"{one['name']}, as far as is known of it"] = "beyond" if one["far"] else "within"
+    return answer
+
+
 def _answer(causes: Sequence[dict[str, Any]], values: dict[str, tuple[float, float]]) -> Answer:
     for cause in causes:
-        if cause["verdict"] == "identified":
-            values |= _values({f"{cause['name']} {name}": one for name, one in cause["parameters"].items()})
+        if cause["verdict"] in {"identified", "happened"}:
+            own = cause.get("parameters") or cause.get("values") or {}
+            values |= _values({f"{cause['name']} {name}": one for name, one in own.items()})
     return Answer({cause["name"]: cause["verdict"] for cause in causes}, values)
 
 

@@ -11,6 +11,7 @@ from dbbstation.circles.noise import noise_of
 from dbbstation.circles.path import CirclePath, Filter, both, path_of
 from dbbstation.circles.reversals import AXES_DEG, closure_of, harmonics_of, step_at
 from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.threads import with_one_thread
 from dbbstation.trace.analysis import figures
 from dbbstation.trace.cut import edges_of, overlap_feed
 from dbbstation.trace.loss import lost_samples
@@ -88,6 +89,7 @@ class CircleAnalysis:
     residual_um: NDArray[np.float64]
 
 
+@with_one_thread
 def analyse(raw: RawCircle, recording: Recording | None = None, chosen: Filter = Filter.NONE) -> CircleAnalysis:
     """Work out all figures of a circle.
 
@@ -196,6 +198,7 @@ class PairAnalysis:
     h_deg: float
 
 
+@with_one_thread
 def analyse_pair(one: CircleAnalysis, other: CircleAnalysis) -> PairAnalysis:
     """Work out the figures of both directions of a circle.
 

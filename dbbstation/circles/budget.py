@@ -11,6 +11,7 @@ import numpy as np
 from dbbstation.circles.estimates import estimate_of, pair_estimate
 from dbbstation.circles.noise import FEWEST_SAMPLES, ROUNDING
 from dbbstation.circles.quantity import ABSOLUTE, Quantity
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -171,6 +172,7 @@ OF_ONE = (*RANGES, Quantity.RADIUS, Quantity.MEAN_RADIAL, Quantity.X, Quantity.Y
 OF_BOTH = (Quantity.G_BOTH, Quantity.G_BOTH_LS, Quantity.D, Quantity.H)
 
 
+@with_one_thread
 def budgets(
     one: CircleAnalysis, known: SetUpKnowledge, quantities: Iterable[Quantity] = OF_ONE
 ) -> dict[Quantity, Budget]:
@@ -178,6 +180,7 @@ def budgets(
     return {quantity: budget_of(one, quantity, known) for quantity in quantities}
 
 
+@with_one_thread
 def pair_budgets(pair: PairAnalysis, known: SetUpKnowledge) -> dict[Quantity, Budget]:
     """Return the budgets of G(b), D and H of a circle in both directions on one mounting.
 

@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 from dbbstation.circles.noise import LEAST_UM
 from dbbstation.circles.signatures import Shape, Signature, cyclic_shapes, shapes_of
 from dbbstation.inference.harmonics import LOW, basis, misfit
+from dbbstation.threads import with_one_thread
 from dbbstation.trace.average import means, sector_of
 
 if TYPE_CHECKING:
@@ -124,6 +125,7 @@ class _Fit:
     spike_deg: float
 
 
+@with_one_thread
 def quick_look(turns: Sequence[CircleAnalysis]) -> QuickLook | None:
     """Fit the signatures to both directions of a circle, or to one.
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import io
 import os
 import sys
-from typing import TYPE_CHECKING
+import warnings
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from dbbstation import __version__
 from dbbstation.cli.interrupted import politely_ended
 from dbbstation.cli.lazy import LazyGroup
-from dbbstation.cli.output import echo
+from dbbstation.cli.output import echo, say
 from dbbstation.cli.streams import drop_output, drop_unwritable, flush_output, open_missing
 from dbbstation.errors import StationError
 from dbbstation.files.inputs import input_book
@@ -94,8 +95,10 @@ def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
     open_missing()
-    # The matrices are narrow: threads of the linear algebra cost twice what they save. Read when NumPy is imported.
+    # All work of this process is the program's own: the threads that `dbbstation.threads` takes away are not even started.
+    # Read when NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    warnings.showwarning = _noted
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = _DEBUG in given
     try:
@@ -135,6 +138,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
         echo(f"this is a fault of dbbstation itself; with {_DEBUG} it shows what to report", err=True)
         sys.exit(FAILED)
     sys.exit(code if isinstance(code, int) else DONE)
+
+
+_SHOWN_BY_PYTHON = warnings.showwarning
+
+
+def _noted(message: Warning | str, category: type[Warning], *where: Any, **further: Any) -> None:  # noqa: ANN401 - passed on
+    """Say in a sentence what the program itself warns of; warnings of others are for who mends them, with file and line."""
+    from dbbstation.machine.compiled import NotKeptWarning
+
+    if issubclass(category, NotKeptWarning):
+        say(f"note: {message}")
+    else:
+        _SHOWN_BY_PYTHON(message, category, *where, **further)
 
 
 def _own_first(given: list[str]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,12 +13,7 @@ from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from dbbstation.calibration.fit.calibrate import Calibration
-    from dbbstation.machine.geometry import Machine
-    from dbbstation.model.observation import Observation
-    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.results.calibration import CalibrationResult, PlanCheckResult, ScatterResult
 
 
 @click.command()
@@ -86,84 +81,51 @@ def calibrate(
     With drive-friction among the sources, recorded motor currents are fitted too. They give gains and friction of the
     drives, and with cog-shift the centre of gravity.
     """
-    from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, machine_sources
-    from dbbstation.calibration.fit.methods import Method, as_known
-    from dbbstation.calibration.reporting.summary import identified_model
-    from dbbstation.cli.output import print_json, say
-    from dbbstation.cli.progress import count_bar
+    from dbbstation.cli.output import print_result, say
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.errors import ModelError
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source, sources_of
-    from dbbstation.recorded import load_sessions
-    from dbbstation.sources.registry import sources_named
+    from dbbstation.tasks.calibrate import STAGES
+    from dbbstation.tasks.calibrate import calibrate as calibrated
 
     refuse_outputs((out, figure), force=force)
-    chosen = KINEMATIC_SOURCES if sources is None else tuple(filter(None, map(str.strip, sources.split(","))))
+    chosen = names_in(sources)
     every = every_source(source_files)
-    for name in set(sources_of(source_files, every)) - set(chosen):
+    for name in set(sources_of(source_files, every)) - set(chosen or ()):
         say(f"note: {name} is known now, but not fitted: name it with --sources")
-    fitted = sources_named(dict.fromkeys(chosen + MEASUREMENT_SOURCES), every)
-    if not machine_sources(fitted):
-        raise ModelError(
-            "none of the error sources named belongs to the machine and shows in circles: there is nothing to calibrate",
-            remedy=f"name one such as {KINEMATIC_SOURCES[0]}, or leave --sources out",
+    with stage_bar("calibration", STAGES) as progress:
+        result = calibrated(
+            sessions,
+            sources=chosen,
+            method=method,
+            prescribe=names_in(prescribe),
+            tests=tests,
+            exclude=exclude,
+            law_over_time=law_over_time,
+            known=every,
+            progress=progress,
+            say=lambda text: say(f"note: {text}"),
         )
-    with count_bar("reading runs") as reading:
-        recorded = load_sessions(sessions, exclude, reading, tests)
-    for warning in recorded.warnings:
-        say(f"note: {warning}")
-    fitted = fitted if law_over_time else _following_thermometers(fitted, recorded.observations)
-    known = as_known(Method(method), recorded.machine, recorded.observations)
-    calibration, figures = _calibrated(recorded.machine, known, fitted, _prescribed(prescribe, method))
-    summary = {"method": method, **figures}
     if out is not None:
-        kept = {key: value for key, value in summary.items() if key not in ELSEWHERE_IN_MODEL}
-        write_model(out, identified_model(calibration, kept, recorded.sessions), provenance=provenance(), force=force)
-    if figure is not None:
-        from dbbstation.report.calibration_figure import calibration_figure
-
-        write_bytes(figure, calibration_figure(calibration, format_of(figure)), force=force)
+        write_model(out, result.model, provenance=provenance(), force=force)
+    if figure is not None and result.drawing is not None:
+        write_bytes(figure, result.drawing(format_of(figure)), force=force)
         say(f"figure written to {figure}")
-    for outlier in summary["outliers"]:
-        say(f"outlier, kept out of the fit: {outlier['text']}")
+    for outlier in result.outliers:
+        say(f"outlier, kept out of the fit: {outlier.text}")
     if as_json:
-        print_json(summary)
+        print_result(result)
     else:
-        _print(summary)
+        _print(result)
         if out is not None:
             say(f"model written to {out}")
 
 
-STAGES = {"fit": 0, "figures": 36, "observability": 53}
-"""Stages of a calibration, and the share of its time that has passed by then [%]; fits are one or several."""
-
-
-def _calibrated(
-    machine: Machine,
-    runs: Sequence[Observation],
-    fitted: Sequence[ErrorSource],
-    held: Sequence[tuple[str, str]] | None,
-) -> tuple[Calibration, dict[str, Any]]:
-    """Fit, and say how far it has come; return the fit and its summary."""
-    from dbbstation.calibration.fit.calibrate import calibrate as fit
-    from dbbstation.calibration.outliers.robust import calibrate_robust
-    from dbbstation.calibration.reporting.evaluation import evaluate
-    from dbbstation.calibration.reporting.summary import calibration_summary
-    from dbbstation.cli.progress import stage_bar
-
-    with stage_bar("calibration", STAGES) as progress:
-
-        def fit_told(some: Sequence[Observation]) -> Calibration:
-            progress(f"fit of {len(some)} runs")
-            return fit(machine, some, fitted, prescribe=held)
-
-        calibration, outliers = calibrate_robust(fit_told, runs)
-        progress("figures of circles")
-        evaluated = evaluate(calibration.model, runs)
-        progress("observability")
-        return calibration, calibration_summary(calibration, evaluated, outliers)
+def names_in(text: str | None) -> list[str] | None:
+    """Return names that commas part; None where there is no text."""
+    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
 
 
 LEAST_PRINTED = 1e-99
@@ -178,92 +140,81 @@ IN_MM = frozenset({"cog-shift"})
 NOT_THIS_MACHINE = 10.0
 """Residual over noise above which the machine file itself is in doubt."""
 
-ELSEWHERE_IN_MODEL = frozenset({"sources", "measurement_effects", "directions_lost"})
-"""Parts of the summary that the model file holds in places of their own."""
 
-
-def _prescribed(names: str | None, method: str) -> list[tuple[str, str]] | None:
-    """Parameters named, or nobody's choice: the directions themselves on a jig, the program's choice otherwise."""
-    if names is None:
-        return None if method == "jig" else []
-    parts = [name.strip().partition(".") for name in names.split(",") if name.strip()]
-    return [(source, parameter) for source, _, parameter in parts]
-
-
-def _print(summary: Mapping[str, Any]) -> None:
+def _print(result: CalibrationResult) -> None:
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.motors import print_currents
 
-    print_runs(summary)
+    print_runs(result.runs)
     echo()
-    _print_parameters(summary)
+    _print_parameters(result)
     echo()
-    echo(f"{summary['parameters_identified']} parameters identified")
-    held = "" if summary["parameters_prescribed"] else ", held at nominal"
-    for text in summary["directions_lost"]:
+    echo(f"{result.parameters_identified} parameters identified")
+    held = "" if result.parameters_prescribed else ", held at nominal"
+    for text in result.directions_lost:
         echo(f"not visible to these tests{held}: {text}")
-    if summary["parameters_prescribed"]:
-        echo(f"held at nominal instead: {', '.join(summary['parameters_prescribed'])}")
-    for text in summary["directions_regularised"]:
+    if result.parameters_prescribed:
+        echo(f"held at nominal instead: {', '.join(result.parameters_prescribed)}")
+    for text in result.directions_regularised:
         echo(f"not visible to these tests, known by the machine file's joint tolerance only: {text}")
-    for text in summary["gaps"]:
+    for text in result.gaps:
         echo(f"  {text}")
-    for weak in summary["observability"]["weak_directions"][:1]:
-        echo(f"least visible, to {weak['uncertainty']:.1f} {weak['unit']}: {weak['text']}")
-    if not summary["plan_check"]["enough"]:
-        _print_plan_check(summary["plan_check"])
-    _print_misfit(summary)
-    for check in summary["scatter"]:
-        _print_scatter(check, missing_physics=summary["misfit"]["missing_physics"])
-    echo(f"nominal machine leaves   {summary['nominal_rms_um']:8.2f} µm rms")
-    echo(f"model leaves             {summary['residual_rms_um']:8.2f} µm rms")
-    echo(f"... within each mounting {summary['residual_within_mounting_rms_um']:8.2f} µm rms")
-    echo(f"noise of one reading     {summary['noise_um']:8.2f} µm")
-    print_currents(summary)
+    for weak in result.observability.weak_directions[:1]:
+        echo(f"least visible, to {weak.uncertainty:.1f} {weak.unit}: {weak.text}")
+    if not result.plan_check.enough:
+        _print_plan_check(result.plan_check)
+    _print_misfit(result)
+    for check in result.scatter:
+        _print_scatter(check, missing_physics=result.misfit.missing_physics)
+    echo(f"nominal machine leaves   {result.nominal_rms_um:8.2f} µm rms")
+    echo(f"model leaves             {result.residual_rms_um:8.2f} µm rms")
+    echo(f"... within each mounting {result.residual_within_mounting_rms_um:8.2f} µm rms")
+    echo(f"noise of one reading     {result.noise_um:8.2f} µm")
+    print_currents(result.motor_currents)
 
 
-def _print_plan_check(check: Mapping[str, Any]) -> None:
+def _print_plan_check(check: PlanCheckResult) -> None:
     echo(
-        f"{check['tests']} tests are too few to reveal a wrong tilt, height or position in the plan: {check['left']} degrees "
-        f"of freedom are left to check it, one circle has {check['of_one_test']}; a small residual proves nothing here, so "
+        f"{check.tests} tests are too few to reveal a wrong tilt, height or position in the plan: {check.left} degrees "
+        f"of freedom are left to check it, one circle has {check.of_one_test}; a small residual proves nothing here, so "
         "check the tilts by hand or measure further circles"
     )
 
 
-def _print_misfit(summary: Mapping[str, Any]) -> None:
+def _print_misfit(result: CalibrationResult) -> None:
     """Print what is left beyond noise and mountings; nothing where chance explains it."""
-    misfit = summary["misfit"]
-    if not misfit["missing_physics"]:
+    misfit = result.misfit
+    if not misfit.missing_physics:
         return
-    chance = misfit["probability"]
+    chance = misfit.probability
     echo(
-        f"the residual exceeds noise and mountings by {misfit['rms_um']:.2f} µm rms (probability by chance "
+        f"the residual exceeds noise and mountings by {misfit.rms_um:.2f} µm rms (probability by chance "
         f"{'below 1e-99' if chance < LEAST_PRINTED else f'{chance:.1g}'}): physics is missing from the model; "
         "`dbbstation diagnose` looks for it"
     )
-    if summary["residual_within_mounting_rms_um"] > NOT_THIS_MACHINE * summary["noise_um"]:
+    if result.residual_within_mounting_rms_um > NOT_THIS_MACHINE * result.noise_um:
         echo(
             f"... more than {NOT_THIS_MACHINE:.0f} times the noise: check also that the machine file is this machine's, its "
             "joints in the order of the struts and the rotation convention that of the control"
         )
 
 
-def _print_parameters(summary: Mapping[str, Any]) -> None:
+def _print_parameters(result: CalibrationResult) -> None:
     from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_table
 
     rows = []
-    for source in summary["sources"]:
-        if source["name"] in IN_A_TABLE_OF_THEIR_OWN:
+    for source in result.sources:
+        if source.name in IN_A_TABLE_OF_THEIR_OWN:
             continue
-        for name, number in source["parameters"].items():
-            value, uncertainty, unit = number["value"], number["uncertainty"], number["unit"]
+        for name, number in source.parameters.items():
+            value, uncertainty, unit = number.value, number.uncertainty, number.unit
             each = 1.0
-            if unit == "mm" and source["name"] not in IN_MM:
+            if unit == "mm" and source.name not in IN_MM:
                 each, unit = 1e3, "µm"
             known: list[object] = ["-", "-"]
             if uncertainty is not None:
                 known = [each * uncertainty, COVERAGE_FACTOR * each * uncertainty]
-            rows.append([source["name"], name.removesuffix("_mm").replace("_", " "), each * value, *known, unit])
+            rows.append([source.name, name.removesuffix("_mm").replace("_", " "), each * value, *known, unit])
     print_table(["source", "parameter", "value", "u", EXPANDED, "unit"], rows)
 
 
@@ -278,27 +229,13 @@ BESIDE_MISSING_PHYSICS = (
 )
 
 
-def _print_scatter(check: Mapping[str, Any], *, missing_physics: bool) -> None:
-    stated = f"balls stated to stand within {check['stated_um']:.2f} µm per axis"
-    if check["fits"] is None:
+def _print_scatter(check: ScatterResult, *, missing_physics: bool) -> None:
+    stated = f"balls stated to stand within {check.stated_um:.2f} µm per axis"
+    if check.fits is None or check.interval_um is None:
         echo(f"{stated}: these tests cannot tell")
         return
-    low, high = check["interval_um"]
-    said = SAID_OF_SCATTER[check["finding"]]
-    if missing_physics and check["finding"] == "more":
+    low, high = check.interval_um
+    said = SAID_OF_SCATTER[check.finding]
+    if missing_physics and check.finding == "more":
         said = BESIDE_MISSING_PHYSICS
-    echo(f"{stated} scatter by {check['found_um']:.2f} ({low:.2f} to {high:.2f}) µm, {said}")
-
-
-def _following_thermometers(
-    fitted: tuple[ErrorSource, ...], observations: tuple[Observation, ...]
-) -> tuple[ErrorSource, ...]:
-    """Sources that grow with time by their thermometers where those were logged; said, since it is another model."""
-    from dbbstation.cli.output import say
-    from dbbstation.sources.laws.by_temperature import following_thermometers
-
-    forms = following_thermometers(fitted, [observation.motion() for observation in observations])
-    for source, form in zip(fitted, forms, strict=True):
-        if form is not source:
-            say(f"note: {form.name} follows the logged temperatures, not a law over time (--law-over-time)")
-    return forms
+    echo(f"{stated} scatter by {check.found_um:.2f} ({low:.2f} to {high:.2f}) µm, {said}")

@@ -58,39 +58,35 @@ def circles(
       dbbstation circles session --test a --budget --json
       dbbstation circles session --test a --quick-look
     """
-    from dbbstation.circled import circled_summary, load_circles, quick_looks
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.files.formats.model import read_model
-    from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.table_csv import table_csv
+    from dbbstation.tasks.circles import circle_figures
 
     if model is not None and not findings:
         raise click.UsageError("--model says where circles are expected: give --findings too")
     if out is not None:
         refuse_existing_table(out, force=force)
-    chosen = filter_of(cut_off)
-    identified = None if model is None else read_model(model, every_source(()))
     with count_bar("circles") as progress:
-        found = load_circles(
+        result = circle_figures(
             sessions,
-            chosen,
-            tests,
-            exclude,
+            undulations=filter_of(cut_off),
+            tests=tests,
+            exclude=exclude,
             findings=findings,
-            model=identified,
-            progress=progress,
+            quick_look=quick_look,
+            model=model,
+            progress=lambda _, done=0, of=0: progress(done, of),
+            say=lambda text: say(f"note: {text}"),
         )
-    for warning in found.warnings:
-        say(f"note: {warning}")
-    summary = circled_summary(found, chosen)
-    if quick_look:
-        summary["quick_look"] = quick_looks(found)
+    summary = result.to_dict()
     if out is not None:
-        names, rows = _flat(summary["runs"])
-        write_table(out, table_csv(names, list(zip(*rows, strict=True))), provenance(), force=force)
+        rows = result.rows()
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        columns = [[row.get(name, "") for name in names] for row in rows]
+        write_table(out, table_csv(names, list(zip(*columns, strict=True))), provenance(), force=force)
         summary["csv"] = str(out)
     if as_json:
         print_json(summary)
@@ -276,36 +272,3 @@ def _print_quick_looks(looks: Sequence[Mapping[str, Any]]) -> None:
     echo(f"\nquick look at the signatures of serial axes, {EXPANDED}")
     echo("On a hexapod these are symptoms, no causes: it has no axes X and Y. Causes: `dbbstation diagnose`.")
     print_table(["test", "dir", "n", "signature", "at", "value", "U", "unit", "seen", ""], rows)
-
-
-def _flat(runs: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[object]]]:
-    """Columns and rows of a table: every number of a run that is one."""
-    flat = [_flattened(run) for run in runs]
-    names = list(dict.fromkeys(name for run in flat for name in run))
-    return names, [[run.get(name, "") for name in names] for run in flat]
-
-
-def _flattened(run: Mapping[str, Any]) -> dict[str, object]:
-    found: dict[str, object] = {}
-    for key, value in run.items():
-        match value:
-            case str() | int() | float():
-                found[key] = value
-            case {"max": _, "min": _} | {"x": _, "y": _}:
-                found |= {f"{key.removesuffix('_um')}_{part}_um": number for part, number in value.items()}
-            case _:
-                pass
-    for harmonic in run.get("harmonics", ()):
-        found[f"harmonic_{harmonic['undulations']}_um"] = harmonic["amplitude_um"]
-    for step in run.get("reversal_steps", ()):
-        found[f"step_at_{step['theta_deg']:.0f}_deg_um"] = step["height_um"]
-    if run.get("closure"):
-        found["closure_um"] = run["closure"]["height_um"]
-    if run.get("noise_um"):
-        found["noise_um"] = run["noise_um"]["of_a_reading"] or ""
-    for figure, budget in run.get("uncertainty", {}).items():
-        plain = figure.lower().replace("(", "_").replace(")", "").replace(" ", "_")
-        found[f"u_{plain}_um"] = "" if budget["u_um"] is None else budget["u_um"]
-    for finding in run.get("findings", ()):
-        found[f"finding_{finding['name'].replace(' ', '_')}"] = finding["verdict"]
-    return found

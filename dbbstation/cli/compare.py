@@ -14,10 +14,10 @@ from dbbstation.cli.output import echo
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.recorded import Recorded
+    from dbbstation.tasks.load import Recorded
 
 
-STAGES = {"candidates": 1, "sets of causes": 30, "look": 60, "verdicts": 90}
+STAGES = {"candidates": 1, "sets of causes": 30, "look": 60, "held-out tests": 80}
 """How much of a comparison is done when each stage begins [%]."""
 
 
@@ -52,7 +52,6 @@ def compare(
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import stage_bar
-    from dbbstation.diagnosed import default_candidates
     from dbbstation.diagnosis.compare.comparison import compare as put_side_by_side
     from dbbstation.diagnosis.compare.notes import notes_of
     from dbbstation.diagnosis.compare.summary import comparison_summary
@@ -60,6 +59,7 @@ def compare(
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.report.compare_figure import compare_figure
     from dbbstation.sources.registry import known_sources, sources_named
+    from dbbstation.tasks.diagnose import default_candidates
 
     if figure is not None:
         refuse_existing(figure, force=force)
@@ -90,7 +90,7 @@ def _both(a: Path, b: Path, tests: tuple[str, ...], exclude: tuple[str, ...]) ->
     """
     from dbbstation.cli.progress import count_bar
     from dbbstation.errors import InputError, Problem
-    from dbbstation.recorded import load_sessions
+    from dbbstation.tasks.load import load_sessions
 
     with count_bar(f"reading {a.name}") as reading:
         one = load_sessions([a], exclude, reading, tests)
@@ -103,6 +103,8 @@ def _both(a: Path, b: Path, tests: tuple[str, ...], exclude: tuple[str, ...]) ->
 
 
 def _print(summary: Mapping[str, Any]) -> None:
+    if summary["held_out_worse"]:
+        echo("Held-out tests are predicted worse than by the first session alone. Nothing is identified.\n")
     echo(summary["text"])
     for note in summary["notes"]:
         echo(f"- {note}")
@@ -152,6 +154,12 @@ def _tenths(value: float) -> str:
     return f"{round(value, 1) + 0.0:.1f}"
 
 
+def _groups_with_gain(cause: Mapping[str, Any]) -> str:
+    """In how many groups of tests that were held back a cause brought something; empty where no other tests can show it."""
+    gains = cause["gains"]
+    return f"{gains['with_gain']} of {len(gains['parts'])}" if gains and cause["acts"] == "always" else ""
+
+
 def _print_causes(summary: Mapping[str, Any]) -> None:
     from dbbstation.cli.output import print_table
 
@@ -166,13 +174,14 @@ def _print_causes(summary: Mapping[str, Any]) -> None:
                 f"{cause['name']}, {cause['form']}" if cause["form"] else cause["name"],
                 cause["verdict"],
                 f"{cause['probability']:.3f}",
+                _groups_with_gain(cause),
                 f"{cause['rms_um']:.2f}",
                 *(f"{100 * cause[key]:.0f} %" for key in ("share", "opposite", "taken_up")),
                 cause["where"]["text"],
             ]
             for cause in there
         ]
-        titles = ["cause", "verdict", "probability", "µm rms", "share", "opposite", "calibration", "where"]
+        titles = ["cause", "verdict", "probability", "gain in", "µm rms", "share", "opposite", "calibration", "where"]
         print_table(titles, rows)
         for cause in there:
             if cause["text"]:

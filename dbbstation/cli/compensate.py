@@ -80,28 +80,29 @@ def compensate(
       dbbstation compensate part.nc --from linuxcnc --model model.yaml --out true.ngc --start 0,0,-1000,0,0,0
       dbbstation compensate part.ngc --model model.yaml --out fast.ngc --prefer feed
     """
-    from dataclasses import replace
-
-    from dbbstation.cli.programs import loaded_inverse, origin_of, parsed_pose, preferred, print_programs, read_source
-    from dbbstation.files.atomic import refuse_existing, write_text
-    from dbbstation.files.own_dialects import dialect_given
-    from dbbstation.nc.export import compensated_program
-    from dbbstation.nc.registry import dialect_of_file
+    from dbbstation.cli.output import say
+    from dbbstation.cli.programs import parsed_pose, print_programs
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.files.own_sources import every_source
+    from dbbstation.tasks.compensate import compensate as compensated
 
     pose = None if start is None else parsed_pose(start)
-    refuse_existing(out, force=force)
-    written_in = dialect_given(dialect)
-    text = read_source(program_file)
-    reader = dialect_of_file(str(program_file), text) if source is None else dialect_given(source)
-    path = reader.read(text, str(program_file), start=pose)
-    inverse = loaded_inverse(model_file, time_s, source_files, largest_mm)
-    inverse = replace(inverse, prefer=preferred(prefer), accepted_um=accepted_um)
-    done = compensated_program(
-        path,
-        written_in,
-        inverse,
-        chord_mm=chord_um / 1e3,
-        origin=origin_of({"program file": program_file}, inverse),
+    every = every_source(source_files)
+    result = compensated(
+        program_file,
+        model_file,
+        out,
+        dialect=dialect,
+        written_in=source,
+        start=pose,
+        chord_um=chord_um,
+        prefer=prefer,
+        accept_chord_um=accepted_um,
+        time_s=time_s,
+        largest_correction_mm=largest_mm,
+        force=force,
+        known=every,
+        provenance=provenance,
+        say=lambda text: say(f"note: {text}"),
     )
-    write_text(out, done.text, force=force)
-    print_programs([(out, done)], written_in, inverse.model.machine, model_file, as_json=as_json)
+    print_programs(result, as_json=as_json)

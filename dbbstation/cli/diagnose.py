@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,20 +13,9 @@ from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
-    from dbbstation.diagnosis.findings import Diagnosis
-    from dbbstation.diagnosis.unexplained_model import Kept
-
-STAGES = {
-    "kinematic calibration": 0,
-    "candidates": 10,
-    "joint fit": 45,
-    "verdicts": 75,
-    "held-out tests": 77,
-    "next test": 80,
-}
-"""Stages that a diagnosis reports, and the share of its time that has passed by then [%]; joint fits are none or several."""
+    from dbbstation.results.diagnosis import CauseResult, DiagnosisResult, UnexplainedCurve, WorkspaceGain
 
 
 @click.command()
@@ -72,44 +61,41 @@ def diagnose(
       dbbstation diagnose 2026-11-20-hexapod-7 --source-file scale_bow.py
       dbbstation diagnose 2026-11-20-hexapod-7 --out kept.yaml --keep-unexplained
     """
-    from dbbstation.calibration.reporting.evaluation import evaluate
-    from dbbstation.calibration.reporting.summary import calibration_summary, identified_model
-    from dbbstation.cli.calibrate import ELSEWHERE_IN_MODEL
-    from dbbstation.cli.output import print_json, say
-    from dbbstation.cli.progress import count_bar, stage_bar
+    from dbbstation.cli.calibrate import names_in
+    from dbbstation.cli.output import print_result, say
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes
-    from dbbstation.diagnosed import diagnose_sessions
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
     from dbbstation.files.own_sources import every_source
+    from dbbstation.tasks.diagnose import STAGES
+    from dbbstation.tasks.diagnose import diagnose as diagnosed
 
     if keep_unexplained and out is None:
         raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
     refuse_outputs((out, figure), force=force)
-    candidates = [name.strip() for name in sources.split(",")] if sources else None
-    known = every_source(source_files)
-    with count_bar("reading runs") as reading, stage_bar("diagnosis", STAGES) as progress:
-        diagnosed = diagnose_sessions(sessions, candidates, exclude, say, known, progress, reading, tests)
-    found, summary = diagnosed.diagnosis, diagnosed.summary()
+    with stage_bar("diagnosis", STAGES) as progress:
+        result = diagnosed(
+            sessions,
+            sources=names_in(sources or None),
+            tests=tests,
+            exclude=exclude,
+            keep_unexplained=keep_unexplained,
+            known=every_source(source_files),
+            progress=progress,
+            say=lambda text: say(f"note: {text}"),
+        )
     if out is not None:
-        unnamed = _kept(found) if keep_unexplained else None
-        fit = found.after if unnamed is None else unnamed.fit
-        calibrated = calibration_summary(fit, evaluate(fit.model, fit.observations))
-        kept = {key: value for key, value in calibrated.items() if key not in ELSEWHERE_IN_MODEL}
-        of_sessions = diagnosed.recorded.sessions
-        model = identified_model(fit, kept, of_sessions) if unnamed is None else unnamed.identified(kept, of_sessions)
-        write_model(out, model, provenance=provenance(), force=force)
-        say_unknown_causes(model.model)
-    if figure is not None:
-        from dbbstation.report.diagnosis_figure import diagnosis_figure
-
-        write_bytes(figure, diagnosis_figure(found, format_of(figure)), force=force)
+        write_model(out, result.model, provenance=provenance(), force=force)
+        say_unknown_causes(result.model.model)
+    if figure is not None and result.drawing is not None:
+        write_bytes(figure, result.drawing(format_of(figure)), force=force)
         say(f"figure written to {figure}")
     if as_json:
-        print_json(summary)
+        print_result(result)
     else:
-        _print(summary)
+        _print(result)
         if out is not None:
             say(f"joint model written to {out}")
 
@@ -118,59 +104,59 @@ UNPREDICTABLE_UM = 1000.0
 """A prediction that is off by more says that nothing was predicted [µm]."""
 
 
-def _print(summary: Mapping[str, Any]) -> None:
-    _print_mismatch(summary)
-    for outlier in summary["outliers"]:
-        echo(f"outlier, kept out of the fits: {outlier['text']}")
-    _print_sources(summary["sources"])
-    if summary["locations"]:
+def _print(result: DiagnosisResult) -> None:
+    _print_mismatch(result)
+    for outlier in result.outliers:
+        echo(f"outlier, kept out of the fits: {outlier.text}")
+    _print_sources(result.sources)
+    if result.locations:
         echo("\nlargest misfit of the kinematic calibration:")
-        for location in summary["locations"][:5]:
-            echo(f"  {location['text']} ({100 * location['share']:.0f} % of it)")
-    _print_gain(summary)
-    if summary["workspace"]:
-        _print_workspace(summary["workspace"])
-    if summary["parameter_shift"]:
+        for location in result.locations[:5]:
+            echo(f"  {location.text} ({100 * location.share:.0f} % of it)")
+    _print_gain(result)
+    if result.workspace:
+        _print_workspace(result.workspace)
+    if result.parameter_shift:
         echo("bias of the kinematic calibration, largest parameters:")
-        for shift in summary["parameter_shift"][:4]:
-            echo(f"  {shift['parameter']}: {shift['shift_um']:+.0f} µm")
-    echo(summary["unexplained"]["text"])
-    if summary["unexplained"]["curve"]:
-        _print_curve(summary["unexplained"]["curve"])
-    if summary["second_start_agrees"] is False:
+        for shift in result.parameter_shift[:4]:
+            echo(f"  {shift.parameter}: {shift.shift_um:+.0f} µm")
+    echo(result.unexplained.text)
+    if result.unexplained.curve:
+        _print_curve(result.unexplained.curve)
+    if result.second_start_agrees is False:
         echo("A second search came to another set of causes: several explain these recordings, take it with care.")
-    _print_next_tests(summary)
+    _print_next_tests(result)
 
 
-def _print_mismatch(summary: Mapping[str, Any]) -> None:
+def _print_mismatch(result: DiagnosisResult) -> None:
     """Print whether the recordings differ from the kinematic model; before that, where what was found predicts worse."""
-    if summary["held_out_worse"]:
+    if result.held_out_worse:
         echo("Held-out tests are predicted worse than by the kinematic calibration alone. Nothing is identified.\n")
-    if summary["mismatch"]:
+    if result.mismatch:
         echo(
-            f"The recordings differ from the kinematic model by {summary['misfit_rms_um']:.2f} µm rms beyond noise "
-            f"(probability by chance {_chance(summary['probability'])})."
+            f"The recordings differ from the kinematic model by {result.misfit_rms_um:.2f} µm rms beyond noise "
+            f"(probability by chance {_chance(result.probability)})."
         )
     else:
-        echo(f"The recordings agree with the kinematic model (probability {summary['probability']:.2g}).")
+        echo(f"The recordings agree with the kinematic model (probability {result.probability:.2g}).")
     echo()
 
 
-def _print_workspace(elsewhere: Mapping[str, Any]) -> None:
+def _print_workspace(elsewhere: WorkspaceGain) -> None:
     """Print how far apart two models put the tool, with and without what they shift it by in common, and how well that is known."""
-    shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", elsewhere["common_shift_um"], strict=True))
+    shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", elsewhere.common_shift_um, strict=True))
     for which, error, u, more in (
-        ("as a whole", "error_with_shift_rms_um", "uncertainty_with_shift_rms_um", ""),
+        ("as a whole", elsewhere.error_with_shift_rms_um, elsewhere.uncertainty_with_shift_rms_um, ""),
         (
             "about a common shift",
-            "error_rms_um",
-            "uncertainty_rms_um",
-            f", {elsewhere['error_greatest_um']:.1f} µm at most",
+            elsewhere.error_rms_um,
+            elsewhere.uncertainty_rms_um,
+            f", {elsewhere.error_greatest_um:.1f} µm at most",
         ),
     ):
-        known = "not known" if elsewhere[u] is None else f"{elsewhere[u]:.1f} µm rms"
+        known = "not known" if u is None else f"{u:.1f} µm rms"
         echo(
-            f"over the workspace, kinematic calibration less joint model, {which}: {elsewhere[error]:.1f} µm rms{more}; u of the joint "
+            f"over the workspace, kinematic calibration less joint model, {which}: {error:.1f} µm rms{more}; u of the joint "
             f"model {known}"
         )
     echo(f"  the common shift is {shift} µm; a program whose zero is set on the part does not feel it")
@@ -179,84 +165,71 @@ def _print_workspace(elsewhere: Mapping[str, Any]) -> None:
 STILL_OPEN = frozenset({"ambiguous", "not-testable"})
 
 
-def _print_next_tests(summary: Mapping[str, Any]) -> None:
+def _print_next_tests(result: DiagnosisResult) -> None:
     """Print which tests to measure next; that none helps, where a verdict is open; nothing where none is."""
-    if summary["next_test"]:
-        tests = [summary["next_test"], *summary["further_tests"]]
+    if result.next_test:
+        tests = [result.next_test, *result.further_tests]
         which = "this test" if len(tests) == 1 else f"these {len(tests)} tests"
         echo(
-            f"measure next: {'; and '.join(test['text'] for test in tests)}; {which} would bring u of {tests[0]['source']} "
-            f"to {tests[-1]['sigma_after']:.2g} instead of {tests[0]['sigma_before']:.2g} {tests[0]['unit']}"
+            f"measure next: {'; and '.join(test.text for test in tests)}; {which} would bring u of {tests[0].source} "
+            f"to {tests[-1].sigma_after:.2g} instead of {tests[0].sigma_before:.2g} {tests[0].unit}"
         )
-    elif any(source["verdict"] in STILL_OPEN and source["gain"] is not None for source in summary["sources"]):
+    elif any(source.verdict in STILL_OPEN and source.gain is not None for source in result.sources):
         echo("measure next: no proposal; up to three further tests would neither change a verdict nor halve u")
-
-
-def _kept(found: Diagnosis) -> Kept | None:
-    """Unmodelled effect to be kept in the model; None where it cannot be kept, and the reason on standard error."""
-    from dbbstation.cli.output import say
-    from dbbstation.diagnosis.unexplained_model import keep_unexplained
-    from dbbstation.errors import ModelError
-
-    try:
-        return keep_unexplained(found.unexplained.curve, found.after)
-    except ModelError as error:
-        say(f"note: the model is written without it: {error.what}")
-        return None
 
 
 MOST_POINTS = 12
 """Points of a curve that are printed, at the most; a wave has many more, and its size and period are printed."""
 
 
-def _print_curve(curve: Mapping[str, Any]) -> None:
+def _print_curve(curve: UnexplainedCurve) -> None:
     from dbbstation.cli.output import print_table
 
-    points = curve["points"]
+    points = curve.points
     echo(
-        f"it moves the readings by {curve['readings_um']:.2f} µm rms; {curve['unconcealed_um']:.2f} µm rms of that no "
+        f"it moves the readings by {curve.readings_um:.2f} µm rms; {curve.unconcealed_um:.2f} µm rms of that no "
         "kinematic parameter can imitate; cause unknown:"
     )
-    if curve["period_mm"] is not None:
+    if curve.period_mm is not None:
         echo(
-            f"  a wave of {curve['period_mm']:.2f} mm, from {points[0]['at']:.0f} to {points[-1]['at']:.0f} mm, up to "
-            f"{max(abs(point['value_um']) for point in points):.2f} µm"
+            f"  a wave of {curve.period_mm:.2f} mm, from {points[0].at:.0f} to {points[-1].at:.0f} mm, up to "
+            f"{max(abs(point.value_um) for point in points):.2f} µm"
         )
-    elif curve["form"]:
-        echo(f"  {curve['form']}")
+    elif curve.form:
+        echo(f"  {curve.form}")
     step = -(-len(points) // MOST_POINTS)
-    rows = [[f"{p['at']:.6g}", f"{p['value_um']:+.2f}", "±", f"{p['uncertainty_um']:.2f}"] for p in points[::step]]
-    print_table([f"{curve['variable']} / {curve['unit']}", "error / µm", "", "u / µm"], rows)
-    if curve["convention"]:
-        echo(f"  ({curve['convention']})")
+    rows = [[f"{p.at:.6g}", f"{p.value_um:+.2f}", "±", f"{p.uncertainty_um:.2f}"] for p in points[::step]]
+    print_table([f"{curve.variable} / {curve.unit}", "error / µm", "", "u / µm"], rows)
+    if curve.convention:
+        echo(f"  ({curve.convention})")
 
 
-def _print_gain(summary: Mapping[str, Any]) -> None:
+def _print_gain(result: DiagnosisResult) -> None:
     """Print residual and prediction of held-out tests before and after."""
-    residual, held_out = summary["residual_rms_um"], summary["held_out_rms_um"]
-    echo(f"\nresidual within mountings {residual['before']:.2f} -> {residual['after']:.2f} µm rms")
-    normalised = summary["held_out_normalised"]
-    if summary["held_out"] == "not-tested" and any(source["verdict"] == "identified" for source in summary["sources"]):
+    residual, held_out = result.residual_rms_um, result.held_out_rms_um
+    echo(f"\nresidual within mountings {residual.before:.2f} -> {residual.after:.2f} µm rms")
+    normalised = result.held_out_normalised
+    if result.held_out == "not-tested" and any(source.verdict == "identified" for source in result.sources):
         echo("too few tests to hold some back: whether what is identified predicts others was not tested")
-    if max(held_out.values()) > UNPREDICTABLE_UM:
+    if max(held_out.before, held_out.after) > UNPREDICTABLE_UM:
         echo("held-out tests cannot be predicted: the other tests are too few to identify the machine")
     else:
         echo(
-            f"error of predicting held-out tests {held_out['before']:.2f} -> {held_out['after']:.2f} µm rms; over its "
-            f"stated uncertainty {normalised['before']:.2f} -> {normalised['after']:.2f}"
+            f"error of predicting held-out tests {held_out.before:.2f} -> {held_out.after:.2f} µm rms; over its "
+            f"stated uncertainty {normalised.before:.2f} -> {normalised.after:.2f}"
         )
 
 
-def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
+def _print_sources(sources: Sequence[CauseResult]) -> None:
     from dbbstation.cli.output import print_table
 
     rows = []
     for source in sources:
-        hidden = "" if source["concealed"] is None else f"{100 * source['concealed']:.0f} %"
-        gain = "" if source["gain"] is None else str(round(source["gain"]))
-        again = "" if source["stability"] is None else f"{100 * source['stability']:.0f} %"
-        alike = ", ".join(source["ambiguous_with"] or source["class"][1:])
-        rows.append([source["name"], source["verdict"], _probable(source), gain, hidden, again, alike])
+        hidden = "" if source.concealed is None else f"{100 * source.concealed:.0f} %"
+        gain = "" if source.gain is None else str(round(source.gain))
+        again = "" if source.stability is None else f"{100 * source.stability:.0f} %"
+        alike = ", ".join(source.ambiguous_with or source.equivalent[1:])
+        rows.append([source.name, source.verdict, _probable(source), gain, hidden, again, alike])
     titles = [
         "cause",
         "verdict",
@@ -267,15 +240,15 @@ def _print_sources(sources: Sequence[Mapping[str, Any]]) -> None:
         "not distinguished from",
     ]
     print_table(titles, rows)
-    named = [source for source in sources if source["verdict"] in SAID]
+    named = [source for source in sources if source.verdict in SAID]
     if named:
         echo("\nvalue ± u (one standard uncertainty)")
         for source in named:
             echo()
-            for name, number in source["parameters"].items():
-                value, uncertainty = f"{number['value']:.4g}", f"{number['uncertainty']:.2g}"
-                echo(f"{source['name']}: {name} {value} ± {uncertainty} {number['unit']}")
-            echo(f"  {source['text']}")
+            for name, number in source.parameters.items():
+                value, uncertainty = f"{number.value:.4g}", f"{number.uncertainty:.2g}"
+                echo(f"{source.name}: {name} {value} ± {uncertainty} {number.unit}")
+            echo(f"  {source.text}")
 
 
 SAID = frozenset({"identified", "happened", "does-not-predict", "ambiguous"})
@@ -291,9 +264,9 @@ LEAST_PRINTED = 1e-99
 """Probabilities below are printed alike."""
 
 
-def _probable(source: Mapping[str, Any]) -> str:
+def _probable(source: CauseResult) -> str:
     """Probability as printed: no figure is closer to one or nought than the catalogue of causes is complete."""
-    if source["probability"] is None:
+    if source.probability is None:
         return ""
     surest = 0.999
-    return f"> {surest}" if source["probability"] > surest else f"{source['probability']:.3f}"
+    return f"> {surest}" if source.probability > surest else f"{source.probability:.3f}"

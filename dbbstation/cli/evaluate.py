@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.output import echo
+from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Sequence
 
-from dbbstation.cli.source_files import source_file_option
+    from dbbstation.results.evaluation import EvaluatedRun
 
 
 @click.command()
@@ -44,55 +45,59 @@ def evaluate(
       dbbstation evaluate check-session --model model.yaml --json
     """
     from dbbstation.cli.figures import print_runs
-    from dbbstation.cli.output import print_json, say
-    from dbbstation.cli.progress import count_bar
+    from dbbstation.cli.output import print_result, say
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.shop import shop_settings
-    from dbbstation.cli.tolerances import held_against, print_tolerances
-    from dbbstation.evaluated import evaluated
-    from dbbstation.files.formats.model import read_model
+    from dbbstation.cli.tolerances import print_tolerances
     from dbbstation.files.own_sources import every_source
-    from dbbstation.machine.difference import check_model_is_of
-    from dbbstation.recorded import load_sessions
+    from dbbstation.tasks.evaluate import STAGES
+    from dbbstation.tasks.evaluate import evaluate as evaluated
 
     settings = shop_settings()
-    identified = read_model(model, every_source(source_files))
-    with count_bar("reading runs") as reading:
-        recorded = load_sessions(sessions, exclude, reading, tests)
-    check_model_is_of(recorded.machine, identified.model.machine)
-    for warning in recorded.warnings:
-        say(f"note: {warning}")
-    with count_bar("predicting runs") as predicting:
-        summary = evaluated(identified, recorded, predicting)
-    summary["tolerances"] = held_against(settings, summary)
+    with stage_bar("evaluation", STAGES) as progress:
+        result = evaluated(
+            sessions,
+            model,
+            tests=tests,
+            exclude=exclude,
+            tolerances=settings.tolerances,
+            known=every_source(source_files),
+            progress=progress,
+            say=lambda text: say(f"note: {text}"),
+        )
     if as_json:
-        print_json(summary)
+        print_result(result)
         return
-    print_runs(summary, low_passed=True)
+    print_runs(result.runs, low_passed=True)
     echo()
-    _print_predicted(summary)
+    _print_predicted(result.runs)
     echo()
-    echo(f"nominal machine leaves {summary['nominal_rms_um']:8.2f} µm rms")
-    echo(f"model leaves           {summary['residual_rms_um']:8.2f} µm rms")
-    echo(f"uncompensated at Z {summary['plane_z_mm']:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
-    if summary["plane_without"]:
-        echo(f"(without {', '.join(summary['plane_without'])}: no pose alone says what they do)")
-    for label, figure in (("flatness           ", "flatness"), ("parallelism along X", "parallelism")):
-        u_um = summary[f"{figure}_u_um"]
+    echo(f"nominal machine leaves {result.nominal_rms_um:8.2f} µm rms")
+    echo(f"model leaves           {result.residual_rms_um:8.2f} µm rms")
+    echo(f"uncompensated at Z {result.plane_z_mm:.0f} mm, over X, Y = ±190 mm, as the model predicts:")
+    if result.plane_without:
+        echo(f"(without {', '.join(result.plane_without)}: no pose alone says what they do)")
+    for label, value_um, u_um in (
+        ("flatness           ", result.flatness_um, result.flatness_u_um),
+        ("parallelism along X", result.parallelism_um, result.parallelism_u_um),
+    ):
         known = "u not known" if u_um is None else f"u {u_um:.1f} µm"
-        echo(f"{label}    {summary[f'{figure}_um']:8.1f} µm   {known}")
-    if summary["plane_uncertainty_not_known_because"]:
-        echo(f"  ({summary['plane_uncertainty_not_known_because']})")
-    print_tolerances(summary["tolerances"], settings.tolerances_from)
+        echo(f"{label}    {value_um:8.1f} µm   {known}")
+    if result.plane_uncertainty_not_known_because:
+        echo(f"  ({result.plane_uncertainty_not_known_because})")
+    print_tolerances(result.tolerances, settings.tolerances_from)
 
 
-def _print_predicted(summary: Mapping[str, Any]) -> None:
+def _print_predicted(runs: Sequence[EvaluatedRun]) -> None:
     from dbbstation.cli.output import print_table
 
     rows: list[list[object]] = []
-    for run in summary["runs"]:
-        measured, predicted = (run["circularity_30_upr_um"][of] for of in ("measured", "predicted"))
-        off = predicted - measured
-        share = f"{100 * off / measured:.0f}" if measured else "-"
-        rows.append([run["test"], run["direction"], run["repeat"], measured, predicted, off, share])
+    for run in runs:
+        circular = run.circularity_30_upr_um
+        if circular is None:
+            continue
+        off = circular.predicted - circular.measured
+        share = f"{100 * off / circular.measured:.0f}" if circular.measured else "-"
+        rows.append([run.test, run.direction, run.repeat, circular.measured, circular.predicted, off, share])
     echo("circular deviation G up to 30 undulations per revolution [µm]")
     print_table(["test", "dir", "n", "measured", "predicted", "difference", "%"], rows)

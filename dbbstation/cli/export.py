@@ -56,10 +56,10 @@ def export(
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.exported import exporting, write_csv, write_parquet
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.provenance import refuse_existing_table
     from dbbstation.files.recordings.session import read_session
+    from dbbstation.tasks.export import exporting, write_csv, write_parquet
 
     if out.suffix.lower() not in FORMATS:
         raise click.UsageError(f"--out {out}: name a file that ends in {' or '.join(FORMATS)}")

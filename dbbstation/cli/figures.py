@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.cli.output import echo, print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Sequence
+
+    from dbbstation.results.evaluation import EvaluatedRun
 
 G_WITH_NOISE = "G: greatest less least deviation from the least-squares circle [ISO 230-4], the bar's noise included"
 G_LOW_PASSED = (
@@ -18,31 +20,30 @@ G_LOW_PASSED = (
 deviation; only the second can be held against a prediction, which has no noise."""
 
 
-def print_runs(summary: Mapping[str, Any], *, low_passed: bool = False) -> None:
+def print_runs(runs: Sequence[EvaluatedRun], *, low_passed: bool = False) -> None:
     """Print centre deviation, mean radial error and circular deviation of every run, before and after.
 
     Args:
-        summary: what `evaluation_summary` returns.
-        low_passed: print the circular deviation of low-passed readings, which its runs must then have.
+        runs: figures of each.
+        low_passed: print the circular deviation of low-passed readings, which the runs must then have.
     """
     echo("             centre deviation     mean radial error  circular deviation G  [µm]")
     titles = ["test", "dir", "n", "before", "after", " before", " after", "  before", "  after"]
     rows = []
-    for run in summary["runs"]:
-        both = [run[when] for when in ("before", "after")]
-        bent = [run["circularity_30_upr_um"][when] if low_passed else run[when]["circularity_um"] for when in WHEN]
+    for run in runs:
+        both = (run.before, run.after)
+        bent = [of.circularity_um for of in both]
+        if low_passed and run.circularity_30_upr_um is not None:
+            bent = [run.circularity_30_upr_um.before, run.circularity_30_upr_um.after]
         rows.append(
             [
-                run["test"],
-                run["direction"],
-                run["repeat"],
-                *(of["centre_deviation_um"] for of in both),
-                *(of["mean_radial_error_um"] for of in both),
+                run.test,
+                run.direction,
+                run.repeat,
+                *(of.centre_deviation_um for of in both),
+                *(of.mean_radial_error_um for of in both),
                 *bent,
             ]
         )
     print_table(titles, rows)
     echo(G_LOW_PASSED if low_passed else G_WITH_NOISE)
-
-
-WHEN = ("before", "after")

@@ -15,7 +15,7 @@ from dbbstation.cli.source_files import source_file_option
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from dbbstation.historied import Historied
+    from dbbstation.tasks.history import Historied
 
 MOST_NOTES = 12
 """Notes that the terminal shows; `--json` and `--html` have all."""
@@ -72,9 +72,9 @@ def history(
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.files.recordings.table_csv import table_csv
-    from dbbstation.historied import load_history
     from dbbstation.history.summary import TIDY, history_summary, tidy_rows
     from dbbstation.history.trend import Asked
+    from dbbstation.tasks.history import load_history
 
     refuse_outputs([page, out], force=force)
     if out is not None:

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.plan import InlinePlan
     from dbbstation.files.recordings.foreign_csv import ForeignTable
     from dbbstation.files.recordings.session_details import SessionDetails
-    from dbbstation.imported.runs import ImportedRun, Reader, RunName
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.plan import Plan
+    from dbbstation.tasks.importing.runs import ImportedRun, Reader, RunName
 
 CONDITIONS = ("temperature", "operator", "job", "bar")
 """What a session notes and no table says."""
@@ -84,7 +84,7 @@ def import_(
     from dbbstation.errors import OutputError
     from dbbstation.files.atomic import refuse_existing
     from dbbstation.files.formats.mapping import write_mapping
-    from dbbstation.imported.session import staged
+    from dbbstation.tasks.importing.session import staged
 
     if out.exists():
         raise OutputError("the session folder exists already", where=str(out), remedy="choose another name")
@@ -146,8 +146,8 @@ def _read(
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.recordings.entries import Note
-    from dbbstation.imported.runs import Reader
-    from dbbstation.imported.session import originals
+    from dbbstation.tasks.importing.runs import Reader
+    from dbbstation.tasks.importing.session import originals
 
     tables = read_tables(files, of_mapping)
     chosen = chosen_mapping(list(tables.values()), of_mapping, asker)
@@ -233,7 +233,7 @@ def _or(option: str, condition: str) -> str:
 
 def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path, RunName]:
     """Which run each file is, as `--run` says."""
-    from dbbstation.imported.runs import run_name
+    from dbbstation.tasks.importing.runs import run_name
 
     found = {}
     for text in named:
@@ -252,7 +252,7 @@ def _told(files: Sequence[Path], named: Sequence[str], plan: Plan) -> dict[Path,
 
 def _asked_run(asker: Asker, reader: Reader, table: ForeignTable, plan: Plan) -> RunName:
     """Which run a file is; asked for where neither its rows nor its name say it."""
-    from dbbstation.imported.runs import RunName, run_name
+    from dbbstation.tasks.importing.runs import RunName, run_name
 
     if not asker.terminal or reader.says_test(table):
         return RunName()

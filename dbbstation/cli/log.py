@@ -1,7 +1,8 @@
 """The log: what a command was asked, with which versions and inputs, what it said, how it ended; for a service engineer.
 
-One file beside the session, which every command about sessions of that folder continues. It is turned over at a size, so
-that it never fills a disk.
+One file in the user's folder for logs, which every command continues: a command writes nothing beside what it reads. What happened
+while a session was measured is in its own event log, which goes with it. The file is turned over at a size, so that it never fills a
+disk.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from dbbstation.cli.provenance import PROGRAM, command_of
-from dbbstation.cli.shop import folder_of_sessions
 from dbbstation.files.recorded_ground import session_around
 from dbbstation.printable import printable
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 LOG = logging.getLogger("dbbstation")
 
 FILE = "dbbstation.log"
-"""Name of the log beside sessions and in the user's folder."""
+"""Name of the log in the user's folder."""
 
 VARIABLE = "DBBSTATION_LOG"
 """Environment variable that names another file; `off` for none."""
@@ -77,7 +77,7 @@ def _attended(callback: Callable[..., Any]) -> Callable[..., Any]:
 def _kept(context: click.Context) -> Iterator[None]:
     """Log the beginning of a command, everything that is logged while it runs, and its end."""
     verbose = bool(context.find_root().params.get("verbose"))
-    handlers = [_to_file(context), _to_screen() if verbose else None]
+    handlers = [_to_file(), _to_screen() if verbose else None]
     used = [handler for handler in handlers if handler is not None] or [logging.NullHandler()]
     before = LOG.level
     for handler in used:
@@ -131,19 +131,18 @@ def _to_screen() -> logging.Handler:
     return screen
 
 
-def _to_file(context: click.Context) -> logging.Handler | None:
-    """Return the handler of the first log that can be written; None where there is to be none."""
+def _to_file() -> logging.Handler | None:
+    """Return the handler of the log; None where there is to be none, or it cannot be written."""
     from logging.handlers import RotatingFileHandler
 
     named = os.environ.get(VARIABLE)
     if named == "off":
         return None
-    for path in [Path(named)] if named else _usual_places(context):
-        # A log is no reason to fail: recordings may lie where nobody may write.
-        with suppress(OSError):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            if not _free(path):
-                continue
+    path = Path(named) if named else _usual_place()
+    # A log is no reason to fail: there may be no place where this user may write.
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if _free(path):
             file = _undisturbing(RotatingFileHandler)(path, maxBytes=LARGEST_BYTES, backupCount=KEPT, encoding="utf-8")
             file.setFormatter(_FORM)
             return file
@@ -182,11 +181,8 @@ def _undisturbing(kind: type[_Kind]) -> type[_Kind]:
     return Undisturbing
 
 
-def _usual_places(context: click.Context) -> Iterator[Path]:
-    """Beside the session where the command has one; else, or where that cannot be written, the user's folder for logs."""
+def _usual_place() -> Path:
+    """The user's folder for logs."""
     import platformdirs
 
-    beside = folder_of_sessions(context.info_name, context.params)
-    if beside is not None and beside.is_dir():
-        yield beside / FILE
-    yield platformdirs.user_log_path("dbbstation", appauthor=False) / FILE
+    return platformdirs.user_log_path("dbbstation", appauthor=False) / FILE

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dbbstation.files.formats.mapping import MappingFile
     from dbbstation.files.formats.number_language import NumberLanguage
     from dbbstation.files.recordings.foreign_csv import ForeignTable
-    from dbbstation.imported.proposal import Proposed
+    from dbbstation.tasks.importing.proposal import Proposed
 
 _Function = TypeVar("_Function", bound="Callable[..., Any]")
 
@@ -134,7 +134,7 @@ def _read(path: Path, stated: NumberLanguage | None, shops: NumberLanguage | Non
     """Read one file: as stated, else as the shop writes, where this program did not write it; errors as of `read_foreign`."""
     from dbbstation.errors import InputError
     from dbbstation.files.recordings.foreign_csv import read_foreign
-    from dbbstation.imported.proposal import EXPORTED
+    from dbbstation.tasks.importing.proposal import EXPORTED
 
     if shops is not None:
         with suppress(InputError):  # what is wrong with it is said as the shop reads it
@@ -155,7 +155,7 @@ def chosen_mapping(
         asker: of what cannot be told.
     """
     from dbbstation.files.formats.mapping import ANGLE, DEVIATION, UNITS, read_mapping
-    from dbbstation.imported.proposal import EXPORTED, Proposed
+    from dbbstation.tasks.importing.proposal import EXPORTED, Proposed
 
     kept = _kept(options)
     if kept is not None:
@@ -194,7 +194,7 @@ def _kept(options: Mapping[str, Any]) -> Path | None:
 
 def _columns(table: ForeignTable, said: Sequence[str]) -> dict[str, Proposed]:
     """What columns are: as the options say, else as their names do."""
-    from dbbstation.imported.proposal import Proposed, proposed, stated
+    from dbbstation.tasks.importing.proposal import Proposed, proposed, stated
 
     told: dict[str, Proposed] = {}
     for text in said:

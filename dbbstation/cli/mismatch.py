@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dbbstation.diagnosis.table.mismatch import Mismatch
-    from dbbstation.tabulated import Tabulated
+    from dbbstation.tasks.tables import Tabulated
 
 
 @click.command()
@@ -123,7 +123,7 @@ def mismatch(
     from dbbstation.diagnosis.table.summary import mismatch_summary
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.provenance import refuse_existing_table, write_table
-    from dbbstation.tabulated import Asked, load_sources, load_tables, stated_uncertainties, stated_variables
+    from dbbstation.tasks.tables import Asked, load_sources, load_tables, stated_uncertainties, stated_variables
 
     numbers = number_language(decimal, separator) if decimal or separator else None
     _refuse_mixed(

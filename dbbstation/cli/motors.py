@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dbbstation.cli.output import echo, print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from dbbstation.results.currents import CurrentsResult
+    from dbbstation.results.serialise import Quantified
 
 NOT_TOLD = "-"
 MA_PER_A = 1e3
 
 
-def print_currents(summary: Mapping[str, Any]) -> None:
+def print_currents(currents: CurrentsResult | None) -> None:
     """Print drives, centre of gravity by channel and notes, where a calibration used motor currents."""
-    currents = summary.get("motor_currents")
     if currents is None:
         return
     echo()
     echo(
-        f"motor currents, with the platform's weight of {currents['weight_taken_as_known_n']:.0f} N taken as known; "
+        f"motor currents, with the platform's weight of {currents.weight_taken_as_known_n:.0f} N taken as known; "
         "±: u, one standard uncertainty"
     )
     titles = ["motor", "N/A", "±", "friction N", "±", "per speed N s/mm", "±", "per load N/kN", "±", "asymmetry N", "±"]
@@ -32,32 +32,32 @@ def print_currents(summary: Mapping[str, Any]) -> None:
         ("asymmetry_n", 1),
     )
     rows = []
-    for motor in currents["motors"]:
-        noise = [NOT_TOLD if motor[k] is None else f"{MA_PER_A * motor[k]:.1f}" for k in ("residual_a", "noise_a")]
-        numbers = [text for kind, digits in kinds for text in _with_uncertainty(motor[kind], digits)]
-        rows.append([motor["motor"], *numbers, *noise])
+    for motor in currents.motors:
+        noise = [NOT_TOLD if a is None else f"{MA_PER_A * a:.1f}" for a in (motor.residual_a, motor.noise_a)]
+        numbers = [text for kind, digits in kinds for text in _with_uncertainty(getattr(motor, kind), digits)]
+        rows.append([motor.motor, *numbers, *noise])
     print_table([*titles, "residual mA", "noise mA"], rows)
-    if any(motor["torque_per_current"] is not None for motor in currents["motors"]):
-        torques = ", ".join(_with_uncertainty(motor["torque_per_current"], 4)[0] for motor in currents["motors"])
+    if any(motor.torque_per_current is not None for motor in currents.motors):
+        torques = ", ".join(_with_uncertainty(motor.torque_per_current, 4)[0] for motor in currents.motors)
         echo(f"torque at the screws per current, 1 to 6: {torques} Nm/A")
-    elif any(motor["force_per_current"] is not None for motor in currents["motors"]):
+    elif any(motor.force_per_current is not None for motor in currents.motors):
         echo("torques are not given: the machine file has no screw_lead_mm; forces do not need it")
-    if currents["centre_of_gravity"]:
+    if currents.centre_of_gravity:
         echo()
         channels = {"circles": "circles alone", "currents": "currents alone", "both": "both"}
         titles = [column for title in channels.values() for column in (title, "±")]
         shifts = [
             [name.removesuffix("_mm"), *(text for channel in channels for text in _with_uncertainty(by[channel], 3))]
-            for name, by in currents["centre_of_gravity"].items()
+            for name, by in currents.centre_of_gravity.items()
         ]
         echo("centre of gravity, actual minus machine file, platform axes [mm]; ±: u, one standard uncertainty")
         print_table(["", *titles], shifts)
-    for note in currents["notes"]:
+    for note in currents.notes:
         echo(f"note: {note}")
 
 
-def _with_uncertainty(number: Mapping[str, Any] | None, digits: int) -> tuple[str, str]:
+def _with_uncertainty(number: Quantified | None, digits: int) -> tuple[str, str]:
     """Return value and uncertainty as text, the uncertainty with two digits."""
     if number is None:
         return NOT_TOLD, NOT_TOLD
-    return f"{number['value']:.{digits}f}", f"{number['uncertainty']:.2g}"
+    return f"{number.value:.{digits}f}", f"{number.uncertainty or 0.0:.2g}"

@@ -43,6 +43,13 @@ def print_json(data: dict[str, Any]) -> None:
     print_plain_json({**data, "provenance": provenance().data()})
 
 
+def print_result(result: object) -> None:
+    """Print a result as one JSON object with where it comes from."""
+    from dbbstation.results.serialise import plain
+
+    print_json(plain(result))
+
+
 def print_plain_json(data: dict[str, Any]) -> None:
     """Print one JSON object as it is: a document of its own, such as a schema."""
     echo(json_text(data, indent=1))

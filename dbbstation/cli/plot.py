@@ -52,11 +52,11 @@ def plot(
       dbbstation plot session --test a,b --kind deviation --out ab.pdf
       dbbstation plot before after --test a --kind compare --out a.png
     """
-    from dbbstation.circled import load_circles
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.report.plot import Kind, Plotted, plot_figure
+    from dbbstation.tasks.circles import load_circles
 
     refuse_outputs([out], force=force)
     chosen = filter_of(cut_off)

@@ -41,63 +41,48 @@ def predict(
       dbbstation predict --model model.yaml --poses commanded.csv --out actual.csv
       dbbstation predict --model model.yaml --poses excel.csv --decimal , --out actual.csv
     """
-    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_json, say
+    from dbbstation.cli.output import COVERAGE_FACTOR, EXPANDED, print_result, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.cli.unknown_causes import say_unknown_causes, unknown_causes
-    from dbbstation.files.formats.model import read_model
-    from dbbstation.files.formats.pose_table import read_poses, write_poses
+    from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.files.own_sources import every_source
     from dbbstation.files.provenance import refuse_existing_table
-    from dbbstation.machine.travel import check_travel
-    from dbbstation.model.uncertainty import predicted_poses, prediction_summary
+    from dbbstation.tasks.models import model_of
+    from dbbstation.tasks.predict import STAGES
+    from dbbstation.tasks.predict import predict as predicted
 
     refuse_existing_table(out, force=force)
-    identified = read_model(model, every_source(source_files))
+    identified = model_of(model, every_source(source_files))
     say_unknown_causes(identified.model)
     with stage_bar("prediction", STAGES) as progress:
-        progress("reading poses")
-        table = read_poses(poses, number_language(decimal, separator))
-        progress("travel")
-        check_travel(identified.model.machine, table.poses, where=str(poses))
-        actual, uncertainty_mm = predicted_poses(
-            identified, table.poses, lambda done, of: progress("predicting pose", done, of)
+        result = predicted(
+            identified,
+            poses,
+            out=out,
+            force=force,
+            numbers=number_language(decimal, separator),
+            provenance=provenance,
+            progress=progress,
         )
-        progress("writing")
-        why = identified.why_unknown
-        write_poses(out, actual, uncertainty_mm, table.others, provenance(), why_unknown=why, force=force)
-    told = prediction_summary(table.poses, actual, uncertainty_mm)
-    unknown = [axis for axis, u in told["greatest_uncertainty_by_axis_um"].items() if u is None]
     if as_json:
-        print_json(
-            {
-                "file": str(out),
-                "poses": len(actual),
-                **told,
-                "uncertainty_not_known_because": why if unknown else None,
-                "directions_lost": list(identified.directions_lost),
-                "unknown_causes": unknown_causes(identified.model),
-            }
-        )
+        print_result(result)
         return
-    say(f"{len(actual)} poses written to {out}")
-    shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", told["common_shift_um"], strict=True))
+    say(f"{result.poses} poses written to {out}")
+    shift = ", ".join(f"{axis} {um:+.1f}" for axis, um in zip("XYZ", result.common_shift_um, strict=True))
     say(
-        f"position errors {told['error_rms_um']:.1f} µm rms, {told['greatest_error_um']:.1f} µm at most; their mean is {shift} µm, "
-        f"and they are {told['error_about_mean_rms_um']:.1f} µm rms about it"
+        f"position errors {result.error_rms_um:.1f} µm rms, {result.greatest_error_um:.1f} µm at most; their mean is {shift} µm, "
+        f"and they are {result.error_about_mean_rms_um:.1f} µm rms about it"
     )
-    if told["greatest_uncertainty_um"] is not None:
-        u_um = told["greatest_uncertainty_um"]
+    u_um = result.greatest_uncertainty_um
+    if u_um is not None:
         say(f"greatest uncertainty u {u_um:.1f} µm, {EXPANDED} {COVERAGE_FACTOR * u_um:.1f} µm")
         return
-    known = [f"{axis.upper()} {u:.1f}" for axis, u in told["greatest_uncertainty_by_axis_um"].items() if u is not None]
+    by_axis = result.greatest_uncertainty_by_axis_um
+    known = [f"{axis.upper()} {u:.1f}" for axis, u in by_axis.items() if u is not None]
+    unknown = [axis.upper() for axis, u in by_axis.items() if u is None]
     say(
         f"greatest uncertainty u {', '.join(known) + ' µm; ' if known else ''}"
-        f"u of {', '.join(axis.upper() for axis in unknown)} is not known: {why}"
+        f"u of {', '.join(unknown)} is not known: {result.uncertainty_not_known_because}"
     )
     if identified.null_space is not None:
         say("  a joint_tolerance_mm in the machine file of the calibration, or tests that show it, would tell")
-
-
-STAGES = {"reading": 0, "travel": 32, "predicting": 48, "writing": 67}
-"""Stages of a prediction, and the share of its time that has passed by then [%]."""

@@ -87,29 +87,40 @@ def program(
       dbbstation program --plan table2.yaml --machine machine.yaml --model model.yaml --out compensated
       dbbstation program --plan table2.yaml --machine machine.yaml --test a,f --out two --json
     """
-    from dataclasses import replace
-
     from dbbstation.cli.output import say
-    from dbbstation.cli.programs import loaded_inverse, origin_of, preferred, print_programs
+    from dbbstation.cli.programs import print_programs
     from dbbstation.cli.progress import count_bar
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.files.atomic import write_folder
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.own_dialects import dialect_given
+    from dbbstation.files.own_sources import every_source
     from dbbstation.nc.export import circle_programs
+    from dbbstation.results.programs import programs_result
+    from dbbstation.tasks.programs import inverse_of, origin_of, sha256_of
 
     written_in = dialect_given(dialect)
     plan, machine = read_plan(plan_file), read_machine(machine_file)
-    inverse = None if model_file is None else loaded_inverse(model_file, time_s, source_files, largest_mm)
-    if inverse is not None:
-        inverse = replace(inverse, prefer=preferred(prefer), accepted_um=accepted_um)
+    inverse = None
+    if model_file is not None:
+        inverse = inverse_of(
+            model_file,
+            every_source(source_files),
+            time_s=time_s,
+            largest_mm=largest_mm,
+            prefer=prefer,
+            accept_chord_um=accepted_um,
+        )
+        say_unknown_causes(inverse.model)
     with count_bar("programs") as writing:
         programs = circle_programs(
             plan,
             machine,
             written_in,
             inverse=inverse,
-            origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse),
+            origin=origin_of({"plan file": plan_file, "machine file": machine_file}, inverse, provenance()),
             tests=chosen_of(plan.name, plan.tests, tests, exclude),
             step_deg=step_deg,
             chord_mm=chord_um / 1e3,
@@ -117,7 +128,8 @@ def program(
             progress=writing,
         )
     write_folder(out, {each.name: each.text for each in programs}, force=force)
-    written = [(out / each.name, each) for each in programs]
-    print_programs(written, written_in, None if inverse is None else machine, model_file, as_json=as_json)
+    written = [(str(out / each.name), each) for each in programs]
+    digest = None if model_file is None else sha256_of(model_file)
+    print_programs(programs_result(written, written_in, None if inverse is None else machine, digest), as_json=as_json)
     if not as_json:
         say(f"{len(programs)} programs written to {out}, all within the machine's travel")

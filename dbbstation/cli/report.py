@@ -12,9 +12,9 @@ from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
-    from dbbstation.circled import Circled
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.report.content import Modelled
+    from dbbstation.results.circles import Circled
 
 
 @click.command()
@@ -72,7 +72,7 @@ def report(
     from dbbstation.report.content import Reported, content_of, numbers_of
     from dbbstation.report.html import report_html
     from dbbstation.report.pdf import chromium, printed
-    from dbbstation.tolerated import TOLERATED
+    from dbbstation.results.tolerances import TOLERATED
 
     refuse_outputs([out, pdf], force=force)
     browser = None if pdf is None else chromium()
@@ -101,10 +101,10 @@ def _read(
     exclude: tuple[str, ...],
 ) -> tuple[Circled, Circled | None, Modelled | None]:
     """Read what a report needs: circles, circles before, and what the model leaves."""
-    from dbbstation.circled import load_circles
     from dbbstation.cli.progress import count_bar
     from dbbstation.machine.difference import check_model_is_of
-    from dbbstation.tolerated import TOLERATED
+    from dbbstation.results.tolerances import TOLERATED
+    from dbbstation.tasks.circles import load_circles
 
     with count_bar("circles") as progress:
         found = load_circles(sessions, TOLERATED, tests, exclude, findings=True, model=identified, progress=progress)
@@ -123,17 +123,16 @@ def _modelled(
     sessions: tuple[Path, ...], identified: IdentifiedModel, tests: tuple[str, ...], exclude: tuple[str, ...]
 ) -> Modelled:
     """Return what a model leaves; a run that it cannot take leaves the report without that, and says so."""
-    from dbbstation.cli.progress import count_bar
+    from dbbstation.cli.progress import stage_bar
     from dbbstation.errors import StationError
-    from dbbstation.evaluated import evaluated
-    from dbbstation.recorded import load_sessions
     from dbbstation.report.content import Modelled
+    from dbbstation.results.serialise import plain
+    from dbbstation.tasks.evaluate import STAGES, evaluate
 
     try:
-        with count_bar("reading runs") as reading:
-            recorded = load_sessions(sessions, exclude, reading, tests)
-        with count_bar("predicting runs") as predicting:
-            return Modelled(identified, evaluated(identified, recorded, predicting))
+        with stage_bar("evaluation", STAGES) as progress:
+            found = evaluate(sessions, identified, tests=tests, exclude=exclude, progress=progress)
+        return Modelled(identified, {key: value for key, value in plain(found).items() if key != "tolerances"})
     except StationError as error:
         return Modelled(identified, {}, str(error))
 

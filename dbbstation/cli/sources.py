@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,8 +12,7 @@ from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
 
 if TYPE_CHECKING:
-    from dbbstation.machine.geometry import Machine
-    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.results.sources import SourceDescription
 
 WIDTH = 110
 
@@ -41,10 +40,12 @@ def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[
       dbbstation sources gravity --machine machine.yaml
       dbbstation sources scale-bow --source-file scale_bow.py --json
     """
-    from dbbstation.cli.output import print_json, print_table
+    from dbbstation.cli.output import print_json, print_result, print_table
     from dbbstation.errors import ModelError
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.own_sources import every_source
+    from dbbstation.results.serialise import plain
+    from dbbstation.results.sources import role_of, source_description
     from dbbstation.sources.registry import sources_named
 
     known = every_source(source_files)
@@ -58,56 +59,22 @@ def sources(name: str | None, *, machine_file: Path | None, source_files: tuple[
                 source.parameters(machine)
             except ModelError as error:
                 raise ModelError(error.what, where=str(machine_file), remedy=error.remedy) from error
-        told = _told(source, machine)
+        found = source_description(source, machine)
         if as_json:
-            print_json(told)
+            print_result(found)
         else:
-            echo("\n".join(_details(told)))
+            echo("\n".join(_details(found)))
         return
     if as_json:
-        print_json({"sources": [_told(source, None) for source in known.values()]})
+        print_json({"sources": [plain(source_description(source)) for source in known.values()]})
         return
     rows = [
-        [source.name, source.belongs_to.value, _role(source), _first(source.texts.what)] for source in known.values()
+        [source.name, source.belongs_to.value, role_of(source), _first(source.texts.what)] for source in known.values()
     ]
     print_table(["cause", "belongs to", "role", "what it is"], rows)
 
 
-def _told(source: ErrorSource, machine: Machine | None) -> dict[str, Any]:
-    """Everything that a cause says of itself."""
-    texts = source.texts
-    told: dict[str, Any] = {
-        "name": source.name,
-        "belongs_to": source.belongs_to.value,
-        "role": _role(source),
-        "what": texts.what,
-        "shows": texts.shows,
-        "confirm": texts.confirm,
-        "cure": texts.cure,
-        "equation": texts.equation,
-        "origin": texts.origin,
-        "needs": sorted(need.value for need in source.needs),
-        "varies_with": source.varies_with or None,
-        "form_uncertainty": source.form_uncertainty,
-    }
-    if machine is not None:
-        told["parameters"] = [
-            {"name": p.name, "unit": p.unit, "usual_size": p.plausible, "meaning": p.meaning}
-            for p in source.parameters(machine)
-        ]
-    return told
-
-
-def _role(source: ErrorSource) -> str:
-    """What becomes of it: fitted in every calibration, a candidate of the diagnosis, or the keeper of a curve."""
-    from dbbstation.calibration.fit.calibrate import default_sources
-
-    if source.name in {fitted.name for fitted in default_sources()}:
-        return "fitted always"
-    return "candidate" if source.candidate else "keeps what has no name"
-
-
-def _details(told: dict[str, Any]) -> list[str]:
+def _details(told: SourceDescription) -> list[str]:
     """The same as lines."""
     titles = {
         "what": "What it is",
@@ -117,23 +84,23 @@ def _details(told: dict[str, Any]) -> list[str]:
         "equation": "Equation",
         "origin": "From",
     }
-    lines = [told["name"]]
+    lines = [told.name]
     for key, title in titles.items():
-        lines += ["", f"{title}:", *_wrapped(told[key])]
-    varies = f"its error follows the {told['varies_with']}" if told["varies_with"] else "its error follows the pose"
-    exact = told["form_uncertainty"]
+        lines += ["", f"{title}:", *_wrapped(getattr(told, key))]
+    varies = f"its error follows the {told.varies_with}" if told.varies_with else "its error follows the pose"
+    exact = told.form_uncertainty
     lines += [
         "",
         "In a model:",
-        f"  {told['role']}; belongs to the {told['belongs_to']}; {varies}; needs {', '.join(told['needs'])}",
+        f"  {told.role}; belongs to the {told.belongs_to}; {varies}; needs {', '.join(told.needs)}",
         f"  real machines follow the formula to {100 * exact:.0f} % of the effect, one standard deviation"
         if exact
         else "  the formula is exact",
     ]
-    if "parameters" in told:
+    if told.parameters is not None:
         lines += ["", "Parameters:"]
-        for p in told["parameters"]:
-            lines += _wrapped(f"{p['name']}, usually {p['usual_size']:g} {p['unit']}: {p['meaning']}", hanging="  ")
+        for p in told.parameters:
+            lines += _wrapped(f"{p.name}, usually {p.usual_size:g} {p.unit}: {p.meaning}", hanging="  ")
     return lines
 
 

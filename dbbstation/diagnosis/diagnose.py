@@ -9,10 +9,10 @@ import numpy as np
 
 from dbbstation.calibration.checks.missing_physics import SIGNIFICANT, is_missing_physics, remainder_of
 from dbbstation.calibration.outliers.stray_balls import beside
-from dbbstation.diagnosis.chosen_anew import chosen_anew
+from dbbstation.diagnosis.chosen_anew import without_tests
 from dbbstation.diagnosis.explain import explain, without
 from dbbstation.diagnosis.findings import Diagnosis, Unexplained, Verdict
-from dbbstation.diagnosis.left_out import found_again, predicted
+from dbbstation.diagnosis.left_out import found_again, predicted, widened_by_tests
 from dbbstation.diagnosis.locate import locations_of
 from dbbstation.diagnosis.next_test import next_tests
 from dbbstation.diagnosis.shifts import shifts_between
@@ -25,11 +25,12 @@ from dbbstation.errors import ModelError
 from dbbstation.inference.alternatives import EVEN
 from dbbstation.inference.verdict import SURE
 from dbbstation.sources.laws.by_temperature import not_given
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from dbbstation.diagnosis.explain import Explained, Settled
+    from dbbstation.diagnosis.explained import Explained, Settled
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.remainder import Remainder
@@ -42,6 +43,7 @@ RIVALS = 6
 """Named causes of the greatest evidence that compete in each draw of a part of the tests."""
 
 
+@with_one_thread
 def diagnose(
     machine: Machine,
     observations: Sequence[Observation],
@@ -66,9 +68,9 @@ def diagnose(
     progress("verdicts")
     explained, findings = judged(explained)
     progress("held-out tests")
-    anew = chosen_anew(explained)
-    if anew is not None:
-        findings = judge(explained, anew)
+    anew = without_tests(explained)
+    explained = _widened(explained)
+    findings = judge(explained, anew)
     settled, before, outliers = explained.settled, explained.before, explained.outliers
     after, members = settled.after, settled.members
     again = found_again(explained, [f.name for f in sorted(findings, key=lambda f: -f.gain)[:RIVALS]])
@@ -96,6 +98,13 @@ def diagnose(
         second_start_agrees=settled.second_start_agrees(),
         next_tests=() if settled.at_limit else next_tests(explained, findings, elsewhere),
     )
+
+
+def _widened(explained: Explained) -> Explained:
+    """The same with uncertainties of both fits by what tests say of each other."""
+    before, settled = widened_by_tests(explained.before), explained.settled
+    after = before if settled.after is explained.before else widened_by_tests(settled.after)
+    return replace(explained, before=before, settled=replace(settled, after=after))
 
 
 def judged(explained: Explained) -> tuple[Explained, tuple[SourceFinding, ...]]:

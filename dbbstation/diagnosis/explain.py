@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from dbbstation.calibration.outliers.robust import MOST, calibrate_robust
 from dbbstation.calibration.outliers.strange_runs import in_place_after_all
 from dbbstation.calibration.outliers.stray_balls import set_free
 from dbbstation.diagnosis.channel import Channel
+from dbbstation.diagnosis.explained import MOST_MEMBERS, Explained, Settled
 from dbbstation.diagnosis.unmodelled import Unmodelled
 from dbbstation.errors import CalibrationError, KinematicsError
 from dbbstation.inference.alternatives import in_place_of
@@ -25,13 +26,13 @@ from dbbstation.inference.settle import impossibly_negative
 from dbbstation.inference.verdict import SURE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from numpy.typing import NDArray
 
     from dbbstation.calibration.outliers.outlier import Fit, Outlier
-    from dbbstation.inference.harmonics import Misfit, Spectrum
-    from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
+    from dbbstation.inference.harmonics import Spectrum
+    from dbbstation.inference.model_comparison import Member, ModelComparison
     from dbbstation.inference.projection import BesideBase
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
@@ -46,82 +47,8 @@ SEEDS = 3
 GRID = 0.3
 """Share to which nonlinear parameters are known from the grid of the comparison, about its spacing, in a second try."""
 
-MOST_MEMBERS = 12
-"""Causes of a hypothesis at which the comparison ends without a name. Each takes part of what none of them is, and the next one is
-called in for what they leave: hypotheses grew to 61 members. Sessions that the list explains have at most 8."""
-
 STEPS = 2
 """Times that the nonlinear parameters of a rival are improved."""
-
-
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """What the comparison came to.
-
-    Attributes:
-        after: joint fit of base and named causes of the most probable hypothesis.
-        posterior: over sets of causes, about that fit.
-        best: its most probable hypothesis, or one as probable, whose named causes were fitted.
-        comparison: that it came from.
-        causes: that were compared.
-        unmodelled: effects without a name among them.
-        noise: measured on what all causes together leave.
-        left: misfit of the joint fit.
-        refused: causes that cannot be what these recordings show, and why.
-        at_limit: nothing listed explains the recordings down to the noise: `after` is the base fit, no cause is named, and `best` has
-            the strongest unmodelled effect alone.
-        scatter: how many times as much as stated balls scatter.
-    """
-
-    after: Calibration
-    posterior: Posterior
-    best: Hypothesis
-    comparison: ModelComparison
-    causes: tuple[Cause, ...]
-    unmodelled: Unmodelled
-    noise: Spectrum
-    left: Misfit
-    refused: Mapping[str, str] = field(default_factory=dict)
-    at_limit: bool = False
-    scatter: float = 1.0
-
-    def second_start_agrees(self) -> bool | None:
-        """Whether a search that begins with nothing, about the same fit, comes to the same most probable set of causes.
-
-        None where the comparison ended at its limit: there is no such set.
-        """
-        if self.at_limit:
-            return None
-        return search(self.comparison, self.causes, most_members=MOST_MEMBERS).best.names == self.posterior.best.names
-
-    @property
-    def members(self) -> tuple[Member, ...]:
-        """Named causes of the most probable hypothesis."""
-        return tuple(m for m in self.best.members if m.cause.named)
-
-    @property
-    def noise_mm(self) -> float:
-        """Standard deviation, per sample, of white noise that would act on smooth effects as this one does [mm]."""
-        return float(np.sqrt(self.noise.power[0]))
-
-
-@dataclass(frozen=True, eq=False)
-class Explained:
-    """Everything that the comparison needs and found.
-
-    Attributes:
-        before: fit of the base model.
-        outliers: balls and runs that are off, kept from pulling it.
-        channel: about that fit.
-        first: what it leaves.
-        settled: what the comparison came to.
-    """
-
-    before: Calibration
-    outliers: tuple[Outlier, ...]
-    channel: Channel
-    first: Misfit
-    settled: Settled
 
 
 def explain(

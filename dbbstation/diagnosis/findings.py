@@ -10,9 +10,9 @@ from dbbstation.inference.verdict import Acts, Gains, Value, Verdict
 if TYPE_CHECKING:
     from dbbstation.calibration.fit.calibrate import Calibration
     from dbbstation.calibration.outliers.outlier import Outlier
-    from dbbstation.diagnosis.chosen_anew import ChosenAnew
     from dbbstation.diagnosis.shapes import Follows
     from dbbstation.diagnosis.workspace import WorkspaceError
+    from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.harmonics import Misfit
     from dbbstation.inference.held_out import HeldOut
 
@@ -69,6 +69,11 @@ class SourceFinding:
     acts: Acts = Acts.ALWAYS
     sigmas: float = 0.0
     gains: Gains | None = None
+
+    @property
+    def persists(self) -> bool:
+        """Whether it happened once, such as a bump, and held-out tests tell of it, too."""
+        return self.verdict is Verdict.HAPPENED and self.gains is not None and self.gains.predicts
 
 
 @dataclass(frozen=True)

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import SMALLEST_NOISE_MM
+from dbbstation.inference.chosen_anew import LEAST_PARTS
+from dbbstation.inference.folds import FOLDS as GROUPS
 from dbbstation.inference.harmonics import LOW
 from dbbstation.inference.held_out import HeldOut, held_out
+from dbbstation.inference.jackknife import widening
 from dbbstation.inference.selection_frequency import renumbered, selection_frequency
+from dbbstation.inference.square_root import solve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.diagnosis.explain import Explained
+    from numpy.typing import NDArray
+
+    from dbbstation.calibration.fit.calibrate import Calibration
+    from dbbstation.diagnosis.explained import Explained
+    from dbbstation.inference.square_root import Solution
     from dbbstation.model.observation import Observation
 
 FOLDS = 5
@@ -61,6 +70,38 @@ def found_again(explained: Explained, names: Sequence[str]) -> dict[str, float]:
         max(settled.noise_mm, SMALLEST_NOISE_MM),
         np.random.default_rng(len(channel.observations)),
     )
+
+
+def widened_by_tests(calibration: Calibration) -> Calibration:
+    """The same fit with the larger of its own uncertainty and that of a jackknife over groups of tests.
+
+    What balls, runs and readings do otherwise than the model of noise says shows in how values move when tests are left out. Nothing is
+    chosen anew, the fit is linear about its values, correlations stay [`widening`], and random effects keep what is stated. With fewer
+    than `LEAST_PARTS` groups of tests nothing changes.
+    """
+    groups = groups_of(calibration.observations)
+    if groups is None:
+        return calibration
+    known, noise = calibration.layout.known, calibration.noise.effective
+    held, behind = calibration.solution.held, calibration.blocks[len(groups) :]
+
+    def without(group: int | None) -> Solution:
+        circles = [block for block, own in zip(calibration.circle_blocks, groups, strict=True) if own != group]
+        return solve([*circles, *behind], known, noise, held)
+
+    of_all, others = without(None), [without(group) for group in np.unique(groups)]
+    moved = np.array([other.x - of_all.x for other in others])
+    variances = [np.diag(solution.covariance) for solution in (of_all, *others)]
+    factor = np.where(known.random, 1.0, widening(variances[0], moved, np.array(variances[1:])))
+    covariance = np.outer(factor, factor) * calibration.solution.covariance
+    return replace(calibration, solution=replace(calibration.solution, covariance=covariance))
+
+
+def groups_of(observations: Sequence[Observation]) -> NDArray[np.int64] | None:
+    """Group of the test of each run that is held back in turn; None where there are too few groups."""
+    tests = np.array(tests_of(observations))
+    groups = tests % min(GROUPS, int(tests.max()) + 1)
+    return groups if len(np.unique(groups)) >= LEAST_PARTS else None
 
 
 def tests_of(observations: Sequence[Observation]) -> list[int]:

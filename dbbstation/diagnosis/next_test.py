@@ -17,6 +17,7 @@ from dbbstation.machine.travel import check_travel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Circle, Direction
 from dbbstation.sources.contract import Motion, Need, Setup
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.channel import Channel
-    from dbbstation.diagnosis.explain import Explained
+    from dbbstation.diagnosis.explained import Explained
     from dbbstation.diagnosis.findings import SourceFinding
     from dbbstation.diagnosis.workspace import WorkspaceError
     from dbbstation.inference.model_comparison import Variant
@@ -77,6 +78,7 @@ class Proposal:
         return ", ".join(parts)
 
 
+@with_one_thread
 def next_tests(
     explained: Explained, findings: Sequence[SourceFinding], elsewhere: WorkspaceError | None
 ) -> tuple[NextTest, ...]:

@@ -17,6 +17,7 @@ from dbbstation.diagnosis.shapes import SIGNED, TEMPERATURES, Follows, variables
 from dbbstation.machine.geometry import STRUTS
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.laws.by_temperature import FollowsTemperature
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -104,6 +105,7 @@ class _Samples:
     gain: NDArray[np.float64]
 
 
+@with_one_thread
 def source_curves(diagnosis: Diagnosis) -> tuple[SourceCurves, ...]:
     """Curves of every source that was found, and of what is left where some variable organises it."""
     left = ("",) if diagnosis.unexplained.follows is not None else ()

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from dbbstation.diagnosis.channel import Channel
-    from dbbstation.diagnosis.explain import Settled
+    from dbbstation.diagnosis.explained import Settled
     from dbbstation.diagnosis.shapes import Samples, Shape
 
 LINE_OUT = "less the straight line that fits it best over the readings: joints and reference length make that"

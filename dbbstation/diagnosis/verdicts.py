@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.diagnosis.chosen_anew import ChosenAnew
-    from dbbstation.diagnosis.explain import Explained, Settled
+    from dbbstation.diagnosis.explained import Explained, Settled
+    from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.model_comparison import Cause, Member, Variant
     from dbbstation.inference.verdict import Gains
 
@@ -152,7 +152,7 @@ class _Judge:
         shown = self._with_a_name(equal)
         shown = shown if len(shown) > 1 else ()
         gains, acts = self._gains(name), self._acts(name)
-        worse = self._anew is not None and self._anew.worse
+        worse = self._anew is not None and self._anew.is_worse
         verdict = claim(self._probability(equal), self._sigmas_of(name), acts, gains, worse=worse)
         if verdict is not Verdict.AMBIGUOUS:
             return verdict, (), shown, _why(verdict, gains)
@@ -172,7 +172,7 @@ class _Judge:
         """What a cause of the most probable hypothesis, or one of its class, brought in held-out tests; None: not asked."""
         if self._anew is None or name not in self._classes:
             return None
-        return self._anew.gains(self._classes[name])
+        return self._anew.gains_of([(one,) for one in self._classes[name]])
 
     def _sigmas_of(self, name: str) -> float:
         """By how many standard deviations the norm of an effect beside the base is out; 0 for what the hypothesis has not.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.calibration.reporting.summary import identified_model
+from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.errors import MachineError
 from dbbstation.machine.travel import check_travel
 from dbbstation.model.uncertainty import position_uncertainty_mm, rms_length

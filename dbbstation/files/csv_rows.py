@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 _BEGINS_FORMULA = frozenset("=+-@\t\n＝＋－＠")
 """Signs with which a spreadsheet begins a formula, or leaves them out before one [OWASP, CSV Injection]."""
 
+DIGITS = 12
+"""Digits of a number, without zeros behind: sums of binary fractions are off in the sixteenth, and a micrometre of a kilometre is the
+ninth."""
+
 _NONE = "-"
 """What tables hold where there is nothing."""
 
@@ -24,7 +28,7 @@ _NONE = "-"
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
     """Return rows as CSV text: the one writer of tables that people open in a spreadsheet.
 
-    A text that a spreadsheet would take for a formula gets `'` before it. Numbers stay numbers, negative ones too.
+    A text that a spreadsheet would take for a formula gets `'` before it. Numbers stay numbers, negative ones too, with `DIGITS` digits.
     """
     out = io.StringIO(newline="")
     csv.writer(out, lineterminator="\n").writerows(map(_guarded, row) for row in rows)
@@ -32,6 +36,8 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 
 
 def _guarded(cell: object) -> object:
+    if isinstance(cell, float):
+        return float(f"{cell:.{DIGITS}g}")
     if not isinstance(cell, str):
         return cell
     shown = printable(cell)  # a carriage return would begin a row, and a formula at its start a cell

@@ -9,12 +9,11 @@ import ast
 import hashlib
 import os
 import sys
-import traceback
 from inspect import isabstract
 from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.catalogue import Found, classes_of, in_words
+from dbbstation.catalogue import Found, classes_of, in_words, line_in
 from dbbstation.errors import Problem
 from dbbstation.files.places import real_path
 from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
@@ -90,9 +89,3 @@ def _run(path: Path, tree: ast.Module, faults: list[Problem]) -> ModuleType | No
         faults.append(Problem(str(path), line_in(error, str(path)), 0, what, "mend the line"))
         return None
     return module
-
-
-def line_in(error: Exception, file: str) -> int:
-    """Return the last line of a file that an error came through; 0 where it did not."""
-    frames = traceback.extract_tb(error.__traceback__)
-    return next((frame.lineno or 0 for frame in reversed(frames) if frame.filename == file), 0)

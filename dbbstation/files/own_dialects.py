@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dbbstation.catalogue import Found, in_words
+from dbbstation.catalogue import Found, in_words, line_in
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.own_classes import classes_in_files, line_in
+from dbbstation.files.own_classes import classes_in_files
 from dbbstation.nc.dialect import Dialect
 from dbbstation.nc.registry import dialect_named
 from dbbstation.nc.trial import faults_of

@@ -5,9 +5,9 @@ from __future__ import annotations
 from inspect import isabstract
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.catalogue import in_words
+from dbbstation.catalogue import in_words, line_in
 from dbbstation.errors import InputError, Problem
-from dbbstation.files.own_classes import classes_in_files, line_in
+from dbbstation.files.own_classes import classes_in_files
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

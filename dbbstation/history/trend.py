@@ -14,6 +14,7 @@ from dbbstation.history.order import by_time
 from dbbstation.history.run_length import chart_for
 from dbbstation.history.watch import Verdict, watch
 from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -147,6 +148,7 @@ class Asked:
         return (not self.tests or test in self.tests) and test not in self.exclude
 
 
+@with_one_thread
 def histories(
     sessions: Sequence[SessionFigures], models: Mapping[str, ModelFigures], asked: Asked
 ) -> tuple[MachineHistory, ...]:

@@ -151,9 +151,10 @@ class Bank:
         """Columns over the kept rows, whitened, shape (m, p)."""
         return np.asarray(self._columns.of(columns), dtype=np.float64)
 
-    def beside(self) -> BesideBase:
-        """Causes beside the base."""
-        return BesideBase(self._columns, self.channel.known, self.channel.held, self.noise.innovation)
+    def beside(self, but_for: NDArray[np.bool_] | None = None) -> BesideBase:
+        """Causes beside the base; some kept rows, shape (m,), may say nothing: the target must be zero there."""
+        columns = self._columns if but_for is None else self._columns.but_for(but_for)
+        return BesideBase(columns, self.channel.known, self.channel.held, self.noise.innovation)
 
     def add(self, more: Sequence[Pattern]) -> list[str]:
         """Take in patterns that are not there yet, and return their names."""

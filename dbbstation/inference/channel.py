@@ -91,6 +91,7 @@ class Law:
             residual; None: amplitudes have their `plausible` size at all of them.
         family: of patterns that it belongs to; None for physics of a client.
         variables: that it follows, where it belongs to a family.
+        acts_once: no other rows can show it: a ball that was put up badly.
     """
 
     name: str
@@ -109,6 +110,7 @@ class Law:
     reach: float | None = None
     family: Family | None = None
     variables: tuple[Variable, ...] = ()
+    acts_once: bool = False
 
     def plausible_of(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
         """Usual size of each amplitude, shape (p,), whose columns are these, shape (n, p)."""

@@ -62,6 +62,23 @@ def weighted_jackknife(
     return np.asarray(np.sqrt(np.sum(np.where(np.isfinite(squares), squares, 0.0), axis=0)))
 
 
+def widening(
+    variances: NDArray[np.float64], moved: NDArray[np.float64], variances_without: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Factors of standard uncertainties after which each is the larger of model and jackknife, shape (p,).
+
+    Values that the same weak direction makes uncertain get nearly the same factor, so a covariance whose rows and columns are
+    multiplied by them still knows combinations better than their parts. A value without variance, which is held, stays held.
+
+    Args:
+        variances: stated of the values from all parts, shape (p,).
+        moved: by how much the values differ without each part, shape (k, p).
+        variances_without: stated of the values without each part, shape (k, p).
+    """
+    found = weighted_jackknife(np.zeros(len(variances)), variances, moved, variances_without)
+    return np.maximum(found / np.sqrt(np.where(variances > 0.0, variances, np.inf)), 1.0)
+
+
 def refits_without(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> tuple[Solution, ...]:
     """Base and members of the best hypothesis fitted without each part, in the noise that there is: nothing is chosen anew.
 

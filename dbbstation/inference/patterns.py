@@ -93,6 +93,7 @@ class Pattern:
         tried: how many independent forms it was picked from.
         choices: forms of which one is there, where there are several: the columns of each, its log probability, and what tells it
             from the others.
+        acts_once: no other rows can show it, whatever it follows: a curve that each block has of its own.
     """
 
     family: Family
@@ -104,6 +105,7 @@ class Pattern:
     label: str = ""
     tried: float = 1.0
     choices: tuple[tuple[tuple[int, ...], float, str], ...] = ()
+    acts_once: bool = False
 
     @property
     def name(self) -> str:

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from dbbstation.inference.chosen_anew import ChosenAnew
     from dbbstation.inference.folds import HeldOutError
     from dbbstation.inference.model_comparison import Cause, Member
-    from dbbstation.inference.patterns import Pattern
     from dbbstation.inference.settled import Settled
     from dbbstation.inference.square_root import Solution
 
@@ -79,7 +79,7 @@ class Finding:
         text: why, in a sentence; empty where the verdict says it all.
         acts: whether other rows can show it again.
         gains: in held-out parts; None where these were not asked for.
-        persists: a step in time that held-out parts tell of, too.
+        persists: a step in time, or a law that acts once, that held-out parts tell of, too.
         recurs: a wave over the time that predicts held-out parts, found anew without each of them.
     """
 
@@ -117,7 +117,7 @@ class Trial:
         refits: values of base and members without each part [`refits_without`]; none: uncertainties are the model's.
     """
 
-    held_out: HeldOutError | None = None
+    held_out: HeldOutError | ChosenAnew | None = None
     refits: Sequence[Solution] = ()
 
 
@@ -194,7 +194,8 @@ class _Judge:
         variables = pattern.variables if pattern else law.variables if law else ()
         there = verdict.rank <= Verdict.AMBIGUOUS.rank and member is not None
         rows = _stretches(effect) if there and pattern is not None and pattern.family == "pulses" else ()
-        happened = verdict is Verdict.HAPPENED and gains is not None and gains.predicts and pattern is not None
+        happened = verdict is Verdict.HAPPENED and gains is not None and gains.predicts
+        lasts = pattern is None or pattern.family is Family.STEP or self._is_a_step(rows)
         largest = _at_half(effect) if there else np.zeros(0, dtype=bool)
         channel = self._settled.channel
         return Finding(
@@ -217,10 +218,10 @@ class _Judge:
             equivalent=equal if len(equal) > 1 else (),
             ambiguous_with=others,
             text=text,
-            acts=_acts(pattern),
+            acts=self._acts(cause.name),
             gains=gains,
-            persists=bool(happened and pattern and (pattern.family is Family.STEP or self._is_a_step(rows))),
-            recurs=bool(happened and pattern and pattern.family is Family.WAVE),
+            persists=happened and lasts,
+            recurs=happened and pattern is not None and pattern.family is Family.WAVE,
         )
 
     def _gains(self, name: str) -> Gains | None:
@@ -228,6 +229,15 @@ class _Judge:
         if self._trial is None or self._trial.held_out is None:
             return None
         return self._trial.held_out.gains_of({self._settled.bank.kind_of(one) for one in self._pooled(name)})
+
+    def _acts(self, name: str) -> Acts:
+        """Whether other rows can show an effect again: not what follows the time alone, nor offsets and curves of single runs."""
+        pattern, law = self._settled.bank.patterns.get(name), self._settled.bank.laws.get(name)
+        if pattern is None:
+            return Acts.ONCE if law is not None and law.acts_once else Acts.ALWAYS
+        over_time = any(variable.kind is Kind.TIME for variable in pattern.variables)
+        once = over_time or pattern.acts_once or pattern.family in (*IN_TIME, Family.BLOCKS)
+        return Acts.ONCE if once else Acts.ALWAYS
 
     def _is_a_step(self, rows: tuple[tuple[int, int], ...]) -> bool:
         """Whether stretches of rows are a single one that a block begins or ends with, but for fewer rows than a stretch has."""
@@ -316,7 +326,7 @@ class _Judge:
             return claim(probability, sigmas, Acts.ALWAYS, None), (), ""
         gains, held_out = self._gains(name), self._trial.held_out
         worse = held_out is not None and held_out.is_worse
-        verdict = claim(probability, sigmas, _acts(self._settled.bank.patterns.get(name)), gains, worse=worse)
+        verdict = claim(probability, sigmas, self._acts(name), gains, worse=worse)
         text = ""
         if verdict is Verdict.DOES_NOT_PREDICT and gains is not None:
             text = f"It was found in these rows; held-out parts gain by it in {gains.with_gain} of {len(gains.parts)}."
@@ -372,14 +382,6 @@ class _Judge:
         rest = _rms(kept - (self._settled.channel.base.samples @ fitted)[self._settled.channel.kept])
         share = 1.0 - (rest / whole) ** 2 if whole > 0.0 else 0.0
         return whole, rest, float(np.clip(share, 0.0, 1.0))
-
-
-def _acts(pattern: Pattern | None) -> Acts:
-    """Whether other rows can show an effect again: not what follows the time alone, nor offsets of runs."""
-    if pattern is None:
-        return Acts.ALWAYS
-    over_time = any(variable.kind is Kind.TIME for variable in pattern.variables)
-    return Acts.ONCE if over_time or pattern.family in (*IN_TIME, Family.BLOCKS) else Acts.ALWAYS
 
 
 def _at_half(effect: NDArray[np.float64]) -> NDArray[np.bool_]:

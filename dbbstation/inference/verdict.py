@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum, StrEnum, auto
+from typing import Any
 
 SURE = 0.95
 """Probability from which on something is said to be there: one claim in twenty may be wrong if the model of noise and causes is right."""
@@ -66,7 +67,8 @@ class Gains:
 
     Attributes:
         parts: sum of squares of the errors of prediction of a part without the effect, what else was chosen refitted, less that with it,
-            in the squared unit of what is predicted; zero where the effect was not chosen.
+            in the squared unit of what is predicted; on circles, log density of the prediction with it less that without it. Zero where
+            the effect was not chosen.
     """
 
     parts: tuple[float, ...]
@@ -87,6 +89,15 @@ class Gains:
         if not self.parts or self.with_gain < PARTS_WITH_GAIN * len(self.parts):
             return False
         return self.total - max(self.parts) > 0.0
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as plain values for JSON."""
+        return {
+            "parts": list(self.parts),
+            "with_gain": self.with_gain,
+            "total": self.total,
+            "predicts": self.predicts,
+        }
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import looked_up, nearest
+from dbbstation.catalogue import loaded, looked_up, nearest
 from dbbstation.errors import InputError, InstrumentError, Problem
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.files.yaml.schema import validate
@@ -15,7 +15,10 @@ from dbbstation.instrument.profiles import ProtocolFile, variant
 if TYPE_CHECKING:
     from dbbstation.instrument.protocol import Protocol
 
-HOW_TO_ADD = "or give a .yaml file of your own"
+GROUP = "dbbstation.instruments"
+"""Entry points of this group name packages; every `.yaml` file in the folder of one is an instrument."""
+
+HOW_TO_ADD = "or give a .yaml file of your own, or install its package"
 """What a name that nobody knows may lack."""
 
 
@@ -24,13 +27,39 @@ def instruments_folder() -> Path:
     return shipped_folder("protocols") / "instruments"
 
 
-def known_instruments(folder: Path | None = None) -> list[str]:
-    """Return the names of the instruments in `folder` (the shipped ones by default), sorted."""
-    return sorted(path.stem for path in (folder or instruments_folder()).glob("*.yaml"))
+def known_instruments() -> list[str]:
+    """Return the names of the instruments that are shipped and of installed ones, sorted.
+
+    Raises:
+        InputError: an entry point that cannot be loaded or names no package, or an instrument whose name is taken.
+    """
+    return list(_files())
+
+
+def _files() -> dict[str, Path]:
+    """The file of each known instrument, by name."""
+    faults: list[Problem] = []
+    files = {path.stem: path for path in instruments_folder().glob("*.yaml")}
+    whose = dict.fromkeys(files, "dbbstation itself")
+    for point in loaded(GROUP, faults):
+        folders = [Path(folder) for folder in getattr(point.value, "__path__", ())]
+        found = sorted(path for folder in folders for path in folder.glob("*.yaml"))
+        if not found:
+            what = f"{point.named} is no package with a protocol file, which ends in .yaml, in its folder"
+            faults.append(Problem(point.place.file, 0, 0, what, point.remedy))
+        for path in found:
+            if path.stem in files:
+                what = f"an instrument `{path.stem}` is known already, from {whose[path.stem]}"
+                faults.append(Problem(point.place.file, 0, 0, what, "give it another name"))
+            else:
+                files[path.stem], whose[path.stem] = path, point.place.file
+    if faults:
+        raise InputError(faults)
+    return dict(sorted(files.items()))
 
 
 def load_instrument(name_or_file: str | Path, profile: str | None = None) -> Protocol:
-    """Return the protocol of a shipped instrument, or of a file (a name that ends in `.yaml`).
+    """Return the protocol of a known instrument, or of a file (a name that ends in `.yaml`).
 
     Args:
         name_or_file: of the instrument.
@@ -57,8 +86,7 @@ def _file_of(name_or_file: str | Path) -> Path:
     path = Path(name_or_file)
     if path.suffix in {".yaml", ".yml"}:
         return path
-    files = {name: instruments_folder() / f"{name}.yaml" for name in known_instruments()}
-    return looked_up(str(name_or_file), files, called="instrument", error=InstrumentError, how_to_add=HOW_TO_ADD)
+    return looked_up(str(name_or_file), _files(), called="instrument", error=InstrumentError, how_to_add=HOW_TO_ADD)
 
 
 def with_zero(protocol: Protocol, zero_mm: float | None) -> Protocol:

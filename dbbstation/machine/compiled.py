@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import threading
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
@@ -25,8 +27,21 @@ REORDER = frozenset({"reassoc", "contract", "arcp", "nsz"})
 forget the sign of zero. It may not assume that there is no NaN and no infinity, which the kernels have to notice."""
 
 
+class NotKeptWarning(UserWarning):
+    """Compiled code could not be kept for the next process."""
+
+
+NOT_KEPT = (
+    "there is no folder that compiled loops can be kept in: every command compiles them again, which takes about ten seconds; "
+    "name a folder that you may write to with NUMBA_CACHE_DIR"
+)
+
+
 def compiled(kernel: Kernel) -> Kernel:
     """Compile a loop to machine code at its first call and keep the code on disk for the next process.
+
+    Where there is no place for it, neither beside the package nor in the user's cache folder, nothing is kept:
+    `NotKeptWarning`, once, in the process that nobody else started.
 
     The kernel runs without Python's global lock, so that `in_blocks` can run it on all cores. Numba's own
     parallel loops are not used: their default thread layer aborts the process when two threads enter it.
@@ -71,8 +86,19 @@ class _Kernel:
                 parts = {name: part.dispatcher() for name, part in seen.items() if isinstance(part, _Kernel)}
                 whole = FunctionType(function.__code__, {**function.__globals__, **parts})
                 how: Any = {"error_model": "numpy", "fastmath": set(REORDER), **self._options}
-                self._dispatcher = cast("Callable[..., Any]", numba.njit(**how)(whole))
+                try:
+                    made = numba.njit(**how)(whole)
+                except RuntimeError:  # before anything is compiled: no folder for the code can be written to
+                    made = numba.njit(**{**how, "cache": False})(whole)
+                    _say_not_kept()
+                self._dispatcher = cast("Callable[..., Any]", made)
             return self._dispatcher
+
+
+@cache
+def _say_not_kept() -> None:
+    if multiprocessing.parent_process() is None:
+        warnings.warn(NOT_KEPT, NotKeptWarning, stacklevel=2)
 
 
 _COMPILING = threading.RLock()

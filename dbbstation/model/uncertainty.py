@@ -11,6 +11,7 @@ from dbbstation.machine.kinematics import position_responses
 from dbbstation.model.identified import known_u
 from dbbstation.model.machine_model import by_parameters
 from dbbstation.sources.contract import Motion
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from dbbstation.model.identified import IdentifiedModel
 
 
+@with_one_thread
 def position_uncertainty_mm(
     identified: IdentifiedModel, motion: Motion, *, about_mean: bool = False
 ) -> NDArray[np.float64]:
@@ -50,6 +52,7 @@ def position_uncertainty_mm(
     return known_u(np.maximum(variance, 0.0), along)
 
 
+@with_one_thread
 def range_uncertainty_mm(identified: IdentifiedModel, motion: Motion, axis: int) -> float | None:
     """Standard uncertainty of the greatest less the least deviation along one axis over a motion [mm]; None where not known.
 
@@ -104,6 +107,7 @@ POSES_AT_ONCE = 5_000
 """Poses that are predicted together: sensitivities of so many take some megabytes, and progress shows."""
 
 
+@with_one_thread
 def predicted_poses(
     identified: IdentifiedModel,
     poses: ArrayLike,

@@ -14,6 +14,7 @@ from dbbstation.nc.limits import LARGEST_CORRECTION_MM
 from dbbstation.nc.planner import KEPT, LOOKS_AHEAD, PLANNED_WITHIN, cuts, move_mm
 from dbbstation.nc.splitting import SHORTEST_MM, Pieces, looked_at, moves_of, parts_of, rows_as_pieces, runs_of, split
 from dbbstation.nc.toolpath import Step, rounded
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -97,6 +98,7 @@ class Compensation:
     slow: Slow | None
 
 
+@with_one_thread
 def compensate_toolpath(
     toolpath: Toolpath,
     model: MachineModel,

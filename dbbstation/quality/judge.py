@@ -14,6 +14,7 @@ from dbbstation.quality.place import bore, radius
 from dbbstation.quality.single import by_itself
 from dbbstation.quality.stated import sigmas_apart
 from dbbstation.quality.swapped import of_its_test
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -41,6 +42,7 @@ class Judgement:
         return tuple(finding for finding in self.findings if finding.wrong)
 
 
+@with_one_thread
 def judge(runs: Sequence[Run], progress: Callable[[int, int], None] = lambda _done, _of: None) -> tuple[Judgement, ...]:
     """Judge the runs of one session, each beside all others.
 

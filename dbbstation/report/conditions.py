@@ -11,10 +11,10 @@ from dbbstation.files.recordings.entries import RunState
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from dbbstation.circled import MeasuredCircle
     from dbbstation.files.recordings.entries import Note, RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.plan.bar import Bar
+    from dbbstation.results.circles import MeasuredCircle
 
 _NOT_NOTED = "not noted"
 

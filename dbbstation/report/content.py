@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from dbbstation.circled import circled_summary
 from dbbstation.machine.difference import differences, in_words
 from dbbstation.plan.tolerance import CircleFigure
 from dbbstation.quality.conformity import Conformity
@@ -14,18 +13,19 @@ from dbbstation.report.model_part import not_visible, parameters
 from dbbstation.report.plate_map import WIDTH, plate_map
 from dbbstation.report.polar import CIRCLE, SIZE, polar
 from dbbstation.report.verdict import verdict_of
-from dbbstation.tolerated import held_against, tolerated_circles
+from dbbstation.results.circles import circled_summary
+from dbbstation.results.tolerances import held_against, tolerated_circles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from dbbstation.circled import Circled
     from dbbstation.circles.path import Filter
     from dbbstation.files.formats.settings import Settings
     from dbbstation.files.provenance import Provenance
     from dbbstation.model.identified import IdentifiedModel
     from dbbstation.plan.tolerance import Tolerance
-    from dbbstation.tolerated import Held, ToleratedCircle
+    from dbbstation.results.circles import Circled
+    from dbbstation.results.tolerances import Held, ToleratedCircle
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,6 +39,11 @@ class Stamped:
     provenance: Provenance
 
 
+def figure_format(wanted: object) -> FigureFormat | Stamped:
+    """Return a format, also from the ending of a file's name, such as `.svg`."""
+    return wanted if isinstance(wanted, Stamped) else FigureFormat(str(wanted))
+
+
 def in_format(figure: Figure, wanted: FigureFormat | Stamped) -> bytes:
     """Return the figure's bytes: the same for the same figure and provenance, without a date.
 

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from dbbstation.circled import Circled, MeasuredCircle
     from dbbstation.circles.path import Filter
     from dbbstation.report.plot_panels import Drawn
+    from dbbstation.results.circles import Circled, MeasuredCircle
 
 MOST_DRAWN = 20
 """Repeats of one direction that are drawn: more cover one another even as thin lines. The others are counted on the sheet."""

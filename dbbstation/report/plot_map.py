@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from dbbstation.circled import MeasuredCircle
     from dbbstation.plan.plan import PlannedTest
     from dbbstation.report.sheet import Sheet
+    from dbbstation.results.circles import MeasuredCircle
 
 LONGEST_IN = 0.6
 """The longest arrow [inch]."""

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from dbbstation.circled import MeasuredCircle
     from dbbstation.circles.analysis import CircleAnalysis
     from dbbstation.report.sheet import Sheet
+    from dbbstation.results.circles import MeasuredCircle
 
 Drawn: TypeAlias = "tuple[MeasuredCircle, bool]"
 """A run, and whether it is drawn thin."""

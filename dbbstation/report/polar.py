@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from dbbstation.circled import MeasuredCircle
+    from dbbstation.results.circles import MeasuredCircle
 
 SIZE = 320
 """Width and height of a polar figure in its own units."""

@@ -11,8 +11,8 @@ from dbbstation.quality.conformity import Conformity
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from dbbstation.circled import Circled, MeasuredCircle
-    from dbbstation.tolerated import Held
+    from dbbstation.results.circles import Circled, MeasuredCircle
+    from dbbstation.results.tolerances import Held
 
 MOST_TOLD = 5
 """Runs that the first page names; the findings name all."""

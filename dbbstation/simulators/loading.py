@@ -17,8 +17,9 @@ from dbbstation.diagnosis.simulator.own import PortSource
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
 from dbbstation.files.gateway import content_of
-from dbbstation.files.own_classes import classes_in_files, line_in
+from dbbstation.files.own_classes import classes_in_files
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
+from dbbstation.report.sheet import line_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,8 +13,8 @@ from dbbstation.catalogue import in_words
 from dbbstation.diagnosis.simulator.ports import simulated
 from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
 from dbbstation.errors import CalibrationError
-from dbbstation.files.own_classes import line_in
 from dbbstation.processes import deaf, processes
+from dbbstation.report.sheet import line_in
 from dbbstation.simulators.loading import simulator_of
 
 if TYPE_CHECKING:

@@ -1,27 +1,90 @@
-"""Every error source by name: one file each in `causes` and `unmodelled`, found by looking, not by a list."""
+"""Every error source by name: one file each in `causes` and `unmodelled`, found by looking, and those of installed packages."""
 
 from __future__ import annotations
 
 from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import in_folders, looked_up
-from dbbstation.errors import ModelError
+from dbbstation.catalogue import Found, added, in_folders, in_words, installed, line_in, looked_up
+from dbbstation.errors import InputError, ModelError, Problem
 from dbbstation.sources import causes, unmodelled
 from dbbstation.sources.contract import ErrorSource
+from dbbstation.sources.trial import trial_machine, tried, undeclared
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
+GROUP = "dbbstation.sources"
+"""Entry points of this group name classes that derive from `ErrorSource`."""
 
 HOW_TO_ADD = "one of your own is given with --source-file FILE.py, or its package installed"
 """What a name that nobody knows may lack."""
 
 
-@cache
 def known_sources() -> Mapping[str, ErrorSource]:
-    """All error sources of the package, sorted by name."""
-    return in_folders(ErrorSource, causes, unmodelled)  # type: ignore[type-abstract]  # what derives from it is made
+    """All error sources of the package and of installed ones, sorted by name.
+
+    Raises:
+        InputError: an installed package has a source that cannot be loaded, does not keep the contract, or whose name is taken.
+    """
+    return _known()[0]
+
+
+@cache
+def _known() -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
+    """All that are known without a file being named, and where those come from that are not the package's."""
+    faults: list[Problem] = []
+    others = installed(GROUP, _BASE, faults)
+    found, whose = _with(in_folders(_BASE, causes, unmodelled), {}, others, faults)
+    if faults:
+        raise InputError(faults)
+    return found, whose
+
+
+_BASE: type[ErrorSource] = ErrorSource  # type: ignore[type-abstract]  # what derives from it is made
+
+
+def known_with(others: Sequence[Found[ErrorSource]], faults: list[Problem]) -> Mapping[str, ErrorSource]:
+    """All that are known, and sources made from further classes; what these lack of the contract is added to `faults`.
+
+    Raises:
+        InputError: as `known_sources`.
+    """
+    known, whose = _known()
+    return _with(known, whose, others, faults)[0]
+
+
+def _with(
+    known: Mapping[str, ErrorSource],
+    whose: Mapping[str, str],
+    others: Sequence[Found[ErrorSource]],
+    faults: list[Problem],
+) -> tuple[Mapping[str, ErrorSource], Mapping[str, str]]:
+    found, places = dict(known), dict(whose)
+    for other in others:
+        one = _checked(other, faults)
+        if one is not None:
+            added(found, places, one, other.place, called="an error source", faults=faults)
+    return MappingProxyType(dict(sorted(found.items()))), places
+
+
+def _checked(found: Found[ErrorSource], faults: list[Problem]) -> ErrorSource | None:
+    """Return a source made from a class; None with what it lacks added."""
+    kind, place = found.kind, found.place
+    said, line = undeclared(kind), place.line
+    if not said:
+        try:
+            source = kind()
+            said = tried(source, trial_machine())
+        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+            said = [f"{in_words(error)}, when it was tried on a circle"]
+            line = line_in(error, place.file) or line
+        else:
+            if not said:
+                return source
+    faults += [Problem(place.file, line, 0, f"{kind.__name__}: {what}", found.remedy) for what in said]
+    return None
 
 
 def sources_named(names: Iterable[str], known: Mapping[str, ErrorSource] | None = None) -> tuple[ErrorSource, ...]:
@@ -29,7 +92,7 @@ def sources_named(names: Iterable[str], known: Mapping[str, ErrorSource] | None 
 
     Args:
         names: of the sources.
-        known: every error source by name; those of the package if None.
+        known: every error source by name; those of the package and of installed ones if None.
 
     Raises:
         ModelError: a name that no source has.

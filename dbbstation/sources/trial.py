@@ -9,12 +9,13 @@ from __future__ import annotations
 import inspect
 import re
 from dataclasses import fields, replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import ModelError
-from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.geometry import STRUTS, Compliance, Hexapod, JointAxes, Machine, Masses, StrutMasses, Travel
 from dbbstation.machine.travel import middle
 from dbbstation.sources.contract import EFFECT_SHAPES, Effect, ErrorSource, Motion, Need, Owner, Parameter, Setup, Texts
 from dbbstation.trace.columns import currents, temperatures
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
-
-    from dbbstation.machine.geometry import Machine
 
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
@@ -39,6 +38,50 @@ SAME = 1e-9
 
 MOST_KINKS = 0.05
 """Share of samples where it may differ more: play has kinks, where no derivative holds."""
+
+FEWEST_LETTERS, FEWEST_WORDS = 10, 4
+"""Of a text, and of what a parameter means: less says nothing to whoever finds it in a verdict."""
+
+OTHER_SIZE = 0.7
+"""Share of the plausible sizes, amplitudes negative, at which a derivative is looked at a second time."""
+
+
+@cache
+def trial_machine() -> Machine:
+    """Return a regular hexapod with everything that a machine file may state."""
+    turn = np.radians(120.0)
+    joints_mm = []
+    for radius_mm, half_deg, first_deg, height_mm in ((730.0, 5.0, 90.0, 0.0), (395.0, 10.0, 150.0, 500.0)):
+        at = np.radians([first_deg - half_deg, first_deg + half_deg])
+        at = np.concatenate([at + k * turn for k in range(3)])
+        joints_mm.append(np.column_stack([radius_mm * np.cos(at), radius_mm * np.sin(at), np.full(STRUTS, height_mm)]))
+    base, platform = joints_mm
+    # Struts run from each base joint to the nearest platform joint.
+    platform = np.roll(platform, 1, axis=0)
+    axes = [np.cross(joints, [0.0, 0.0, 1.0]) for joints in (base, platform)]
+    return Machine(
+        name="trial",
+        hexapod=Hexapod(base, platform),
+        travel=Travel(
+            300.0,
+            (-300.0, 300.0),
+            (-300.0, 300.0),
+            (-1200.0, -800.0),
+            (-20.0, 20.0),
+            (-20.0, 20.0),
+            (-5.0, 5.0),
+            (200.0, 1600.0),
+        ),
+        screw_lead_mm=10.0,
+        masses=Masses(400.0, 500.0),
+        joint_tolerance_mm=0.05,
+        compliance=Compliance(1e-5),
+        strut_masses=StrutMasses(25.0, 20.0, 300.0, 12.0, 1400.0),
+        joint_axes=JointAxes(*(each / np.linalg.norm(each, axis=1)[:, None] for each in axes)),
+        greatest_feed_mm_min=30_000.0,
+        greatest_turn_deg_min=1800.0,
+        acceleration_mm_s2=1500.0,
+    )
 
 
 def undeclared(kind: type[ErrorSource]) -> list[str]:
@@ -58,11 +101,14 @@ def undeclared(kind: type[ErrorSource]) -> list[str]:
     detail_mm: object = kind.detail_mm
     if not isinstance(detail_mm, int | float) or not detail_mm > 0.0:
         faults.append("its `detail_mm` must be a length above zero, or SMOOTH_MM")
+    share: object = kind.form_uncertainty
+    if not isinstance(share, int | float) or not 0.0 <= share < 1.0:
+        faults.append("its `form_uncertainty` must be a share of the effect, from 0 to below 1")
     texts = getattr(kind, "texts", None)
     if not isinstance(texts, Texts):
         faults.append("it needs `texts`, a Texts that says " + ", ".join(f.name for f in fields(Texts)))
     else:
-        empty = [f.name for f in fields(texts) if not str(getattr(texts, f.name)).strip()]
+        empty = [f.name for f in fields(texts) if len(str(getattr(texts, f.name)).strip()) < FEWEST_LETTERS]
         if empty:
             faults.append(f"its texts say nothing under {', '.join(empty)}")
     try:
@@ -99,8 +145,12 @@ def tried(source: ErrorSource, machine: Machine) -> list[str]:
         faults = _of_shapes(what, answer, len(motion), last)
         if faults:
             return faults
+    signs = np.array([1.0 if p.shape else -OTHER_SIZE for p in parameters])
     return (
         _of_derivative(source, motion, machine, parameters, values)
+        or _of_derivative(source, motion, machine, parameters, signs * values)
+        or _of_proportion(source, motion, machine, parameters, values)
+        or _of_needs(source, motion)
         or _of_history(source, motion, machine, values)
         or _of_second_form(source, parameters, machine)
     )
@@ -154,9 +204,70 @@ def _of_parameters(parameters: Sequence[Parameter]) -> list[str]:
         for p in parameters
         if not (np.isfinite(p.plausible) and p.plausible > 0.0)
     ]
-    return faults + [
-        f"its parameter {p.name} says no unit or meaning" for p in parameters if not (p.unit and p.meaning)
-    ]
+    for p in parameters:
+        if not p.unit or len(p.meaning.split()) < FEWEST_WORDS:
+            faults.append(f"its parameter {p.name} says no unit or meaning")
+        elif not p.name.endswith(f"_{_as_in_names(p.unit)}"):
+            faults.append(f"its parameter {p.name} must end with its unit, _{_as_in_names(p.unit)}")
+        strut = re.match(r"(?:strut|joint)_([1-6])_", p.name)
+        if p.strut != (int(strut[1]) if strut else None):
+            faults.append(f"its parameter {p.name} must say with `strut` which strut it is of, as its name does")
+        if p.shape and not min(p.shape) <= p.plausible <= max(p.shape):
+            faults.append(f"the plausible size of its parameter {p.name} lies outside of its shape's values")
+    return faults
+
+
+def _as_in_names(unit: str) -> str:
+    """Return a unit as the end of a parameter's name has it."""
+    return re.sub(r"[/ ]", "_", re.sub(r"[()]", "", unit.lower().replace("µ", "u")))
+
+
+def _of_proportion(
+    source: ErrorSource,
+    motion: Motion,
+    machine: Machine,
+    parameters: Sequence[Parameter],
+    values: NDArray[np.float64],
+) -> list[str]:
+    """Whether nothing comes of nothing, and twice the effect of twice the amplitudes but where a path is remembered."""
+    zero = np.zeros(len(parameters))
+    nothing = source.effect(motion, machine, zero)
+    slopes = source.derivative(motion, machine, zero)
+    faults = []
+    doubled = values * np.where([bool(p.shape) for p in parameters], 1.0, 2.0)
+    once, twice = (source.effect(motion, machine, each) for each in (values, doubled))
+    for name in EFFECT_SHAPES:
+        at_zero, whole, double = (getattr(effect, name) for effect in (nothing, once, twice))
+        if (at_zero is None) is not (getattr(slopes, name) is None):
+            faults.append(f"{name} stands in only one of its effect and its derivative where all parameters are zero")
+        if at_zero is not None and np.abs(at_zero).max(initial=0.0) > SAME:
+            faults.append(f"{name} of its effect is not zero where all its parameters are")
+        if whole is None or double is None or source.has_history:
+            continue
+        if np.abs(double - 2.0 * whole).max(initial=0.0) > SAME * np.abs(whole).max(initial=0.0):
+            faults.append(
+                f"{name} of its effect is not proportional to its amplitudes: what is not must have a `shape`"
+            )
+    return faults
+
+
+def _of_needs(source: ErrorSource, motion: Motion) -> list[str]:
+    """Whether a motion without what it needs is refused."""
+    without = {
+        Need.PATH: {"is_path": False},
+        Need.TIME: {"time_s": None},
+        Need.TEMPERATURE: {"logged": {}},
+        Need.CURRENT: {"logged": {}},
+        Need.READING: {"reading_mm": None},
+    }
+    faults = []
+    for need in sorted(source.needs - {Need.POSE}):
+        try:
+            source.require(replace(motion, **without[need]))  # type: ignore[arg-type]
+        except ModelError:
+            continue
+        faults.append(f"its `require` takes a motion without {need}, which it needs")
+    return faults
 
 
 def _circle(machine: Machine) -> Motion:

@@ -21,8 +21,8 @@ from matplotlib import pyplot as plt
 
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.model.compensation import compensated
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Motion
+from dbbstation.tasks.load import load_sessions
 from dbbstation.trace.analysis import figures
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import subset, table_ii_plan

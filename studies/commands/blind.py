@@ -45,10 +45,10 @@ def blind(
     """
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import progress_bar
-    from dbbstation.diagnosed import default_candidates
     from dbbstation.errors import InputError, Problem
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.sources.registry import known_sources
+    from dbbstation.tasks.diagnose import default_candidates
     from studies.blind import judge_sessions, read_answers
     from studies.blind_score import numbers, score
 

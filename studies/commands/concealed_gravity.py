@@ -25,13 +25,13 @@ def concealed_gravity(*, seed: int, figure: Path | None, force: bool, as_json: b
       dbbstation study concealed-gravity
       dbbstation study concealed-gravity --seed 5 --figure concealed.svg --json
     """
-    from dbbstation.cli.diagnose import STAGES
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import stage_bar
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.files.shipped import shipped_folder
+    from dbbstation.tasks.diagnose import STAGES
     from studies.concealed_figure import concealed_figure
     from studies.concealed_gravity import concealed_gravity as experiment
 

@@ -34,6 +34,14 @@ _FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
     help="Two sessions to compare; may be given more than once.",
 )
 @click.option(
+    "--table",
+    "tables",
+    type=(_FILE, str, str),
+    multiple=True,
+    metavar="TABLE.csv MEASURED SIMULATED",
+    help="A table with the names of its measured and simulated column; may be given more than once.",
+)
+@click.option(
     "--only", multiple=True, metavar="NAME", help="Vary this constant; may be given more than once [default: all]."
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of processes [default: all cores].")
@@ -43,34 +51,37 @@ def sensitivities(
     drives: tuple[Path, ...],
     amperes: tuple[tuple[Path, float], ...],
     pairs: tuple[tuple[Path, Path], ...],
+    tables: tuple[tuple[Path, str, str], ...],
     only: tuple[str, ...],
     jobs: int | None,
     as_json: bool,
 ) -> None:
     r"""Ask again with every constant that decides an answer halved and doubled.
 
-    Drive recordings are asked by the constants of `drive`, pairs of sessions by those of `compare`. A table tells which
-    verdicts change, and which parameter changes most in its standard uncertainties.
+    Drive recordings are asked by the constants of `drive`, pairs of sessions by those of `compare`, tables by those of
+    `mismatch`. What is printed tells which verdicts change, and which parameter changes most in its standard uncertainties.
 
     \b
     Examples:
       dbbstation study sensitivities drive.csv
       dbbstation study sensitivities --pair before after --jobs 1
       dbbstation study sensitivities drive.csv --only APART --only LEAST_SHARE
+      dbbstation study sensitivities --table room.csv measured_c simulated_c
     """
     from dbbstation.cli.output import print_json
     from dbbstation.cli.progress import count_bar
-    from studies.sensitivities import COMPARE, DRIVE, study
+    from studies.sensitivities import COMPARE, DRIVE, TABLE, study
 
-    if not (drives or amperes or pairs):
-        raise click.UsageError("give a drive recording, or two sessions with --pair")
-    unknown = set(only) - {constant.name for constant in (*DRIVE, *COMPARE)}
+    if not (drives or amperes or pairs or tables):
+        raise click.UsageError("give a drive recording, two sessions with --pair, or a table with --table")
+    every = {constant.name for constant in (*DRIVE, *COMPARE, *TABLE)}
+    unknown = set(only) - every
     if unknown:
-        known = ", ".join(sorted({constant.name for constant in (*DRIVE, *COMPARE)}))
+        known = ", ".join(sorted(every))
         raise click.UsageError(f"no constant of this study: {', '.join(sorted(unknown))}; it has {known}")
     recordings = [*((path, None) for path in drives), *amperes]
     with count_bar("answers") as progress:
-        changes = study(recordings, pairs, jobs or os.cpu_count() or 1, progress, only)
+        changes = study(recordings, pairs, jobs or os.cpu_count() or 1, progress, only, tables)
     if as_json:
         print_json({"changes": [asdict(change) for change in changes]})
     else:

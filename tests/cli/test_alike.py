@@ -10,7 +10,7 @@ import pytest
 from dbbstation.cli import DONE, FAILED, USAGE
 from dbbstation.errors import InputError
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.recorded import load_sessions
+from dbbstation.tasks.load import load_sessions
 from tests.cli.test_help import LINES, found
 
 PLAN = shipped_folder("protocols") / "plans" / "table2.yaml"

@@ -46,7 +46,7 @@ def test_a_constant_that_was_written_into_the_files(run, three, longer):
     assert found["differ"]
     assert [row["mean_radial_change_um"] for row in found["runs"]] == pytest.approx([5.0] * 6, abs=1e-3)
     best = found["causes"][0]
-    assert (best["name"], best["verdict"]) == ("bar-offset", "identified")
+    assert (best["name"], best["verdict"]) == ("bar-offset", "happened")
     (offset,) = best["parameters"].values()
     assert offset["value"] == pytest.approx(0.005, abs=2 * offset["uncertainty"])
     assert found["organised_text"].startswith("bar-offset, 100 %")

@@ -114,7 +114,7 @@ def test_a_fault_of_the_program_says_so(run, monkeypatch, fifteen):
     def broken(*_):
         raise ValueError("three is not two")
 
-    monkeypatch.setattr("dbbstation.recorded.load_sessions", broken)
+    monkeypatch.setattr("dbbstation.tasks.load.load_sessions", broken)
     outcome = run("calibrate", fifteen)
     assert outcome.code == FAILED
     assert outcome.err == (

@@ -18,7 +18,7 @@ from dbbstation.cli.history import history
 from dbbstation.files.kept import index_file
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.history.trend import FALSE_ALARMS
-from dbbstation.session_figures import session_figures
+from dbbstation.tasks.session_figures import session_figures
 from tests.cli.conftest import call
 from tests.sessions_over_time import sessions_over_time
 
@@ -127,7 +127,7 @@ def test_the_second_time_says_the_same_and_reads_no_recording(told, sessions, mo
     def refuse(*_):
         raise AssertionError("a session was read")
 
-    monkeypatch.setattr("dbbstation.session_figures.session_figures", refuse)
+    monkeypatch.setattr("dbbstation.tasks.session_figures.session_figures", refuse)
     again = call("history", sessions, "--json")
     assert again.out == told.out
 
@@ -136,7 +136,7 @@ def test_a_session_file_that_was_only_touched_is_known_by_its_content(few, monke
     before = call("history", few, "--json").out
     (few / "w002" / "session.yaml").touch()
     shutil.move(few / "w003", few / "w003 moved")
-    monkeypatch.setattr("dbbstation.session_figures.session_figures", None)
+    monkeypatch.setattr("dbbstation.tasks.session_figures.session_figures", None)
     assert call("history", few, "--json").out.replace("w003 moved", "w003") == before
 
 
@@ -149,7 +149,7 @@ def test_what_was_read_before_an_interrupt_is_not_read_again(few, monkeypatch):
             raise KeyboardInterrupt
         return real(folder)
 
-    monkeypatch.setattr("dbbstation.session_figures.session_figures", third_time)
+    monkeypatch.setattr("dbbstation.tasks.session_figures.session_figures", third_time)
     assert call("history", few).code == FAILED
     assert call("history", few).code == DONE
     assert read == ["w001", "w002", "w003", "w003", "w004"]
@@ -161,9 +161,9 @@ def test_several_processes_give_the_same(few, monkeypatch):
     run = few / "w003" / "runs" / "a-cw-2.csv"
     run.write_bytes(run.read_bytes()[:-40])
     before = call("history", few, "--json")
-    monkeypatch.setattr("dbbstation.historied.RUNS_WORTH_PROCESSES", 1)
+    monkeypatch.setattr("dbbstation.tasks.history.RUNS_WORTH_PROCESSES", 1)
     monkeypatch.setattr("os.cpu_count", lambda: 2)
-    monkeypatch.setattr("dbbstation.session_figures.session_figures", None)
+    monkeypatch.setattr("dbbstation.tasks.session_figures.session_figures", None)
     again = call("history", few, "--json", "--rebuild")
     assert (again.out, again.err) == (before.out, before.err)
     assert [one["name"] for one in again.data["left_out"]] == ["w003"]

@@ -40,9 +40,9 @@ def lines_of(path):
     return path.read_text(encoding="utf-8").splitlines()
 
 
-def test_it_stands_beside_the_session_with_command_versions_inputs_notes_and_end(run, shop):
+def test_it_stands_in_the_users_folder_with_command_versions_inputs_notes_and_end(run, shop):
     assert run("evaluate", shop / "small", "--model", MODEL).code == DONE
-    found = [LINE.match(line) for line in lines_of(shop / "dbbstation.log")]
+    found = [LINE.match(line) for line in lines_of(of_user(shop))]
     assert all(found)
     told = [match[3] for match in found]
     assert told[0] == f"$ dbbstation evaluate {shop / 'small'} --model {MODEL}"
@@ -54,45 +54,25 @@ def test_it_stands_beside_the_session_with_command_versions_inputs_notes_and_end
     assert re.match(r"done in \d+\.\d s$", told[-1])
 
 
-def test_every_command_about_the_folder_continues_it(run, shop):
+def test_every_command_continues_it(run, shop):
     for _ in range(2):
         assert run("session", "list", shop / "small").code == DONE
-    assert sum("$ dbbstation session list" in line for line in lines_of(shop / "dbbstation.log")) == 2
+    assert sum("$ dbbstation session list" in line for line in lines_of(of_user(shop))) == 2
 
 
-def test_a_session_that_is_made_has_its_log_beside_it(run, shop):
-    run(
-        "measure",
-        "--plan",
-        PLAN,
-        "--machine",
-        MACHINE,
-        "--instrument",
-        "heidenhain-nd281b",
-        "--port",
-        "no",
-        "--out",
-        shop / "new",
-    )
-    assert "$ dbbstation measure" in lines_of(shop / "dbbstation.log")[0]
-    assert not (shop / "new" / "dbbstation.log").exists()
-
-
-def test_commands_without_a_session_have_the_users(run, shop):
-    assert run("sources", "backlash").code == DONE
-    assert "$ dbbstation sources backlash" in lines_of(of_user(shop))[0]
-    assert not (shop / "dbbstation.log").exists()
-
-
-def test_where_nobody_may_write_the_users_is_taken(run, shop):
-    (shop / "dbbstation.log").mkdir()  # a folder in the place of the log: cannot be opened, by root either
-    assert run("session", "list", shop / "small").code == DONE
-    assert of_user(shop).is_file()
+def test_nothing_is_written_beside_what_is_read_or_made(run, shop):
+    new = shop / "new"
+    words = ("--plan", PLAN, "--machine", MACHINE, "--instrument", "heidenhain-nd281b", "--port", "no", "--out", new)
+    run("measure", *words)
+    assert run("circles", shop / "small").code == DONE
+    assert {path.name for path in shop.iterdir()} <= {"small", "new"}
+    assert not list(shop.rglob("dbbstation.log"))
+    told = [match[3] for line in lines_of(of_user(shop)) if (match := LINE.match(line))]
+    assert {"$ dbbstation measure", "$ dbbstation circles"} <= {" ".join(line.split()[:3]) for line in told}
 
 
 def test_a_log_that_can_be_written_nowhere_is_no_reason_to_fail(run, shop):
-    (shop / "dbbstation.log").mkdir()
-    of_user(shop).mkdir(parents=True)
+    of_user(shop).mkdir(parents=True)  # a folder in the place of the log: cannot be opened, by root either
     assert run("session", "list", shop / "small").code == DONE
 
 
@@ -102,15 +82,15 @@ def test_the_environment_names_another_or_none(run, shop, monkeypatch, named):
     monkeypatch.setenv("DBBSTATION_LOG", "off" if named == "off" else str(other))
     assert run("session", "list", shop / "small").code == DONE
     assert other.is_file() is (named == "file")
-    assert not (shop / "dbbstation.log").exists()
     assert not of_user(shop).exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="links and pipes of Unix")
 @pytest.mark.parametrize("how", ["link", "second name", "pipe", "named in the environment"])
 def test_it_is_written_into_no_recording_and_waits_for_no_pipe(run, shop, monkeypatch, how):
-    log, recording = shop / "dbbstation.log", shop / "small" / "runs" / "a-ccw-1.csv"
+    log, recording = of_user(shop), shop / "small" / "runs" / "a-ccw-1.csv"
     before = recording.read_bytes()
+    log.parent.mkdir(parents=True)
     if how == "link":
         log.symlink_to(recording)
     elif how == "second name":
@@ -122,7 +102,7 @@ def test_it_is_written_into_no_recording_and_waits_for_no_pipe(run, shop, monkey
     for _ in range(2):
         assert run("session", "list", shop / "small").code == DONE
     assert recording.read_bytes() == before
-    assert of_user(shop).exists() == (how != "named in the environment")
+    assert log.exists() == (how != "named in the environment")
 
 
 def test_a_fault_stands_there_with_its_traceback_and_the_terminal_has_one_line(run, shop):
@@ -130,7 +110,7 @@ def test_a_fault_stands_there_with_its_traceback_and_the_terminal_has_one_line(r
     outcome = run("evaluate", shop / "small", "--model", MODEL)
     assert outcome.code == FAILED
     assert "Traceback" not in outcome.err
-    text = (shop / "dbbstation.log").read_text(encoding="utf-8")
+    text = of_user(shop).read_text(encoding="utf-8")
     assert re.search(r" ERROR failed after \d+\.\d s\nTraceback ", text)
     assert re.search(r"InputError: .*plan\.yaml: there is no such file", text)
 
@@ -138,7 +118,7 @@ def test_a_fault_stands_there_with_its_traceback_and_the_terminal_has_one_line(r
 def test_what_is_wrong_with_the_program_itself_stands_there_too(run, shop, monkeypatch):
     monkeypatch.setattr("dbbstation.files.recordings.session.read_session", lambda _: 1 / 0)
     assert run("session", "list", shop / "small").code == FAILED
-    assert "ZeroDivisionError: division by zero" in (shop / "dbbstation.log").read_text(encoding="utf-8")
+    assert "ZeroDivisionError: division by zero" in of_user(shop).read_text(encoding="utf-8")
 
 
 def test_an_interruption_is_noted(run, shop, monkeypatch):
@@ -147,14 +127,14 @@ def test_an_interruption_is_noted(run, shop, monkeypatch):
 
     monkeypatch.setattr("dbbstation.files.recordings.session.read_session", interrupted)
     assert run("session", "list", shop / "small").code == FAILED
-    assert re.search(r" WARNING interrupted after \d+\.\d s$", lines_of(shop / "dbbstation.log")[-1])
+    assert re.search(r" WARNING interrupted after \d+\.\d s$", lines_of(of_user(shop))[-1])
 
 
 def test_it_is_turned_over_and_never_fills_a_disk(run, shop, monkeypatch):
     monkeypatch.setattr(log, "LARGEST_BYTES", 2_000)
     for _ in range(30):
         assert run("session", "list", shop / "small").code == DONE
-    logs = sorted(shop.glob("dbbstation.log*"))
+    logs = sorted(of_user(shop).parent.glob("dbbstation.log*"))
     assert [path.name for path in logs] == ["dbbstation.log", *(f"dbbstation.log.{k}" for k in range(1, log.KEPT + 1))]
     assert max(path.stat().st_size for path in logs) <= 2_000
 
@@ -191,6 +171,6 @@ def test_the_stages_of_long_work_stand_there(shop):
         [sys.executable, "-m", "dbbstation", *words], capture_output=True, text=True, check=False, env=dict(os.environ)
     )
     assert done.returncode == DONE, done.stderr
-    told = [LINE.match(line)[3] for line in lines_of(shop / "dbbstation.log")]
+    told = [LINE.match(line)[3] for line in lines_of(of_user(shop))]
     assert "... kinematic calibration" in told
     assert "... held-out tests" in told

@@ -15,8 +15,8 @@ from dbbstation.files.own_sources import every_source
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Fitted
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.base import Mechanism
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record, true_runs

@@ -8,6 +8,7 @@ import io
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import dbbstation
@@ -117,6 +118,12 @@ def test_a_text_begins_no_formula(cell):
 @pytest.mark.parametrize("number", ["-1", "+1.5", "-1e-5", "-.5", "1", -1.0, -3, None])
 def test_a_number_stays_a_number(number):
     assert csv_text([[number, "x"]]) == f"{'' if number is None else number},x\n"
+
+
+def test_sums_of_binary_fractions_are_written_as_people_add():
+    assert csv_text([[1500.8 - 1e-12 * 1.9, 0.1 + 0.2, 2.0 / 3.0, 1e-9, np.float64(0.1) * 3]]) == (
+        "1500.8,0.3,0.666666666667,1e-09,0.3\n"
+    )
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate
-from dbbstation.diagnosed import diagnose_sessions
 from dbbstation.diagnosis.channel import Channel
 from dbbstation.diagnosis.shapes import ranges, samples_of, shapes
-from dbbstation.recorded import load_sessions
+from dbbstation.tasks.diagnose import diagnose_sessions
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.disturbances import KinkedStrut, WanderingBar
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.session import record

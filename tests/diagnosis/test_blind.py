@@ -7,10 +7,11 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
-from dbbstation.diagnosis.summary import diagnosis_summary
-from dbbstation.recorded import load_sessions
+from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.serialise import plain
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.bar import BarDrift
 from tests.plant.mechanisms.gravity import Gravity
@@ -201,7 +202,7 @@ def test_what_stands_on_no_list_is_called_unexplained_on_the_right_strut(tmp_pat
 
 def test_the_summary_has_the_agreed_keys(gravity):
     _, diagnosis = gravity
-    summary = diagnosis_summary(diagnosis, {"screw-lead": "no lead given"})
+    summary = plain(diagnosis_figures(diagnosis, {"screw-lead": "no lead given"}))
     agreed = {
         "mismatch",
         "probability",

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
-from dbbstation.diagnosed import diagnose_sessions
 from dbbstation.diagnosis.channel import Channel
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import AWAY_MM, TOWARDS, Spring, ranges, samples_of, shapes
 from dbbstation.diagnosis.verdicts import _Judge
 from dbbstation.inference.verdict import Acts
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.diagnose import diagnose_sessions
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.outsiders import HoseDrag

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.compare.comparison import compare
 from dbbstation.diagnosis.diagnose import usable_sources
 from dbbstation.inference.verdict import Verdict
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import Kinematics

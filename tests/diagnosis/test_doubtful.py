@@ -10,8 +10,8 @@ from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.thinned import thinned
 from dbbstation.diagnosis.verdicts import judge
 from dbbstation.inference.alternatives import EVEN
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.thermal import ThermalFrame

@@ -7,8 +7,8 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.diagnosis.held import held_beside, held_variance
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.set_up import ToolBallOffset
 from tests.plant.session import record

@@ -6,8 +6,8 @@ import pytest
 
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.servo import ServoLag

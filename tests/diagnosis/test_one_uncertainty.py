@@ -9,15 +9,17 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import default_sources
 from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.calibration.reporting.summary import calibration_summary, identified_model
+from dbbstation.calibration.reporting.identified import identified_model
 from dbbstation.diagnosis.diagnose import diagnose
-from dbbstation.diagnosis.summary import diagnosis_summary
 from dbbstation.diagnosis.workspace import workspace
 from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import position_uncertainty_mm, predicted_poses, prediction_summary
 from dbbstation.report.model_part import parameters
+from dbbstation.results.of_calibration import calibration_figures
+from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.serialise import plain
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import sources_named
 from dbbstation.virtual.truth import random_kinematics
@@ -50,9 +52,8 @@ def test_what_a_formula_may_be_off_by_is_in_every_uncertainty_of_a_value(diagnos
     assert found.uncertainty == pytest.approx(expected)
     identified = identified_model(after, {}, {})
     assert identified.uncertainties["gravity", "", NAME] == pytest.approx(expected)
-    summary = calibration_summary(after, evaluate(after.model, after.observations))
-    (told,) = (s["parameters"][NAME] for s in summary["sources"] if s["name"] == "gravity")
-    assert told["uncertainty"] == pytest.approx(expected)
+    told = calibration_figures(after, evaluate(after.model, after.observations)).parameters[f"gravity.{NAME}"]
+    assert told.uncertainty == pytest.approx(expected)
     (row,) = (row for row in parameters(identified, 2.0) if row[1] == NAME)
     assert row[3] == f"{2.0 * expected:.2g}"
     between = identified.uncertainties_between_sessions["gravity", "", NAME]
@@ -72,7 +73,7 @@ def test_errors_over_the_workspace_are_those_that_predict_gives(diagnosed, refer
     assert {source.name for source in default_sources()} > {"bar-offset"}
     (was, _), (now, u_mm) = predicted_poses(before, poses), predicted_poses(after, poses)
     expected = prediction_summary(now, was, u_mm)
-    told = diagnosis_summary(diagnosed, {})["workspace"]
+    told = plain(diagnosis_figures(diagnosed, {}))["workspace"]
     assert told["common_shift_um"] == pytest.approx(expected["common_shift_um"])
     assert told["error_with_shift_rms_um"] == pytest.approx(expected["error_rms_um"])
     assert told["error_rms_um"] == pytest.approx(expected["error_about_mean_rms_um"])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.per_test import TRACE_SECTORS, gains_by_test
-from dbbstation.diagnosis.summary import diagnosis_summary
+from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.serialise import plain
 from tests.diagnosis.joint_fits import joint_fit
 
 
@@ -30,7 +31,7 @@ def test_residuals_and_gain_of_a_test(found):
 
 def test_circularity_left_is_that_of_the_summary(found):
     """The same numbers as `--json` has, of the worst run of a test; gravity's is gone once it is found."""
-    runs = [run for run in diagnosis_summary(found, {})["circularity_um"] if run["test"] == "n"]
+    runs = [run for run in plain(diagnosis_figures(found, {}))["circularity_um"] if run["test"] == "n"]
     (told,) = (one.circularity_um for one in gains_by_test(found) if one.name == "n")
     assert told == pytest.approx([max(run[when] for run in runs) for when in ("before", "after")])
     assert told[0] > 6.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dbbstation.diagnosed import diagnose_sessions
+from dbbstation.tasks.diagnose import diagnose_sessions
 from tests.diagnosis.engine_sessions import (
     answer,
     gravity_backlash_and_screw_cyclic,

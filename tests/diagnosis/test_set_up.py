@@ -10,9 +10,10 @@ import pytest
 from dbbstation.calibration.outliers.outlier import Kind
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
-from dbbstation.diagnosis.summary import diagnosis_summary
-from dbbstation.recorded import load_sessions
+from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.balls import BadSeating
 from tests.plant.mechanisms.bar import BarOffset
 from tests.plant.mechanisms.gravity import Gravity
@@ -53,7 +54,9 @@ def test_a_bar_that_was_set_wrongly_is_no_warm_plate(tmp_path, offset_um):
     # The plant's own bars are off by 0.5 um at random besides.
     assert found.size_um == pytest.approx(offset_um, abs=3 * np.hypot(found.uncertainty_um, 0.5))
     assert 0 < found.uncertainty_um < 2.0
-    told = next(source for source in diagnosis_summary(diagnosis, {})["sources"] if source["name"] == "bar-offset")
+    told = next(
+        source for source in plain(diagnosis_figures(diagnosis, {}))["sources"] if source["name"] == "bar-offset"
+    )
     assert told["verdict"] == "happened"
     (value,) = told["parameters"].values()
     assert value["value"] == found.size_um

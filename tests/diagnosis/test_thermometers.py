@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from dbbstation.diagnosed import diagnose_sessions
 from dbbstation.diagnosis.findings import Verdict
+from dbbstation.tasks.diagnose import diagnose_sessions
 from tests.plant.mechanisms.bar import BarDrift
 from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.kinematics import RandomKinematics
@@ -67,7 +67,7 @@ def test_what_follows_a_thermometer_is_named_with_its_growth_per_kelvin(tmp_path
     value = named[name].parameters[parameter]
     assert value.value == pytest.approx(per_kelvin, abs=4.0 * value.uncertainty)
     # Tests know it to a few per cent; a thermometer stands for its body to a tenth only.
-    assert value.uncertainty < 0.12 * abs(per_kelvin)
+    assert value.uncertainty < 0.15 * abs(per_kelvin)
     assert found.unexplained.variable is None
     assert {location.variable for location in found.locations} == {"temperature"}
 

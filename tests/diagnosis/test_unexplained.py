@@ -8,19 +8,20 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from dbbstation.diagnosed import default_candidates
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import READING, Follows
-from dbbstation.diagnosis.summary import diagnosis_summary
 from dbbstation.diagnosis.unexplained_model import keep_unexplained
 from dbbstation.errors import ModelError
 from dbbstation.files.formats.model import read_model, write_model
 from dbbstation.model.compensation import compensated
 from dbbstation.model.uncertainty import position_uncertainty_mm
-from dbbstation.recorded import load_sessions
+from dbbstation.results.of_diagnosis import diagnosis_figures
+from dbbstation.results.serialise import plain
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.diagnose import default_candidates
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.base import Mechanism
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.outsiders import DentedScrew, OddGearWobble, SoftFloor
@@ -215,7 +216,7 @@ def test_they_are_no_candidates(hollow):
 
 
 def test_the_summary_has_the_curve(hollow):
-    curve = diagnosis_summary(hollow[1], {})["unexplained"]["curve"]
+    curve = plain(diagnosis_figures(hollow[1], {}))["unexplained"]["curve"]
     assert {"variable", "unit", "strut", "points"} <= set(curve)
     assert set(curve["points"][0]) == {"at", "value_um", "uncertainty_um"}
 

@@ -8,8 +8,8 @@ import pytest
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.diagnosis.shapes import PULL, READING, SIGNED, TOOL, Follows
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.mechanisms.oddities import CreepingSpindle, CyclingChiller, RockingTable, SpringyDrive, WindingCable
 from tests.plant.mechanisms.outsiders import BuildingSway, DentedScrew, HoseDrag, LobedSocket, SoftFloor

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import re
+import sys
 import textwrap
+from functools import cache
 
+import numpy as np
 import pytest
 
 from dbbstation.errors import InputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.own_sources import every_source, sources_of
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.sources import registry
 from dbbstation.sources.contract import Owner
-from dbbstation.sources.registry import known_sources
-from dbbstation.sources.trial import tried, undeclared
+from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.sources.trial import trial_machine, tried, undeclared
 
 EXAMPLE = shipped_folder("fixtures") / "sources" / "scale_bow.py"
 
@@ -43,14 +47,17 @@ def told(*files):
 def installed(tmp_path, monkeypatch):
     """Install the example as a package whose entry point is given."""
 
-    def install(entry):
+    def install(entry, text=None):
         folder = tmp_path / "site"
         (folder / "bowed-1.0.dist-info").mkdir(parents=True)
         (folder / "bowed-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: bowed\nVersion: 1.0\n")
         (folder / "bowed-1.0.dist-info" / "entry_points.txt").write_text(f"[dbbstation.sources]\nbow = {entry}\n")
-        (folder / "bowed_scale.py").write_text(EXAMPLE.read_text(encoding="utf-8"), encoding="utf-8")
+        (folder / "bowed_scale.py").write_text(text or EXAMPLE.read_text(encoding="utf-8"), encoding="utf-8")
         monkeypatch.syspath_prepend(folder)
+        monkeypatch.delitem(sys.modules, "bowed_scale", raising=False)
 
+    # A memory of its own: the other tests go on with the sources that they have.
+    monkeypatch.setattr(registry, "_known", cache(registry._known.__wrapped__))
     return install
 
 
@@ -87,6 +94,16 @@ def test_a_class_that_others_derive_from_may_leave_things_to_them(tmp_path):
 def test_an_installed_package_adds_its_source(installed):
     installed("bowed_scale:ScaleBow")
     assert "scale-bow" in every_source()
+    assert "scale-bow" in known_sources()
+    assert sources_named(["scale-bow"]) == (known_sources()["scale-bow"],)
+
+
+def test_an_installed_package_that_breaks_the_contract_is_refused_wherever_sources_are_asked_for(installed):
+    text = EXAMPLE.read_text(encoding="utf-8").replace("1e-3 * place", "np.nan * place")
+    installed("bowed_scale:ScaleBow", text)
+    for ask in (known_sources, every_source, lambda: sources_named(["gravity"])):
+        with pytest.raises(InputError, match="ScaleBow: strut_mm of its derivative is not a number somewhere"):
+            ask()
 
 
 @pytest.mark.parametrize(
@@ -160,6 +177,18 @@ def test_a_name_that_is_taken(tmp_path):
         ("strut_mm=1e-3", "tool_tip_mm=1e-3", "tool_tip_mm of its derivative has the shape (181, 6, 6), not (3, 6)"),
         (" * np.eye(STRUTS))", ")", "strut_mm of its derivative has the shape (181, 6, 1), not (6, 6) or (181, 6, 6)"),
         ("1e-3 * place", "np.nan * place", "strut_mm of its derivative is not a number somewhere"),
+        ('"The scale of a strut is bowed."', '"Bowed."', "its texts say nothing under what"),
+        (
+            "    belongs_to",
+            "    form_uncertainty = -0.1\n    belongs_to",
+            "its `form_uncertainty` must be a share of the effect",
+        ),
+        ("strut_{}_um", "strut_{}_mm", "its parameter strut_1_mm must end with its unit, _um"),
+        (
+            "strut_{}_um",
+            "bow_{}_um",
+            "its parameter bow_1_um must say with `strut` which strut it is of, as its name does",
+        ),
     ],
 )
 def test_what_is_lacking_of_the_contract_is_told(tmp_path, old, new, why):
@@ -172,6 +201,58 @@ def test_a_derivative_that_is_not_that_of_the_effect_is_told(tmp_path):
     wrong = "    def effect(self, motion, machine, values):\n        return self.derivative(motion, machine, values).times(2 * values)\n"
     path = own(tmp_path, EXAMPLE.read_text(encoding="utf-8") + "\n" + wrong)
     assert "its derivative of strut_mm by strut_1_um is not what its effect does" in told(path)
+
+
+@pytest.mark.parametrize(
+    ("effect", "why"),
+    [
+        (
+            "self.derivative(motion, machine, values).times(values + 1e-3)",
+            "strut_mm of its effect is not zero where all",
+        ),
+        (
+            "self.derivative(motion, machine, values).times(np.abs(values))",
+            "its derivative of strut_mm by strut_1_um is not",
+        ),
+        (
+            "self.derivative(motion, machine, values).times(values) if values.any() else Effect()",
+            "strut_mm stands in only one of its effect and its derivative where all parameters are zero",
+        ),
+    ],
+)
+def test_an_effect_that_no_amplitude_has_is_told(tmp_path, effect, why):
+    wrong = f"    def effect(self, motion, machine, values):\n        return {effect}\n"
+    assert why in told(own(tmp_path, EXAMPLE.read_text(encoding="utf-8") + "\n" + wrong))
+
+
+def test_an_effect_that_grows_with_the_square_is_no_amplitude(tmp_path):
+    """Its derivative is right, and still the parameter scales nothing: it needs a shape."""
+    text = EXAMPLE.read_text(encoding="utf-8").replace("strut_mm=1e-3", "strut_mm=2.0 * values * 1e-3")
+    square = "    def effect(self, motion, machine, values):\n        return self.derivative(motion, machine, values).times(0.5 * values)\n"
+    assert "is not proportional to its amplitudes" in told(own(tmp_path, text + "\n" + square))
+
+
+def test_a_source_that_takes_a_motion_without_what_it_needs_is_told(tmp_path):
+    text = EXAMPLE.read_text(encoding="utf-8").replace(
+        "    belongs_to", "    needs = frozenset({Need.POSE, Need.TIME})\n    belongs_to", 1
+    )
+    text = text.replace("from dbbstation.sources.contract import ", IMPORTS, 1)
+    assert "scale-bow" in every_source([own(tmp_path, text, "right.py")])
+    text += "\n    def require(self, motion):\n        pass\n"
+    assert "its `require` takes a motion without time, which it needs" in told(own(tmp_path, text))
+
+
+def test_the_machine_of_the_trial_is_a_hexapod_that_can_move():
+    """Struts of one length in the middle, and a platform that is held in all six directions."""
+    machine = trial_machine()
+    base, platform = machine.hexapod.base_joints_mm, machine.hexapod.platform_joints_mm
+    struts = platform + np.array([0.0, 0.0, -1000.0]) - base
+    lengths = np.linalg.norm(struts, axis=1)
+    assert np.ptp(lengths) < 1e-9
+    assert machine.travel.strut_mm[0] < lengths[0] < machine.travel.strut_mm[1]
+    directions = struts / lengths[:, None]
+    held = np.hstack([directions, np.cross(platform, directions) / 400.0])
+    assert np.linalg.cond(held) < 50.0
 
 
 def test_an_error_in_its_own_code_has_its_line(tmp_path):
@@ -239,7 +320,7 @@ class Wound(LinearSource):
     name = "wound"
     belongs_to = Owner.MACHINE
     needs = frozenset({Need.POSE, Need.PATH})
-    texts = Texts("a", "b", "c", "d", "e", "f")
+    texts = Texts(*["Written for a test."] * 6)
 
     def parameters(self, machine):
         return (Parameter("share_1", "1", 1e-3, "of the way since the beginning"),)

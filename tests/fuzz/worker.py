@@ -27,7 +27,7 @@ from pathlib import Path
 from tests.fuzz.mutate import spoil
 from tests.fuzz.seeds import SEEDS, Seed
 
-TRACED = ("files", "cli", "nc", "instrument", "imported", "trace", "plan", "machine", "tabulated.py", "exported.py")
+TRACED = ("files", "cli", "nc", "instrument", "tasks", "trace", "plan", "machine")
 """Parts of the package whose lines guide."""
 
 LONGEST_S = 60.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from dbbstation.inference.jackknife import jackknife_covariance, refits_without, weighted_jackknife
+from dbbstation.inference.jackknife import jackknife_covariance, refits_without, weighted_jackknife, widening
 from dbbstation.inference.settle import settle
 from dbbstation.inference.square_root import compress
 from tests.inference.tables import table
@@ -92,3 +92,49 @@ def test_refits_are_those_of_the_rows_that_are_left():
         assert refit.x == pytest.approx(values, rel=1e-6)
         spread = noise**2 * np.linalg.inv(stacked.T @ stacked)
         assert np.diag(refit.covariance) == pytest.approx(np.diag(spread), rel=1e-6)
+
+
+def line_fits(rng, draws, shared_sd):
+    """Values, stated and widened covariances of straight lines over ten groups that share an error each, which the model lacks."""
+    columns = np.column_stack([np.ones(200), np.linspace(-1.0, 1.0, 200) + 3.0])
+    groups = np.arange(200) % 10
+    stated = np.linalg.inv(columns.T @ columns)
+    kept = [groups != g for g in range(10)]
+    without = np.array([np.linalg.inv(columns[k].T @ columns[k]) for k in kept])
+    variances = np.diag(stated), np.diagonal(without, axis1=1, axis2=2)
+    values, wide = [], []
+    for _ in range(draws):
+        shared = shared_sd * rng.normal(size=10)
+        noise = rng.normal(size=200) + shared[groups] * columns[:, 1]
+        found = stated @ columns.T @ noise
+        others = np.array([own @ columns[k].T @ noise[k] for own, k in zip(without, kept, strict=True)])
+        factor = widening(variances[0], others - found, variances[1])
+        values.append(found)
+        wide.append(np.outer(factor, factor) * stated)
+    return np.array(values), stated, np.array(wide)
+
+
+def test_widened_covariance_covers_what_groups_share_and_the_model_lacks(rng):
+    """Against the spread of 400 fits. Combinations, such as the level in the middle, are covered better, though not fully."""
+    values, stated, wide = line_fits(rng, 400, 1.0)
+    u = np.sqrt(np.diagonal(wide, axis1=1, axis2=2))
+    level = np.array([1.0, 3.0])
+    assert np.mean(np.abs(values[:, 1]) < 2.0 * np.sqrt(stated[1, 1])) < 0.6
+    assert np.mean(np.abs(values @ level) < 2.0 * np.sqrt(level @ stated @ level)) < 0.2
+    assert np.all(np.mean(np.abs(values) < 2.0 * u, axis=0) > 0.88)
+    assert np.mean(np.abs(values @ level) < 2.0 * np.sqrt(level @ wide @ level)) > 0.65
+
+
+def test_widening_hardly_changes_what_the_model_states_rightly(rng):
+    """The jackknife over ten groups scatters by a quarter, so the larger of the two is a tenth above on the average."""
+    _, stated, wide = line_fits(rng, 400, 0.0)
+    ratio = np.sqrt(np.diagonal(wide, axis1=1, axis2=2) / np.diag(stated))
+    assert np.all(ratio >= 1.0 - 1e-12)
+    assert np.all(np.mean(ratio, axis=0) < 1.2)
+    level = np.array([1.0, 3.0])
+    assert np.mean(np.sqrt(level @ wide @ level / (level @ stated @ level))) < 1.5
+
+
+def test_widening_leaves_what_is_held():
+    moved = np.array([[4.0, 0.0], [-4.0, 0.0], [0.5, 0.0]])
+    assert widening(np.array([1.0, 0.0]), moved, np.ones((3, 2)) * [2.0, 0.0])[1] == 1.0

@@ -10,13 +10,13 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from dbbstation.circled import load_circles
 from dbbstation.circles.path import Filter
 from dbbstation.circles.spectrum import spectrum_of
 from dbbstation.report.drawing import in_style
 from dbbstation.report.label_places import Box, place_labels
 from dbbstation.report.plot import Kind, Plotted, draw_plot
 from dbbstation.report.sheet import width_of_in, wrapped
+from dbbstation.tasks.circles import load_circles
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import table_ii_plan
 from tests.plant.session import record

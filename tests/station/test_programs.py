@@ -13,8 +13,8 @@ from dbbstation.model.machine_model import MachineModel
 from dbbstation.nc.export import Inverse, circle_programs
 from dbbstation.nc.registry import dialect_named
 from dbbstation.plan.circle import Direction
-from dbbstation.recorded import load_sessions
 from dbbstation.station.programs import load_programs, read_toolpath
+from dbbstation.tasks.load import load_sessions
 from dbbstation.virtual.path import path_of
 from dbbstation.virtual.truth import random_kinematics
 from tests.station.bench import MACHINE_FILE, bench

@@ -9,7 +9,7 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, calibrate
 from dbbstation.files.shipped import shipped_folder
-from dbbstation.recorded import load_sessions
+from dbbstation.tasks.load import load_sessions
 from tests.station.bench import bench
 
 if TYPE_CHECKING:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -67,3 +68,18 @@ def test_a_constant_that_is_none_of_the_study_is_refused():
 def test_whole_numbers_stay_whole_and_above_zero():
     assert Constant("diagnosis.drive.explain", "MOST_LOOKS").tried == (1, 4)
     assert Constant("diagnosis.drive.channel", "STRONGEST").tried == (3, 12)
+
+
+def test_a_table_is_asked_by_the_constants_of_mismatch(monkeypatch, tmp_path):
+    """A prior of no width keeps a parameter where it is; 0.3 fits."""
+    t = np.linspace(0.0, 10.0, 60)
+    moves = np.sin(2.0 * t)
+    measured = 0.3 * moves + np.random.default_rng(4).normal(0.0, 0.05, len(t))
+    rows = [f"{a:.4f},{b:.6f},0,{c:.6f}" for a, b, c in zip(t, measured, moves, strict=True)]
+    path = tmp_path / "swing.csv"
+    path.write_text("\n".join(["t_s,measured_mm,simulated_mm,d_size", *rows]) + "\n", encoding="utf-8")
+    monkeypatch.setattr(asked, "TABLE", (Constant("diagnosis.table.data", "REFITTED", (1e-3,)),))
+    (narrow,) = study([], [], 1, tables=[(path, "measured_mm", "simulated_mm")])
+    assert narrow.data == "swing"
+    assert narrow.parameter == "size"
+    assert narrow.largest > 10.0

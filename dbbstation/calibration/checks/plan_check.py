@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.inference.square_root import lost_directions
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,6 +51,7 @@ class PlanCheck:
         return self.left >= self.of_one_test
 
 
+@with_one_thread
 def check_plan(calibration: Calibration) -> PlanCheck:
     """Count the directions that tests determine, judged by the noise of the fit; tolerances of the machine file do not count."""
     known = calibration.layout.known

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.calibration.fit.directions import in_words
 from dbbstation.inference.square_root import complement, spread
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,6 +89,7 @@ class Visibility:
     leverage: dict[str, float]
 
 
+@with_one_thread
 def visibility(calibration: Calibration) -> Visibility:
     """Look at the matrix that a calibration solved."""
     known = calibration.layout.known

@@ -19,6 +19,7 @@ from dbbstation.inference.square_root import Block, Solution, compress, lost_dir
 from dbbstation.machine.compiled import in_parallel
 from dbbstation.sources.contract import Need, Owner
 from dbbstation.sources.registry import sources_named
+from dbbstation.threads import with_one_thread
 from dbbstation.trace.circle import RawCircle
 
 if TYPE_CHECKING:
@@ -123,6 +124,7 @@ def default_sources() -> tuple[ErrorSource, ...]:
     return sources_named(KINEMATIC_SOURCES + MEASUREMENT_SOURCES)
 
 
+@with_one_thread
 def calibrate(
     machine: Machine,
     observations: Sequence[Observation],
@@ -382,6 +384,7 @@ SMALLEST_NOISE_MM = 1e-7
 """No bar is better; keeps noise-free simulations from dividing by zero."""
 
 
+@with_one_thread
 def residuals(model: MachineModel, observations: Sequence[Observation]) -> tuple[NDArray[np.float64], ...]:
     """Measured minus predicted length of every run, shape (n,) each [mm]."""
     needs = frozenset[Need]().union(*(f.source.needs for f in model.sources if not f.source.of_currents))

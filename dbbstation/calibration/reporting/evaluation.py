@@ -11,6 +11,7 @@ from dbbstation.calibration.fit.calibrate import residuals
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.uncertainty import range_uncertainty_mm
 from dbbstation.sources.contract import Motion
+from dbbstation.threads import with_one_thread
 from dbbstation.trace.analysis import CircleFigures, figures
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ class Evaluation:
     nominal_rms_um: float
 
 
+@with_one_thread
 def evaluate(model: MachineModel, observations: Sequence[Observation]) -> Evaluation:
     """Compare recordings with the nominal machine and with a model.
 
@@ -122,6 +124,7 @@ class PlaneFigures:
     parallelism_um: float
 
 
+@with_one_thread
 def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel | None = None) -> PlaneFigures:
     """Flatness over eight points of X, Y = ±190 mm and parallelism of a move along X through its middle.
 
@@ -141,6 +144,7 @@ def plane_figures(model: MachineModel, height_mm: float, corrected: MachineModel
     return PlaneFigures(1e3 * float(np.ptp(heights)), 1e3 * float(np.ptp(sideways)))
 
 
+@with_one_thread
 def plane_uncertainty_um(identified: IdentifiedModel, height_mm: float) -> tuple[float | None, float | None]:
     """Standard uncertainties of flatness and parallelism as a model predicts them [µm]; None where not known."""
     identified = replace(identified, model=identified.model.anywhere())

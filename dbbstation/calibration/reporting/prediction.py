@@ -10,6 +10,7 @@ import numpy as np
 from dbbstation.calibration.fit.calibrate import residuals
 from dbbstation.inference.harmonics import smooth
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.threads import with_one_thread
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ class PredictedCircle:
     after_um: float
 
 
+@with_one_thread
 def predicted_circles(
     model: MachineModel,
     observations: Sequence[Observation],

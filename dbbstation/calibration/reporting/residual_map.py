@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.inference.harmonics import smooth
 from dbbstation.plan.circle import Direction
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -40,6 +41,7 @@ class ResidualMap:
         return float(np.nanmax(np.abs(np.concatenate(list(self.um.values())))))
 
 
+@with_one_thread
 def residual_map(observations: Sequence[Observation], residual_mm: Sequence[NDArray[np.float64]]) -> ResidualMap:
     """Average what is left of every run, noise taken off, over ten degrees of angle.
 

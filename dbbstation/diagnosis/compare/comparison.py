@@ -15,7 +15,8 @@ from scipy.special import expit, logsumexp
 
 from dbbstation.calibration.fit.methods import CENTRED_MM
 from dbbstation.diagnosis.compare.channel import channel_of
-from dbbstation.diagnosis.compare.details import both_directions, effects_of, noticed_mm, predicted
+from dbbstation.diagnosis.compare.details import both_directions, effects_of, noticed_mm
+from dbbstation.diagnosis.compare.left_out import predicted, tried_without_tests
 from dbbstation.diagnosis.compare.pairs import match
 from dbbstation.diagnosis.compare.sides import Sides
 from dbbstation.errors import TraceError
@@ -24,6 +25,7 @@ from dbbstation.inference.left_over import left_over
 from dbbstation.inference.read_off import read_off
 from dbbstation.inference.settle import settle
 from dbbstation.inference.verdict import OUT, SURE
+from dbbstation.threads import with_one_thread
 from dbbstation.trace.analysis import figures
 
 if TYPE_CHECKING:
@@ -35,7 +37,7 @@ if TYPE_CHECKING:
     from dbbstation.diagnosis.compare.pairs import Matching, Pair
     from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.left_over import LeftOver
-    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.read_off import Finding, Trial
     from dbbstation.inference.settled import Settled
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.observation import Observation
@@ -103,6 +105,7 @@ class Comparison:
         findings: what is said of each cause, those that are there first.
         runs: in the order of session A.
         left: tests of the residual.
+        trial: what groups of tests say of the findings; without predictions where nothing was found, or there are too few groups.
         held_out: predictions of held-out tests by what is stated of the set-up alone, and with what was found [mm].
         effects: of the causes of the most probable set, largest first, by name.
         noticed_mm: change of one strut's length that would have been found, whichever strut it is [mm].
@@ -114,6 +117,7 @@ class Comparison:
     findings: tuple[Finding, ...]
     runs: tuple[RunDifference, ...]
     left: LeftOver
+    trial: Trial
     held_out: tuple[HeldOut, HeldOut]
     effects: Mapping[str, EffectOfCause]
     noticed_mm: float
@@ -166,6 +170,7 @@ class Comparison:
         return _rms(both.mean(axis=1)), _rms(0.5 * (both[:, 0] - both[:, 1]))
 
 
+@with_one_thread
 def compare(
     machine: Machine,
     a: Sequence[Observation],
@@ -193,11 +198,13 @@ def compare(
     progress("candidates")
     sides = Sides.of(machine, matching.pairs)
     settled = settle(channel_of(sides, sources), in_time=False, rivals=False, progress=progress)
-    progress("verdicts")
+    progress("held-out tests")
+    trial = tried_without_tests(sides, settled)
     return Comparison(
         matching=matching,
         settled=settled,
-        findings=read_off(settled),
+        findings=read_off(settled, trial),
+        trial=trial,
         runs=_runs(sides, settled),
         left=left_over(settled),
         held_out=predicted(sides, settled),

@@ -1,4 +1,4 @@
-"""What is said of a comparison beside verdicts: where each cause acts, what a calibration would make of it, held-out tests."""
+"""What is said of a comparison beside verdicts: where each cause acts, what a calibration would make of it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES
-from dbbstation.inference.held_out import held_out
 from dbbstation.inference.read_off import HALF
-from dbbstation.inference.square_root import Columns, compress
 from dbbstation.inference.verdict import OUT
 from dbbstation.sources.registry import sources_named
 
@@ -21,11 +19,7 @@ if TYPE_CHECKING:
 
     from dbbstation.diagnosis.compare.pairs import Pair
     from dbbstation.diagnosis.compare.sides import Sides
-    from dbbstation.inference.held_out import HeldOut
     from dbbstation.inference.settled import Settled
-
-FOLDS = 5
-"""Groups of tests that are held out in turn."""
 
 RANK = 1e-9
 """Share of the largest singular value of the kinematic columns below which a direction says nothing."""
@@ -120,26 +114,6 @@ def _kinematic(sides: Sides) -> NDArray[np.float64]:
     ]
     axes, sizes, _ = np.linalg.svd(sides.averaged(1, columns), full_matrices=False)
     return np.asarray(axes[:, sizes > RANK * sizes[0]], dtype=np.float64)
-
-
-def predicted(sides: Sides, settled: Settled) -> tuple[HeldOut, HeldOut]:
-    """Predictions of held-out tests, without and with what was found."""
-    bank, members = settled.bank, settled.best.members
-    columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
-    base = settled.channel.known
-    prior = np.concatenate([base.prior, *(member.sd for member in members)])
-    # Amplitudes of causes come from the tests that are kept; only the set-up of a held-out test may settle there.
-    known = Columns(prior, prior, np.arange(len(prior)) < len(base.prior))
-    tests = list(dict.fromkeys(pair.test for pair in sides.pairs))
-    groups = [tests.index(pair.test) % min(FOLDS, len(tests)) for pair in sides.pairs]
-    every = np.arange(len(prior))
-    blocks = [compress(every, columns[rows], bank.target[rows]) for rows in sides.blocks]
-    noise = settled.noise.innovation
-    without, having = (
-        held_out(blocks, groups, known, every[:used], noise, np.zeros((0, used - len(base.prior))))
-        for used in (len(base.prior), len(prior))
-    )
-    return without, having
 
 
 def noticed_mm(settled: Settled) -> float:

@@ -142,6 +142,7 @@ def _outsize(
             units=("mm",) * len(names),
             log_odds=SETUP_ODDS,
             choices=several if len(choices) > 1 else (),
+            acts_once=True,
         )
     ]
 

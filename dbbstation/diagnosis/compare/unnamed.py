@@ -128,4 +128,4 @@ def of_each_test(sides: Sides) -> Pattern:
         ),
     ]
     variable = Variable("angle, test by test", "deg", Kind.ANGLE, angle, period=360.0)
-    return Pattern(Family.CURVE, (variable,), samples, Lobes(OWN_LOBES), choices=tuple(choices))
+    return Pattern(Family.CURVE, (variable,), samples, Lobes(OWN_LOBES), choices=tuple(choices), acts_once=True)

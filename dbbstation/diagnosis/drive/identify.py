@@ -19,6 +19,7 @@ from dbbstation.diagnosis.drive.verdicts import Verdicts
 from dbbstation.inference.hypotheses import Hypothesis
 from dbbstation.inference.left_over import SIGNIFICANT, left_over
 from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -41,6 +42,7 @@ OFFSETS = frozenset({"load_n", "coulomb_asymmetry_n"})
 GRAVITY_M_S2 = 9.81
 
 
+@with_one_thread
 def identify(
     recordings: Sequence[DriveRecording],
     sources: Sequence[DriveSource],

@@ -20,6 +20,7 @@ from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.settled import Beginning
 from dbbstation.inference.square_root import compress, solve, with_random
 from dbbstation.inference.verdict import OUT, Value, Verdict
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -186,6 +187,7 @@ class Mismatch:
         return _rms(self.settled.channel.residual - self.explained)
 
 
+@with_one_thread
 def find_mismatch(
     table: Table,
     sources: Sequence[TableSource] = (),
@@ -263,6 +265,7 @@ def _held_out(settled: Settled, table: Table, progress: Callable[..., None]) -> 
     )
 
 
+@with_one_thread
 def choose_without(
     channel: Channel, rows: NDArray[np.bool_], *, beginning: Beginning = Beginning.EVERYTHING
 ) -> Settled:

@@ -9,6 +9,7 @@ import numpy as np
 
 from dbbstation.inference.variables import TRAVELS
 from dbbstation.inference.verdict import Verdict
+from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,6 +39,7 @@ class Next:
     variables: tuple[str, ...]
 
 
+@with_one_thread
 def next_measurements(found: Mismatch) -> tuple[Next, ...]:
     """What would decide most, first."""
     return tuple(list(_suggested(found))[:MOST])

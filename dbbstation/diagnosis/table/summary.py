@@ -114,14 +114,7 @@ def _finding(found: Mismatch, finding: Finding) -> dict[str, Any]:
         "acts": finding.acts.name.lower(),
         "persists": finding.persists,
         "recurs": finding.recurs,
-        "gains": None
-        if finding.gains is None
-        else {
-            "parts": list(finding.gains.parts),
-            "with_gain": finding.gains.with_gain,
-            "total": finding.gains.total,
-            "predicts": finding.gains.predicts,
-        },
+        "gains": None if finding.gains is None else finding.gains.plain(),
         "form": None if finding.family is None else str(finding.family),
         "variables": list(finding.variables),
         "probability": finding.probability,

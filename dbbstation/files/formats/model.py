@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,11 +20,11 @@ from dbbstation.files.yaml.schema import dotted, format_for, read_document, vali
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import ErrorSource, Fitted, Owner
-from dbbstation.sources.registry import HOW_TO_ADD
+from dbbstation.sources.registry import HOW_TO_ADD, known_sources
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
+    from collections.abc import Iterable
+    from os import PathLike
 
     from numpy.typing import NDArray
 
@@ -38,31 +40,46 @@ _NEGATIVE = 1e-6
 """How far below zero rounding may leave an eigenvalue of the correlations."""
 
 
-def read_model(path: Path, known_sources: Mapping[str, ErrorSource]) -> IdentifiedModel:
+def read_model(
+    path: str | PathLike[str], sources: Mapping[str, ErrorSource] | Iterable[ErrorSource] | None = None
+) -> IdentifiedModel:
     """Read a model.
 
     Args:
         path: of the file.
-        known_sources: every error source by name.
+        sources: error sources that may stand in it. None: those of the package and of installed ones. Sources of one's own:
+            these beside them, and in place of one of the same name. A mapping by name: these alone.
 
     Raises:
-        InputError: every fault of the file with its place.
+        InputError: every fault of the file with its place; an installed package whose sources cannot be used.
+        ModelError: two of the sources have one name.
     """
     faults: list[Problem] = []
-    model = parse_model(path, known_sources, faults)
+    model = parse_model(Path(path), _by_name(sources), faults)
     if model is None or faults:
         raise InputError(faults)
     return model
 
 
-def parse_model(path: Path, known_sources: Mapping[str, ErrorSource], faults: list[Problem]) -> IdentifiedModel | None:
+def _by_name(sources: Mapping[str, ErrorSource] | Iterable[ErrorSource] | None) -> Mapping[str, ErrorSource]:
+    if isinstance(sources, Mapping):
+        return sources
+    own = list(sources or ())
+    names = [source.name for source in own]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ModelError(f"two of the error sources given are called {', '.join(twice)}", remedy="give each once")
+    return {**known_sources(), **dict(zip(names, own, strict=True))}
+
+
+def parse_model(path: Path, known: Mapping[str, ErrorSource], faults: list[Problem]) -> IdentifiedModel | None:
     """Read a model; None with every fault added to `faults`."""
     document = read_document(path, ModelFile, faults)
     file = None if document is None else validate(document, ModelFile, faults)
     if document is None or file is None:
         return None
     machine = file.machine.to_domain()
-    reader = _Sources(document, machine, known_sources, faults)
+    reader = _Sources(document, machine, known, faults)
     fitted = [reader.fitted(("sources", i), source) for i, source in enumerate(file.sources)]
     effects = enumerate(file.measurement_effects)
     fitted += [reader.fitted(("measurement_effects", i), effect, effect.shared) for i, effect in effects]

@@ -10,9 +10,9 @@ from dbbstation.calibration.checks.missing_physics import is_missing_physics, mi
 from dbbstation.calibration.checks.plan_check import check_plan
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.calibration.reporting.summary import calibration_summary
 from dbbstation.cli import main
-from dbbstation.recorded import load_sessions
+from dbbstation.results.of_calibration import calibration_figures
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import record
@@ -53,9 +53,9 @@ def test_half_the_tilts_pass_unseen_at_three_tests_and_that_is_said(tmp_path, ca
     calibration = calibrate(recorded.machine, recorded.observations)
     assert 1e3 * calibration.noise.sigma == pytest.approx(0.5, abs=0.02)
     assert not is_missing_physics(misfit_of(calibration))
-    told = calibration_summary(calibration, evaluate(calibration.model, recorded.observations))["plan_check"]
-    assert told["enough"] is False
-    assert told["left"] == told["determined"] - told["identified"] < told["of_one_test"]
+    told = calibration_figures(calibration, evaluate(calibration.model, recorded.observations)).plan_check
+    assert told.enough is False
+    assert told.left == told.determined - told.identified < told.of_one_test
     with pytest.raises(SystemExit):
         main(["calibrate", str(tmp_path / "s")])
     assert "3 tests are too few to reveal a wrong tilt, height or position in the plan" in capsys.readouterr().out

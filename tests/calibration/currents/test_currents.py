@@ -13,13 +13,14 @@ from scipy.stats import chi2
 
 from dbbstation.calibration.fit.calibrate import MEASUREMENT_SOURCES, calibrate
 from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.calibration.reporting.summary import calibration_summary
 from dbbstation.cli import cli
 from dbbstation.errors import CalibrationError, ModelError
 from dbbstation.files.formats.model import read_model
 from dbbstation.machine.geometry import StrutMasses
-from dbbstation.recorded import load_sessions
+from dbbstation.results.of_calibration import calibration_figures
+from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.load import load_sessions
 from dbbstation.trace.columns import currents
 from tests.plant.mechanisms.currents import DriveCurrents
 from tests.plant.mechanisms.gravity import CentreOfGravityShift, Gravity
@@ -153,8 +154,8 @@ def test_without_drive_friction_currents_change_nothing(small):
     with_currents = calibrate(recorded.machine, recorded.observations, names)
     assert with_currents.currents is None
     assert np.array_equal(with_currents.x, calibrate(recorded.machine, bare, names).x)
-    assert "motor_currents" not in calibration_summary(
-        with_currents, evaluate(with_currents.model, recorded.observations)
+    assert "motor_currents" not in plain(
+        calibration_figures(with_currents, evaluate(with_currents.model, recorded.observations))
     )
 
 
@@ -205,7 +206,8 @@ def test_one_motor_without_a_current_leaves_five_that_count(small, change, motor
     assert calibration.currents.noise[motor - 1] is None
     # What is open of a drive is no direction in which the tool could be off.
     assert not any("drive-friction" in text for text in calibration.directions_lost)
-    summary = calibration_summary(calibration, evaluate(calibration.model, recorded.observations))["motor_currents"]
+    figures = calibration_figures(calibration, evaluate(calibration.model, recorded.observations))
+    summary = plain(figures)["motor_currents"]
     assert summary["motors"][motor - 1]["gain_a_kn"] is None
     json.dumps(summary, allow_nan=False)
     z_mm, u_mm = value(calibration, "z_mm")

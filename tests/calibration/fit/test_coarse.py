@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.calibration.outliers.robust import calibrate_robust
-from dbbstation.recorded import load_sessions
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import elevated, table_ii_plan
 from tests.plant.session import record

@@ -6,9 +6,9 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, calibrate
 from dbbstation.calibration.reporting.evaluation import evaluate
-from dbbstation.calibration.reporting.summary import calibration_summary
-from dbbstation.recorded import load_sessions
+from dbbstation.results.of_calibration import calibration_figures
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 
 
 @pytest.fixture(scope="module")
@@ -27,12 +27,12 @@ def test_with_mountings_as_random_effects(measured, check):
     Edges taken halfway between the levels on their two sides do a little better at the check, 1.53.
     """
     calibration = calibrate(measured.machine, measured.observations)
-    summary = calibration_summary(calibration, evaluate(calibration.model, measured.observations))
-    assert summary["parameters_identified"] == 23
-    assert summary["directions_lost"] == ["all six base joints together along Z"]
-    assert summary["residual_within_mounting_rms_um"] == pytest.approx(0.50, abs=0.01)
+    summary = calibration_figures(calibration, evaluate(calibration.model, measured.observations))
+    assert summary.parameters_identified == 23
+    assert summary.directions_lost == ("all six base joints together along Z",)
+    assert summary.residual_within_mounting_rms_um == pytest.approx(0.50, abs=0.01)
     # The bar's noise is 0.50 µm in all; a little of it is correlated and lies below harmonic 30, where it is not counted.
-    assert summary["noise_um"] == pytest.approx(0.49, abs=0.015)
+    assert summary.noise_um == pytest.approx(0.49, abs=0.015)
     assert evaluate(calibration.model, check.observations).residual_rms_um < 1.6
 
 

@@ -11,9 +11,9 @@ from dbbstation.calibration.fit import nodes
 from dbbstation.calibration.fit.calibrate import calibrate, linearise, looked_at, residuals
 from dbbstation.calibration.fit.nodes import Nodes, nodes_of, smooth
 from dbbstation.calibration.layout import lay_out
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Effect, LinearSource, Need, Owner, Parameter
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import elevated, table_ii_plan
 from tests.plant.session import record

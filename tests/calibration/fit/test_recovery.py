@@ -12,9 +12,9 @@ from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.calibration.layout import lay_out
 from dbbstation.errors import CalibrationError
 from dbbstation.model.compensation import compensated
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from dbbstation.trace.analysis import centred
 from tests.plant.machine import random_machine, reference_machine
 from tests.plant.mechanisms.kinematics import Kinematics, RandomKinematics

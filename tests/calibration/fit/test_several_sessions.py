@@ -11,7 +11,7 @@ import pytest
 from dbbstation.calibration.checks.gaps import gaps
 from dbbstation.calibration.fit.calibrate import calibrate
 from dbbstation.errors import InputError
-from dbbstation.recorded import load_sessions
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import elevated, table_ii_plan
 from tests.plant.session import record

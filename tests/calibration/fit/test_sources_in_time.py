@@ -9,9 +9,9 @@ import pytest
 
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.model.machine_model import MachineModel
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import known_sources
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.session import record
 

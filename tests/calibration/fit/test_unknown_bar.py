@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dbbstation.calibration.fit.calibrate import KINEMATIC_SOURCES, MEASUREMENT_SOURCES, calibrate
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.bar import BarOffset
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import elevated, table_ii_plan

@@ -16,8 +16,8 @@ from dbbstation.calibration.fit.calibrate import calibrate, default_sources
 from dbbstation.calibration.outliers.outlier import Kind, Outlier
 from dbbstation.calibration.outliers.robust import calibrate_robust
 from dbbstation.calibration.outliers.strange_runs import in_place_after_all
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from tests.plant.mechanisms.gravity import Gravity
 from tests.plant.mechanisms.kinematics import RandomKinematics
 from tests.plant.plan import elevated, table_ii_plan

@@ -19,9 +19,9 @@ from dbbstation.calibration.reporting.prediction import predicted_circles
 from dbbstation.cli import cli
 from dbbstation.errors import ModelError
 from dbbstation.model.compensation import compensated
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Motion
 from dbbstation.sources.registry import sources_named
+from dbbstation.tasks.load import load_sessions
 from dbbstation.trace.analysis import best_circle
 from tests.plant.mechanisms.backlash import Backlash
 from tests.plant.mechanisms.currents import DriveCurrents

@@ -22,7 +22,7 @@ from dbbstation.inference.seen import seen
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
-from dbbstation.tabulated import Asked, load_tables
+from dbbstation.tasks.tables import Asked, load_tables
 from tests.diagnosis.table.plant import PULSE_S, Truth, record
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from dbbstation.diagnosis.table.mismatch import Fitted, find_mismatch
 from dbbstation.diagnosis.table.summary import mismatch_summary
 from dbbstation.errors import InputError
 from dbbstation.inference.verdict import Value, Verdict
-from dbbstation.tabulated import Asked, load_tables, stated_uncertainties
+from dbbstation.tasks.tables import Asked, load_tables, stated_uncertainties
 
 ROWS, NOISE_MM, LINE_MM, STIFFNESS_OFF = 400, 0.01, 0.06, 0.02
 

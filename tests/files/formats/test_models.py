@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from dbbstation.errors import InputError, ModelError, OutputError
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.model import covariance_fault, read_model, write_model
+from dbbstation.files.own_sources import every_source
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
@@ -20,6 +21,7 @@ from dbbstation.sources.contract import Effect, ErrorSource, Fitted, Owner, Para
 from dbbstation.sources.registry import known_sources
 
 SMALL = shipped_folder("fixtures") / "models" / "small.yaml"
+EXAMPLE = shipped_folder("fixtures") / "sources" / "scale_bow.py"
 
 
 class Struts(ErrorSource):
@@ -226,6 +228,24 @@ def test_a_matrix_of_another_size(tmp_path: Path, reference) -> None:
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(InputError, match="6 rows of as many numbers were expected"):
         read_model(path, KNOWN)
+
+
+def test_a_model_is_read_by_its_path_alone_and_with_sources_of_ones_own(tmp_path: Path, reference) -> None:
+    assert read_model(str(SMALL)).covariance.shape == (10, 10)
+    (bow,) = [one for name, one in every_source([EXAMPLE]).items() if name == "scale-bow"]
+    model = IdentifiedModel(MachineModel(reference, (Fitted(bow, np.arange(6.0)),)), (), np.zeros((0, 0)))
+    path = tmp_path / "bowed.yaml"
+    write_model(path, model)
+    (read,) = read_model(path, [bow]).model.sources
+    assert read.source is bow
+    np.testing.assert_array_equal(read.values, np.arange(6.0))
+    assert {one.source.name for one in read_model(SMALL, (bow,)).model.sources} >= {"mounting"}
+    with pytest.raises(InputError, match="scale-bow"):
+        read_model(path)
+    with pytest.raises(InputError, match="strut-reference-length"):
+        read_model(SMALL, {"scale-bow": bow})
+    with pytest.raises(ModelError, match="two of the error sources given are called scale-bow"):
+        read_model(path, [bow, bow])
 
 
 def test_the_example_reads_with_the_package_s_own_sources() -> None:

@@ -11,9 +11,9 @@ from dbbstation.files.formats.plan import read_plan
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.model.simulation import setup_of
-from dbbstation.recorded import load_sessions
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources
+from dbbstation.tasks.load import load_sessions
 from dbbstation.trace.cut import start_uncertainty_deg
 from dbbstation.trace.recording import Recording
 from dbbstation.virtual.truth import random_kinematics

@@ -1,0 +1,14 @@
+from dbbstation.errors import StationError as StationError
+from dbbstation.instrument.library import known_instruments as known_instruments
+from dbbstation.tasks.calibrate import calibrate as calibrate
+from dbbstation.tasks.circles import circle_figures as circle_figures
+from dbbstation.tasks.compensate import compensate as compensate
+from dbbstation.tasks.diagnose import diagnose as diagnose
+from dbbstation.tasks.evaluate import evaluate as evaluate
+from dbbstation.tasks.known import known_sources as known_sources
+from dbbstation.tasks.load import load as load
+from dbbstation.tasks.models import read_model as read_model
+from dbbstation.tasks.models import write_model as write_model
+from dbbstation.tasks.predict import predict as predict
+
+__version__: str

@@ -1,0 +1,82 @@
+"""What two sessions say without some of the tests: predictions of held-out tests, and what each cause brings to them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.inference.chosen_anew import LEAST_PARTS, ChosenAnew, chosen_anew
+from dbbstation.inference.folds import FOLDS as GROUPS
+from dbbstation.inference.held_out import held_out
+from dbbstation.inference.hypotheses import search
+from dbbstation.inference.jackknife import refits_without
+from dbbstation.inference.read_off import Trial
+from dbbstation.inference.settled import MOST_EXPANDED
+from dbbstation.inference.square_root import Columns, compress
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.compare.sides import Sides
+    from dbbstation.inference.held_out import HeldOut
+    from dbbstation.inference.model_comparison import Member, ModelComparison
+    from dbbstation.inference.settled import Settled
+
+FOLDS = 5
+"""Groups of tests that are held out in turn for the error of the prediction."""
+
+
+def tried_without_tests(sides: Sides, settled: Settled) -> Trial:
+    """Hold back groups of tests in turn; nothing is said where nothing was found, or there are fewer than `LEAST_PARTS` groups."""
+    groups = _groups(sides, GROUPS)
+    parts = []
+    for group in range(max(groups) + 1):
+        rows = np.zeros(len(settled.channel.residual), dtype=bool)
+        for own, number in zip(sides.blocks, groups, strict=True):
+            rows[own] = number == group
+        parts.append(rows)
+    if len(parts) < LEAST_PARTS or not settled.best.members:
+        return Trial()
+    return Trial(_chosen_anew(settled, parts), refits_without(settled, parts))
+
+
+def _chosen_anew(settled: Settled, parts: Sequence[NDArray[np.bool_]]) -> ChosenAnew:
+    """What each cause brought in each part; the reference is that nothing changed since the first session but the set-up."""
+    bank, kept = settled.bank, settled.channel.kept
+
+    def of_others() -> Iterator[ModelComparison]:
+        for rows in parts:
+            yield bank.beside(but_for=rows[kept]).comparison(np.where(rows[kept], 0.0, bank.target))
+
+    def choose(comparison: ModelComparison) -> Sequence[Member]:
+        return search(comparison, settled.causes, [settled.best.members], MOST_EXPANDED).best.members
+
+    return chosen_anew(settled.comparison, of_others(), choose, bank.kind_of)
+
+
+def predicted(sides: Sides, settled: Settled) -> tuple[HeldOut, HeldOut]:
+    """Predictions of held-out tests, without and with what was found."""
+    bank, members = settled.bank, settled.best.members
+    columns = np.hstack([bank.base, *(bank.fitted(member.columns) for member in members)])
+    base = settled.channel.known
+    prior = np.concatenate([base.prior, *(member.sd for member in members)])
+    # Amplitudes of causes come from the tests that are kept; only the set-up of a held-out test may settle there.
+    known = Columns(prior, prior, np.arange(len(prior)) < len(base.prior))
+    groups = _groups(sides, FOLDS)
+    every = np.arange(len(prior))
+    blocks = [compress(every, columns[rows], bank.target[rows]) for rows in sides.blocks]
+    noise = settled.noise.innovation
+    without, having = (
+        held_out(blocks, groups, known, every[:used], noise, np.zeros((0, used - len(base.prior))))
+        for used in (len(base.prior), len(prior))
+    )
+    return without, having
+
+
+def _groups(sides: Sides, count: int) -> list[int]:
+    """Group of the test of each pair."""
+    tests = list(dict.fromkeys(pair.test for pair in sides.pairs))
+    return [tests.index(pair.test) % min(count, len(tests)) for pair in sides.pairs]

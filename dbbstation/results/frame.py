@@ -1,0 +1,109 @@
+"""What every result can do: JSON, a table, a figure, and a look in a notebook."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from dbbstation.errors import OutputError, StationError
+from dbbstation.files.atomic import write_bytes
+from dbbstation.results.serialise import AsItIs, Kept, json_of, plain
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+
+class Picture(bytes):
+    """A figure as SVG, which a notebook shows."""
+
+    __slots__ = ()
+
+    def _repr_svg_(self) -> str:
+        return self.decode("utf-8")
+
+
+FORMATS = (".svg", ".png", ".pdf")
+"""Formats of figures, by the ending of the file."""
+
+MOST_SHOWN = 60
+"""Rows that a notebook shows of a table."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Framed:
+    """A result that can be shown.
+
+    Attributes:
+        drawing: draws it in a format, by the ending of a file's name; None where it has no figure.
+        notes: what was noticed on the way, which the command line prints on standard error.
+    """
+
+    drawing: Annotated[Callable[[object], bytes] | None, AsItIs, Kept] = field(default=None, repr=False, compare=False)
+    notes: Annotated[tuple[str, ...], Kept] = field(default=(), repr=False)
+
+    def rows(self) -> list[dict[str, object]]:
+        """The result's main table: one dictionary for each row, units in the names."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as plain objects, lists, texts and numbers: what the command's `--json` prints."""
+        return plain(self)
+
+    def to_json(self, indent: int | None = 1) -> str:
+        """Everything as JSON, without the provenance that the command line adds."""
+        return json_of(self, indent)
+
+    def to_frame(self) -> Any:  # noqa: ANN401 - pandas is no dependency
+        """Return `rows` as a pandas DataFrame.
+
+        Raises:
+            StationError: pandas is not installed.
+        """
+        try:
+            import pandas as pd  # type: ignore[import-untyped, import-not-found, unused-ignore]  # noqa: PLC0415 - who has it
+        except ImportError as error:
+            raise StationError("pandas is not installed", remedy="install it, or use rows()") from error
+        return pd.DataFrame(self.rows())
+
+    def plot(self, path: str | PathLike[str] | None = None, *, force: bool = False) -> Picture | None:
+        """Draw the result.
+
+        Args:
+            path: file to write, .svg, .png or .pdf; None: the figure is returned, which a notebook shows.
+            force: overwrite the file.
+
+        Returns:
+            The figure as SVG; None where it was written to a file.
+
+        Raises:
+            OutputError: the result has no figure; the file's ending is another; it exists and `force` is not given.
+        """
+        if self.drawing is None:
+            raise OutputError(f"a {type(self).__name__} has no figure")
+        if path is None:
+            return Picture(self.drawing(FORMATS[0]))
+        file = Path(path)
+        if file.suffix.lower() not in FORMATS:
+            raise OutputError("figures are written as .svg, .png or .pdf", where=str(file), remedy="name such a file")
+        write_bytes(file, self.drawing(file.suffix.lower()), force=force)
+        return None
+
+    def _repr_html_(self) -> str:
+        rows = self.rows()
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
+        body = "".join(
+            f"<tr>{''.join(f'<td>{html.escape(_shown(row.get(name)))}</td>' for name in names)}</tr>"
+            for row in rows[:MOST_SHOWN]
+        )
+        more = f"<p>and {len(rows) - MOST_SHOWN} more rows</p>" if len(rows) > MOST_SHOWN else ""
+        return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,88 @@
+"""From the motor currents of a calibration to their result."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.machine.geometry import STRUTS
+from dbbstation.machine.statics import GRAVITY_M_S2
+from dbbstation.results.currents import CurrentsResult, MotorResult
+from dbbstation.results.serialise import Quantified
+from dbbstation.sources.causes.drive_friction import PER_MOTOR, of_motor
+from dbbstation.sources.laws.weights import platform_masses
+
+if TYPE_CHECKING:
+    from dbbstation.calibration.currents.findings import MotorFindings
+    from dbbstation.calibration.fit.calibrate import Calibration
+
+N_PER_KN = 1e3
+MM_PER_M = 1e3
+
+
+def currents_result(calibration: Calibration) -> CurrentsResult | None:
+    """Gains, friction, noise and what is left of each motor, and the centre of gravity by channel.
+
+    None for a calibration from circles alone. A number that the recordings leave open is None.
+    """
+    found = calibration.currents
+    if found is None:
+        return None
+    weight_n = platform_masses("drive-friction", calibration.layout.machine).platform_kg * GRAVITY_M_S2
+    return CurrentsResult(
+        weight_taken_as_known_n=weight_n,
+        motors=tuple(_motor(calibration, found, motor) for motor in range(STRUTS)),
+        centre_of_gravity=_centre_of_gravity(calibration, found),
+        notes=tuple(found.notes),
+    )
+
+
+def _fitted(calibration: Calibration, source: str) -> dict[str, tuple[float, float]]:
+    """Values and standard deviations of a source's parameters."""
+    sigma = np.sqrt(np.maximum(np.diag(calibration.solution.covariance), 0.0))
+    numbers = zip(calibration.layout.names, calibration.x, sigma, strict=True)
+    return {name: (float(value), float(u)) for (of, _, name), value, u in numbers if of == source}
+
+
+def _motor(calibration: Calibration, found: MotorFindings, motor: int) -> MotorResult:
+    term = next(term for term in calibration.layout.terms if term.source.of_currents)
+    numbers = _fitted(calibration, term.source.name)
+    units = {p.name: p.unit for p in term.parameters}
+    names = {kind: of_motor(motor + 1, kind) for kind in PER_MOTOR}
+    told = {
+        kind: None if name in found.held else Quantified(*numbers[name], units[name]) for kind, name in names.items()
+    }
+    gain, gain_u = numbers[names[PER_MOTOR[0]]]
+    force = torque = None
+    if told[PER_MOTOR[0]] is not None and gain != 0.0:
+        force = Quantified(N_PER_KN / gain, N_PER_KN * gain_u / gain**2, "N/A")
+        lead = calibration.layout.machine.screw_lead_mm
+        turning = None if lead is None else lead / (2.0 * math.pi * MM_PER_M)
+        if turning:
+            torque = Quantified(force.value * turning, (force.uncertainty or 0.0) * turning, "Nm/A")
+    noise = found.noise[motor]
+    return MotorResult(
+        motor=motor + 1,
+        **told,
+        force_per_current=force,
+        torque_per_current=torque,
+        residual_a=None if noise is None else found.residual_a[motor],
+        noise_a=None if noise is None else found.fine_a[motor],
+        noise_correlation_samples=None if noise is None else noise.correlation_samples,
+        samples=found.samples[motor],
+    )
+
+
+def _centre_of_gravity(calibration: Calibration, found: MotorFindings) -> dict[str, dict[str, Quantified | None]]:
+    """Each coordinate's shift by circles alone, by currents alone and by both."""
+    together = _fitted(calibration, "cog-shift")
+    shifts: dict[str, dict[str, Quantified | None]] = {}
+    for name in next(iter(found.alone.values()), {}):
+        alone = {channel: by_name[name] for channel, by_name in found.alone.items()}
+        shifts[name] = {
+            **{channel: None if number is None else Quantified(*number, "mm") for channel, number in alone.items()},
+            "both": Quantified(*together[name], "mm"),
+        }
+    return shifts

@@ -1,0 +1,111 @@
+"""Where the tool really goes: the result of `predict`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dbbstation.model.uncertainty import prediction_summary
+from dbbstation.results.frame import Framed
+from dbbstation.results.serialise import Absent, AsItIs, Kept
+
+if TYPE_CHECKING:
+    from dbbstation.model.identified import IdentifiedModel
+    from dbbstation.model.machine_model import MachineModel
+
+NAMES = ("x_mm", "y_mm", "z_mm", "a_deg", "b_deg", "c_deg")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PredictionResult(Framed):
+    """Actual poses for commanded ones.
+
+    Attributes:
+        file: table that was written; None where none was.
+        poses: how many.
+        greatest_error_um: greatest distance of the actual position from the commanded one [µm].
+        error_rms_um: root mean square of these [µm].
+        common_shift_um: mean of X, Y and Z, which a program whose zero is set on the part does not feel [µm].
+        error_about_mean_rms_um: root mean square without it [µm].
+        greatest_uncertainty_um: standard uncertainty of a position, where it is greatest; None where not known [µm].
+        greatest_uncertainty_by_axis_um: the same of X, Y and Z each.
+        uncertainty_not_known_because: why; None where it is known.
+        directions_lost: what the recordings of the model could not determine.
+        unknown_causes: sources of the model that describe an error without a cause.
+        commanded: poses, shape (n, 6) [mm, deg].
+        actual: poses, shape (n, 6) [mm, deg].
+        uncertainty_mm: standard uncertainties of X, Y and Z, shape (n, 3) [mm]; NaN where not known.
+    """
+
+    file: Annotated[str | None, Absent] = None
+    poses: int
+    greatest_error_um: float
+    error_rms_um: float
+    common_shift_um: tuple[float, ...]
+    error_about_mean_rms_um: float
+    greatest_uncertainty_um: float | None
+    greatest_uncertainty_by_axis_um: Mapping[str, float | None]
+    uncertainty_not_known_because: str | None
+    directions_lost: tuple[str, ...]
+    unknown_causes: tuple[str, ...]
+    commanded: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
+    actual: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
+    uncertainty_mm: Annotated[NDArray[np.float64], AsItIs, Kept] = field(repr=False)
+
+    def rows(self) -> list[dict[str, object]]:
+        """Actual poses with standard uncertainties of their positions, one row for each."""
+        rows = []
+        for pose, known in zip(self.actual.tolist(), self.uncertainty_mm.tolist(), strict=True):
+            row: dict[str, object] = dict(zip(NAMES, pose, strict=True))
+            row |= {f"u_{axis}_mm": u if np.isfinite(u) else None for axis, u in zip("xyz", known, strict=True)}
+            rows.append(row)
+        return rows
+
+
+def prediction_result(
+    identified: IdentifiedModel,
+    commanded: NDArray[np.float64],
+    actual: NDArray[np.float64],
+    uncertainty_mm: NDArray[np.float64],
+    file: str | None = None,
+) -> PredictionResult:
+    """Return the result of a prediction.
+
+    Args:
+        identified: the model.
+        commanded: shape (n, 6) [mm, deg].
+        actual: shape (n, 6) [mm, deg].
+        uncertainty_mm: shape (n, 3) [mm]; NaN where not known.
+        file: table that was written.
+    """
+    figures = prediction_summary(commanded, actual, uncertainty_mm)
+    unknown = None in figures["greatest_uncertainty_by_axis_um"].values()
+    return PredictionResult(
+        file=file,
+        poses=len(actual),
+        **{**figures, "common_shift_um": tuple(figures["common_shift_um"])},
+        uncertainty_not_known_because=identified.why_unknown if unknown else None,
+        directions_lost=tuple(identified.directions_lost),
+        unknown_causes=unknown_causes(identified.model),
+        commanded=commanded,
+        actual=actual,
+        uncertainty_mm=uncertainty_mm,
+    )
+
+
+def unknown_cause_notes(model: MachineModel) -> list[str]:
+    """Say of a model that keeps an error that its cause is unknown."""
+    return [
+        f"the model has {name}, an error whose cause is unknown; it holds where it was measured, while it lasts"
+        for name in unknown_causes(model)
+    ]
+
+
+def unknown_causes(model: MachineModel) -> tuple[str, ...]:
+    """Names of the sources of a model that describe an error without a cause."""
+    own = model.of_the_machine().sources
+    return tuple(fitted.source.name for fitted in own if not fitted.source.candidate and fitted.values.any())

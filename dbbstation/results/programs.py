@@ -1,0 +1,137 @@
+"""NC programs that were written: the result of `compensate` and `program`."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
+
+from dbbstation.nc.kept import said_acceleration
+from dbbstation.results.frame import Framed
+from dbbstation.results.serialise import Kept
+
+if TYPE_CHECKING:
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.nc.dialect import Dialect
+    from dbbstation.nc.export import Program
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrittenProgram:
+    """One program.
+
+    Attributes:
+        file: that was written; its name where none was.
+        sha256: of its text.
+        points: moves at feed.
+        greatest_correction_um: of a programmed point; None in a nominal program [µm].
+        chord_error_um: largest distance between a move and the path that it stands for [µm].
+        chord_asked_um: that was asked for [µm].
+        model_uncertainty_um: greatest standard uncertainty of the tool tip along the path; None where not known [µm].
+        model_uncertainty_by_axis_um: the same of X, Y and Z each; None in a nominal program.
+        model_uncertainty_not_known_because: why; None where it is known.
+        tilt_left_um: correction of the tilt that was left out, as felt 100 mm from the tip [µm].
+        feed_s: time of all moves at feed, as the control plans them [s].
+        nominal_feed_s: of the program that it was made from [s].
+        text: the program.
+        cost: what a preference cost, in words; empty without one.
+    """
+
+    file: str
+    sha256: str
+    points: int
+    greatest_correction_um: float | None
+    chord_error_um: float | None
+    chord_asked_um: float | None
+    model_uncertainty_um: float | None
+    model_uncertainty_by_axis_um: Mapping[str, float | None] | None
+    model_uncertainty_not_known_because: str | None
+    tilt_left_um: float | None
+    feed_s: float | None
+    nominal_feed_s: float | None
+    text: Annotated[str, Kept] = field(repr=False)
+    cost: Annotated[str, Kept] = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProgramsResult(Framed):
+    """Programs, nominal or compensated.
+
+    Attributes:
+        dialect: that they are written in.
+        model_sha256: of the model's file; None where no file was given.
+        acceleration_mm_s2: that pieces are chosen for; None where the dialect says no look-ahead [mm/s²].
+        acceleration_known: whether the machine file states it.
+        programs: one after the other.
+        acceleration_in_words: the acceleration, and where it is known from; empty where there is none.
+    """
+
+    dialect: str
+    model_sha256: str | None
+    acceleration_mm_s2: float | None
+    acceleration_known: bool | None
+    programs: tuple[WrittenProgram, ...]
+    acceleration_in_words: Annotated[str, Kept] = ""
+
+    def rows(self) -> list[dict[str, object]]:
+        """Programs, one row for each."""
+        return [
+            {
+                "file": one.file,
+                "points": one.points,
+                "greatest_correction_um": one.greatest_correction_um,
+                "model_uncertainty_um": one.model_uncertainty_um,
+                "chord_error_um": one.chord_error_um,
+                "feed_s": one.feed_s,
+                "nominal_feed_s": one.nominal_feed_s,
+            }
+            for one in self.programs
+        ]
+
+
+def programs_result(
+    written: Sequence[tuple[str, Program]],
+    dialect: Dialect,
+    machine: Machine | None,
+    model_sha256: str | None,
+    notes: tuple[str, ...] = (),
+) -> ProgramsResult:
+    """Return programs as a result.
+
+    Args:
+        written: file and program of each.
+        dialect: that they are written in.
+        machine: that compensated programs are for; None of nominal ones.
+        model_sha256: of the model's file.
+        notes: what was noticed on the way.
+    """
+    planned = None if dialect.look_ahead is None else machine
+    return ProgramsResult(
+        notes=notes,
+        dialect=dialect.name,
+        model_sha256=model_sha256,
+        acceleration_mm_s2=None if planned is None else planned.planned_acceleration_mm_s2,
+        acceleration_known=None if planned is None else planned.acceleration_mm_s2 is not None,
+        programs=tuple(_written(file, each) for file, each in written),
+        acceleration_in_words="" if planned is None else said_acceleration(planned),
+    )
+
+
+def _written(file: str, each: Program) -> WrittenProgram:
+    return WrittenProgram(
+        file=file,
+        sha256=hashlib.sha256(each.text.encode()).hexdigest(),
+        points=each.points,
+        greatest_correction_um=each.greatest_um,
+        chord_error_um=each.chord_um,
+        chord_asked_um=each.chord_asked_um,
+        model_uncertainty_um=each.uncertainty_um,
+        model_uncertainty_by_axis_um=dict(zip("xyz", each.uncertainty_by_axis_um, strict=False)) or None,
+        model_uncertainty_not_known_because=each.why_unknown or None,
+        tilt_left_um=each.tilt_left_um,
+        feed_s=each.feed_s,
+        nominal_feed_s=each.nominal_feed_s,
+        text=each.text,
+        cost=each.cost,
+    )

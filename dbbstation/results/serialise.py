@@ -1,0 +1,92 @@
+"""The one way from results to JSON, and to the JSON Schemas of results.
+
+A result is a frozen dataclass. Its fields are the keys of the JSON, in the same words and units.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, GetPydanticSchema, TypeAdapter
+from pydantic_core import core_schema
+
+
+def _is_none(value: object) -> bool:
+    return value is None
+
+
+Absent = Field(exclude_if=_is_none)
+"""Marks a field whose key is left out where it is None, as in `Annotated[str | None, Absent]`."""
+
+AsItIs = GetPydanticSchema(lambda _source, _handler: core_schema.any_schema())
+Kept = Field(exclude=True)
+"""Both together mark a field that belongs to the result and is no part of its JSON: objects to go on working with."""
+
+Array = Annotated[
+    NDArray[np.float64],
+    GetPydanticSchema(
+        lambda _source, _handler: core_schema.any_schema(
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                np.ndarray.tolist, return_schema=core_schema.list_schema()
+            )
+        )
+    ),
+]
+"""Numbers of any shape: nested lists in JSON."""
+
+
+@dataclass(frozen=True)
+class Quantified:
+    """A number as it was identified.
+
+    Attributes:
+        value: in its unit.
+        uncertainty: standard uncertainty u [GUM], in the same unit; None where it is not known.
+        unit: of both.
+    """
+
+    value: float
+    uncertainty: float | None
+    unit: str
+
+
+_ADAPTERS: dict[Any, TypeAdapter[Any]] = {}
+"""Made once for each class: that takes milliseconds."""
+
+
+def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
+    if kind not in _ADAPTERS:
+        _ADAPTERS[kind] = TypeAdapter(kind)
+    return _ADAPTERS[kind]
+
+
+def plain(result: object) -> dict[str, Any]:
+    """Return a result as what JSON has: objects, lists, texts and numbers.
+
+    Args:
+        result: a frozen dataclass of this package.
+    """
+    kind: type[Any] = type(result)
+    return _adapter(kind).dump_python(result, mode="json", by_alias=True)
+
+
+def json_of(result: object, indent: int | None = 1) -> str:
+    """Return a result as JSON text.
+
+    Args:
+        result: a frozen dataclass of this package.
+        indent: spaces by which each level is moved in; None: everything on one line.
+
+    Raises:
+        ValueError: a number in it is not finite, which JSON cannot say.
+    """
+    return json.dumps(plain(result), indent=indent, allow_nan=False, ensure_ascii=False)
+
+
+def schema_of(kind: type) -> dict[str, Any]:
+    """Return the JSON Schema of a result's class."""
+    return _adapter(kind).json_schema(mode="serialization", by_alias=True)

@@ -1,0 +1,97 @@
+"""The causes of error that are known: the result of `sources`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from dbbstation.calibration.fit.calibrate import default_sources
+from dbbstation.machine.geometry import Machine
+from dbbstation.results.serialise import Absent
+from dbbstation.sources.contract import ErrorSource
+
+
+@dataclass(frozen=True)
+class SourceParameter:
+    """A parameter of a cause.
+
+    Attributes:
+        name: with its unit at the end.
+        unit: of its value.
+        usual_size: one prior standard deviation, in its unit.
+        meaning: in words.
+    """
+
+    name: str
+    unit: str
+    usual_size: float
+    meaning: str
+
+
+@dataclass(frozen=True)
+class SourceDescription:
+    """Everything that a cause says of itself.
+
+    Attributes:
+        name: of the error source.
+        belongs_to: `machine`, `session`, `mounting` or `instrument`.
+        role: what becomes of it: fitted in every calibration, a candidate of the diagnosis, or the keeper of a curve.
+        what: what it is.
+        shows: how it shows.
+        confirm: how to confirm it.
+        cure: how to cure it.
+        equation: of its effect.
+        origin: of the equation.
+        needs: what it needs of a run.
+        varies_with: what real machines' departure from its formula follows; None: the pose.
+        form_uncertainty: share of the effect by which real machines depart from the formula, one standard deviation.
+        parameters: on a machine; None where no machine was given.
+    """
+
+    name: str
+    belongs_to: str
+    role: str
+    what: str
+    shows: str
+    confirm: str
+    cure: str
+    equation: str
+    origin: str
+    needs: tuple[str, ...]
+    varies_with: str | None
+    form_uncertainty: float
+    parameters: Annotated[tuple[SourceParameter, ...] | None, Absent] = None
+
+
+def source_description(source: ErrorSource, machine: Machine | None = None) -> SourceDescription:
+    """Describe a cause, with its parameters on a machine where one is given.
+
+    Raises:
+        ModelError: the machine lacks what the source needs.
+    """
+    texts = source.texts
+    parameters = None
+    if machine is not None:
+        parameters = tuple(SourceParameter(p.name, p.unit, p.plausible, p.meaning) for p in source.parameters(machine))
+    return SourceDescription(
+        name=source.name,
+        belongs_to=source.belongs_to.value,
+        role=role_of(source),
+        what=texts.what,
+        shows=texts.shows,
+        confirm=texts.confirm,
+        cure=texts.cure,
+        equation=texts.equation,
+        origin=texts.origin,
+        needs=tuple(sorted(need.value for need in source.needs)),
+        varies_with=source.varies_with or None,
+        form_uncertainty=source.form_uncertainty,
+        parameters=parameters,
+    )
+
+
+def role_of(source: ErrorSource) -> str:
+    """What becomes of it: fitted in every calibration, a candidate of the diagnosis, or the keeper of a curve."""
+    if source.name in {fitted.name for fitted in default_sources()}:
+        return "fitted always"
+    return "candidate" if source.candidate else "keeps what has no name"

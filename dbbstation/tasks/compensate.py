@@ -1,0 +1,107 @@
+"""Compensate: any NC program through the inverse of a calibrated model."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.files.atomic import refuse_existing, write_text
+from dbbstation.files.own_dialects import dialect_given
+from dbbstation.nc.compensate import CHORD_MM
+from dbbstation.nc.export import compensated_program
+from dbbstation.nc.limits import LARGEST_CORRECTION_MM
+from dbbstation.nc.registry import dialect_of_file
+from dbbstation.results.prediction import unknown_cause_notes
+from dbbstation.results.programs import ProgramsResult, programs_result
+from dbbstation.tasks.programs import inverse_of, origin_of, program_text, sha256_of
+from dbbstation.tasks.provenance import from_python
+from dbbstation.tasks.telling import Telling, silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import ArrayLike
+
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.tasks.models import Model
+
+
+def compensate(
+    program: str | PathLike[str],
+    model: Model,
+    out: str | PathLike[str] | None = None,
+    *,
+    dialect: str = "linuxcnc",
+    written_in: str | None = None,
+    start: ArrayLike | None = None,
+    chord_um: float = 1e3 * CHORD_MM,
+    prefer: str | None = None,
+    accept_chord_um: float | None = None,
+    time_s: float | None = None,
+    largest_correction_mm: float = LARGEST_CORRECTION_MM,
+    force: bool = False,
+    known: Mapping[str, ErrorSource] | None = None,
+    provenance: Callable[[], Provenance] = from_python,
+    say: Callable[[str], None] = silent,
+) -> ProgramsResult:
+    """Compensate an NC program: what is written takes the real machine where `program` means to go.
+
+    Args:
+        program: file in machine coordinates; it must be whole, not compensated yet, and of no other machine.
+        model: a model, a file of one, or the result of `calibrate` or `diagnose`.
+        out: file to write; None: none, the text stands in the result.
+        dialect: language to write: a name, or a Python file.
+        written_in: language of `program`, likewise; None: by its extension.
+        start: pose before the program, X, Y, Z [mm], A, B, C [deg]; None: its first move names all six.
+        chord_um: greatest distance between a straight move and the path [µm].
+        prefer: what to keep where chord error and feed cannot both be kept: `accuracy`, `feed` or `position-only`; None: the
+            program is refused then.
+        accept_chord_um: chord error that is accepted where `chord_um` is missed [µm].
+        time_s: start of the program after the session's start, for models that depend on time [s].
+        largest_correction_mm: a model that shifts any point by more is refused [mm].
+        force: overwrite `out`.
+        known: every error source by name, for a file of a model.
+        provenance: asked for the header, when all is read.
+        say: told what is noticed.
+
+    Raises:
+        InputError: faults of files.
+        OutputError: `out` exists and `force` is not given.
+        TravelError: the compensated path leaves the travel.
+        KinematicsError: a pose that the machine cannot take.
+        ModelError: the model has a source that needs what a program lacks.
+        MachineError: a feed that the machine does not reach.
+        StationError: the program is compensated already or for another machine, its corrections are too large, or chord and feed
+            cannot both be kept.
+        ValueError: `prefer` is none of its words; `start` is no pose.
+    """
+    source = Path(program)
+    pose = None if start is None else np.asarray(start, dtype=np.float64).reshape(6)
+    if out is not None:
+        refuse_existing(Path(out), force=force)
+    writer = dialect_given(dialect)
+    text = program_text(source)
+    reader = dialect_of_file(str(source), text) if written_in is None else dialect_given(written_in)
+    path = reader.read(text, str(source), start=pose)
+    inverse = inverse_of(
+        model,
+        known,
+        time_s=time_s,
+        largest_mm=largest_correction_mm,
+        prefer=prefer,
+        accept_chord_um=accept_chord_um,
+    )
+    telling = Telling(say=say)
+    telling.note(*unknown_cause_notes(inverse.model))
+    origin = origin_of({"program file": source}, inverse, provenance())
+    done = compensated_program(path, writer, inverse, chord_mm=chord_um / 1e3, origin=origin)
+    if out is not None:
+        write_text(Path(out), done.text, force=force)
+    digest = sha256_of(Path(model)) if isinstance(model, str | PathLike) else None
+    return programs_result(
+        [(str(out or done.name), done)], writer, inverse.model.machine, digest, notes=tuple(telling.notes)
+    )

@@ -1,0 +1,196 @@
+"""Diagnose: from recorded sessions to the physics that a kinematic calibration of them leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.calibration.fit.calibrate import default_sources
+from dbbstation.calibration.reporting.evaluation import evaluate
+from dbbstation.calibration.reporting.identified import identified_model
+from dbbstation.diagnosis import diagnose as search
+from dbbstation.diagnosis.diagnose import usable_sources
+from dbbstation.diagnosis.unexplained_model import keep_unexplained as keeping
+from dbbstation.errors import ModelError
+from dbbstation.files.own_sources import every_source
+from dbbstation.results.of_calibration import calibration_figures, report_of
+from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result
+from dbbstation.results.serialise import plain
+from dbbstation.sources.registry import known_sources, sources_named
+from dbbstation.tasks.load import READING, loaded
+from dbbstation.tasks.telling import Telling, never, silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.diagnosis.findings import Diagnosis
+    from dbbstation.diagnosis.unexplained_model import Kept as KeptCurve
+    from dbbstation.results.diagnosis import DiagnosisResult
+    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.tasks.load import Recorded, Sessions
+    from dbbstation.tasks.telling import Progress
+
+STAGES = {
+    READING: 0,
+    "kinematic calibration": 5,
+    "candidates": 14,
+    "joint fit": 47,
+    "verdicts": 76,
+    "held-out tests": 78,
+    "next test": 81,
+}
+"""Stages of a diagnosis, and the share of its time that has passed by then [%]; joint fits are none or several."""
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """Recorded sessions with their diagnosis.
+
+    Attributes:
+        recorded: the sessions.
+        diagnosis: what was found in them.
+        lacking: why further candidates could not be looked at, by name.
+    """
+
+    recorded: Recorded
+    diagnosis: Diagnosis
+    lacking: Mapping[str, str]
+
+    def summary(self) -> dict[str, Any]:
+        """Everything that is said, as plain numbers."""
+        return plain(diagnosis_figures(self.diagnosis, self.lacking))
+
+
+def default_candidates(known: Mapping[str, ErrorSource]) -> list[str]:
+    """Names of all error sources that are not fitted anyway."""
+    fitted = {source.name for source in default_sources()}
+    return [name for name, source in known.items() if name not in fitted and source.candidate]
+
+
+def diagnose_sessions(
+    paths: Sequence[Path],
+    candidates: Sequence[str] | None,
+    exclude: Sequence[str],
+    say: Callable[[str], None],
+    known: Mapping[str, ErrorSource] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+    reading: Callable[[int, int], None] = lambda _done, _of: None,
+    only: Sequence[str] = (),
+) -> Diagnosed:
+    """Read sessions of one machine and find what a kinematic calibration of them leaves out.
+
+    Args:
+        paths: session folders or session files.
+        candidates: names of the error sources to look for; all that are known if None.
+        exclude: names of tests to leave out.
+        say: told what was noticed in the files.
+        known: every error source by name; those of the package if None.
+        progress: told each stage of the work as it begins.
+        reading: told how many runs of a session, of how many, are read.
+        only: names of tests to take; empty for all.
+
+    Raises:
+        InputError: faults of files and traces.
+        ModelError: a name that no source has, or that of a source that is no cause.
+        CalibrationError: the kinematic model cannot be fitted.
+    """
+    telling = Telling(_staged(progress, reading), say=lambda text: say(f"note: {text}"))
+    return _diagnosed(paths, candidates, (tuple(only), tuple(exclude)), known or known_sources(), telling)
+
+
+def _staged(progress: Callable[[str], None], reading: Callable[[int, int], None]) -> Progress:
+    def tell(text: str, done: int = 0, of: int = 0) -> None:
+        if of:
+            reading(done, of)
+        else:
+            progress(text)
+
+    return tell
+
+
+def diagnose(
+    sessions: Sessions | Recorded,
+    *,
+    sources: Sequence[str] | None = None,
+    tests: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    keep_unexplained: bool = False,
+    known: Mapping[str, ErrorSource] | None = None,
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
+) -> DiagnosisResult:
+    """Find the physics that a kinematic calibration of these recordings leaves out, name it and model it.
+
+    Args:
+        sessions: session folders, or what `load` returned of them.
+        sources: names of the error sources to compare; None: all.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        keep_unexplained: keep an unmodelled effect in the model, as a curve: compensated, cause unknown.
+        known: every error source by name; None: the package's and those of installed packages.
+        progress: told each stage as it begins.
+        stop: asked at each stage whether to stop.
+        say: told what is noticed.
+
+    Returns:
+        Causes with their verdicts, and the joint model; `drawing` draws them.
+
+    Raises:
+        InputError: faults of files and traces.
+        ModelError: a name that no source has, or that of a source that is no cause.
+        CalibrationError: the kinematic model cannot be fitted.
+        StoppedError: `stop` returned True.
+    """
+    telling = Telling(progress, stop, say)
+    every = every_source() if known is None else known
+    diagnosed = _diagnosed(sessions, sources, (tuple(tests), tuple(exclude)), every, telling)
+    found = diagnosed.diagnosis
+    unnamed = _kept(found, telling) if keep_unexplained else None
+    fit = found.after if unnamed is None else unnamed.fit
+    report = report_of(calibration_figures(fit, evaluate(fit.model, fit.observations)))
+    of_sessions = diagnosed.recorded.sessions
+    model = identified_model(fit, report, of_sessions) if unnamed is None else unnamed.identified(report, of_sessions)
+    return diagnosis_result(
+        diagnosis_figures(found, diagnosed.lacking),
+        model=model,
+        drawing=partial(_drawn, found),
+        notes=tuple(telling.notes),
+    )
+
+
+def _diagnosed(
+    sessions: Sessions | Recorded,
+    candidates: Sequence[str] | None,
+    chosen: tuple[Sequence[str], Sequence[str]],
+    known: Mapping[str, ErrorSource],
+    telling: Telling,
+) -> Diagnosed:
+    """Read and diagnose; `chosen` are tests to take and to leave out."""
+    named = sources_named(default_candidates(known) if candidates is None else candidates, known)
+    for source in named:
+        if not source.candidate:
+            what = f"{source.name} is no cause: it only keeps in a model what a diagnosis left without a name"
+            raise ModelError(what, remedy="leave it out; --keep-unexplained keeps what is left")
+    recorded = loaded(sessions, *chosen, telling)
+    usable, lacking = usable_sources(recorded.machine, recorded.observations, named)
+    found = search.diagnose(recorded.machine, recorded.observations, usable, telling.stage)
+    return Diagnosed(recorded, found, lacking)
+
+
+def _kept(found: Diagnosis, telling: Telling) -> KeptCurve | None:
+    """Unmodelled effect to be kept in the model; None where it cannot be kept, with a note of the reason."""
+    try:
+        return keeping(found.unexplained.curve, found.after)
+    except ModelError as error:
+        telling.note(f"the model is written without it: {error.what}")
+        return None
+
+
+def _drawn(diagnosis: Diagnosis, wanted: object) -> bytes:
+    from dbbstation.report.diagnosis_figure import diagnosis_figure  # noqa: PLC0415 - half a second for who draws nothing
+    from dbbstation.report.figure_format import figure_format  # noqa: PLC0415
+
+    return diagnosis_figure(diagnosis, figure_format(wanted))

@@ -1,0 +1,99 @@
+"""Evaluate: from recorded sessions and a model to what the model leaves of them, circle by circle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from dbbstation.calibration.reporting import evaluation
+from dbbstation.calibration.reporting.evaluation import plane_figures, plane_uncertainty_um
+from dbbstation.calibration.reporting.prediction import predicted_circles
+from dbbstation.machine.difference import check_model_is_of
+from dbbstation.results.evaluation import EvaluationResult, LowPassedCircularity
+from dbbstation.results.of_evaluation import evaluated_runs, evaluated_tolerances
+from dbbstation.tasks.load import READING, loaded
+from dbbstation.tasks.models import model_of
+from dbbstation.tasks.telling import Telling, never, silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from dbbstation.plan.tolerance import Tolerance
+    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.tasks.load import Recorded, Sessions
+    from dbbstation.tasks.models import Model
+    from dbbstation.tasks.telling import Progress
+
+STAGES = {READING: 0, "predicting runs": 30}
+"""Stages of an evaluation, and the share of its time that has passed by then [%]."""
+
+
+def evaluate(
+    sessions: Sessions | Recorded,
+    model: Model,
+    *,
+    tests: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    tolerances: Sequence[Tolerance] = (),
+    known: Mapping[str, ErrorSource] | None = None,
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
+) -> EvaluationResult:
+    """Compare recordings with the nominal machine (before) and with a model (after), which must be of the same machine.
+
+    After is what the model leaves of the recordings, not a new measurement.
+
+    Args:
+        sessions: session folders, or what `load` returned of them.
+        model: a model, a file of one, or the result of `calibrate` or `diagnose`.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        tolerances: to hold against every circle.
+        known: every error source by name, for a file; None: the package's and those of installed packages.
+        progress: told each stage.
+        stop: asked after each run whether to stop.
+        say: told what is noticed in the files.
+
+    Raises:
+        InputError: faults of files and traces.
+        TraceError: a run that is no circle.
+        ModelError: the model is of another machine; a source needs what the runs do not give.
+        KinematicsError: the plane of flatness lies outside the workspace.
+        StoppedError: `stop` returned True.
+    """
+    telling = Telling(progress, stop, say)
+    identified = model_of(model, known)
+    recorded = loaded(sessions, tests, exclude, telling)
+    check_model_is_of(recorded.machine, identified.model.machine)
+    found = evaluation.evaluate(identified.model, recorded.observations)
+    circles = predicted_circles(identified.model, recorded.observations, telling.counted("predicting runs"))
+    runs = tuple(
+        replace(
+            run,
+            circularity_30_upr_um=LowPassedCircularity(
+                circle.measured_um, circle.predicted_um, circle.before_um, circle.after_um
+            ),
+        )
+        for run, circle in zip(evaluated_runs(found.runs), circles, strict=True)
+    )
+    height_mm = min(observation.raw.circle.centre_mm[2] for observation in recorded.observations)
+    plane = plane_figures(identified.model, height_mm)
+    flatness_u_um, parallelism_u_um = plane_uncertainty_um(identified, height_mm)
+    own, placed = identified.model.of_the_machine().sources, identified.model.anywhere().sources
+    return EvaluationResult(
+        runs=runs,
+        nominal_rms_um=found.nominal_rms_um,
+        residual_rms_um=found.residual_rms_um,
+        flatness_um=plane.flatness_um,
+        flatness_u_um=flatness_u_um,
+        parallelism_um=plane.parallelism_um,
+        parallelism_u_um=parallelism_u_um,
+        plane_uncertainty_not_known_because=None
+        if None not in {flatness_u_um, parallelism_u_um}
+        else identified.why_unknown,
+        plane_z_mm=height_mm,
+        plane_without=tuple(f.source.name for f in own if f not in placed and not f.source.of_currents),
+        tolerances=evaluated_tolerances(tolerances, runs),
+        notes=tuple(telling.notes),
+    )

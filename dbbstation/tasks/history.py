@@ -1,0 +1,353 @@
+"""From a folder of sessions to the histories of its machines, by an index of what was worked out of each session before."""
+
+from __future__ import annotations
+
+import json
+import os
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.files.gateway import digest_of
+from dbbstation.files.inputs import note_known
+from dbbstation.files.kept import Kept, Noted, Stamp, stamp_of
+from dbbstation.files.recordings.anchors import SHORTEST, links_of
+from dbbstation.files.recordings.folder_of_sessions import files_of, reason_of
+from dbbstation.files.recordings.session_name import SESSION_FILE
+from dbbstation.history.order import date_faults
+from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
+from dbbstation.history.trend import histories
+from dbbstation.processes import each
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.history.trend import Asked, MachineHistory
+
+
+@dataclass(frozen=True)
+class Historied:
+    """Histories of a folder.
+
+    Attributes:
+        machines: one for each machine.
+        left_out: sessions and models that could not be read, by name, with the reason.
+        notes: remarks on sessions.
+        worked_out: sessions and models that were read now; the others came from the index.
+    """
+
+    machines: tuple[MachineHistory, ...]
+    left_out: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...]
+    worked_out: int
+
+
+def load_history(
+    folder: Path,
+    asked: Asked,
+    source_files: Sequence[Path] = (),
+    *,
+    rebuild: bool = False,
+    now: datetime | None = None,
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+) -> Historied:
+    """Return the histories of all machines whose sessions lie in a folder, at most four folders deep.
+
+    A session is read where its session file has another time or size than in the index, and another content than any that is
+    known. One that cannot be read is left out and named.
+
+    Args:
+        folder: that holds session folders, and models of `calibrate` or `diagnose`.
+        asked: how trends are worked out.
+        source_files: with error sources of models.
+        rebuild: read everything anew.
+        now: the time; None: the clock's.
+        progress: called with how many of how many files are done.
+
+    Raises:
+        InputError: there is no session in it, or none that can be used; a test that none of them has.
+    """
+    found = files_of(folder)
+    with Kept(folder, begin_anew=rebuild) as kept:
+        reading = _Reading(kept, progress, len(found.sessions) + len(found.models))
+        sessions = reading.every(found.sessions, _session_of, _session_data, _processes_for)
+        models = reading.every(found.models, model_from, partial(_model_data, source_files=tuple(source_files)))
+        kept.drop_others([*found.sessions, *found.models])
+        moment = now or datetime.now(UTC)
+        folders = {_called(name): path.parent for name, path in found.sessions.items()}
+        seals = [note for one in sessions if (note := _seal_note(kept, folders[one.name], one, moment))]
+        notes = [*([kept.problem] if kept.problem else []), *seals]
+    progress(reading.of, reading.of)
+    sessions, alike = _once(sessions)
+    dated = [one for one in sessions if one.started is not None]
+    left_out = [*found.closed, *reading.left_out] + [
+        (one.name, "none of its accepted runs says when it started: it has no place in time")
+        for one in sessions
+        if one.started is None
+    ]
+    if not dated:
+        first = f": {left_out[0][0]}: {left_out[0][1]}" if left_out else ""
+        what = f"none of its {len(found.sessions)} sessions can be used{first}"
+        raise InputError([Problem(str(folder), 0, 0, what, "`dbbstation check SESSION` names every fault")])
+    _check_tests(folder, dated, asked)
+    by_session, unlike = _of_one_session(models, dated)
+    notes += [*alike, *unlike]
+    machines = histories(dated, by_session, asked)
+    for machine in machines:
+        notes += date_faults(machine.sessions, now or datetime.now(UTC))
+        notes += _gathered(machine.sessions)
+    return Historied(machines, tuple(left_out), tuple(notes), reading.worked_out)
+
+
+def _seal_note(kept: Kept, folder: Path, one: SessionFigures, moment: datetime) -> str:
+    """Note the anchor of a session, and say where it is not a continuation of the one that was noted before."""
+    noted = kept.noted(one.name)
+    if noted is None or noted.anchor == one.anchor or noted.anchor in links_of(folder):
+        if one.anchor and (noted is None or noted.anchor != one.anchor):
+            kept.note(one.name, Noted(one.anchor, moment.isoformat(timespec="seconds")))
+        return ""
+    before = f"one ended with {noted.anchor[:SHORTEST]} on {noted.at[:10]}"
+    if not one.anchor:
+        return f"{one.name} carries no seal, {before}: the seal was taken out"
+    return (
+        f"{one.name} carries another seal, {before}, which is not part of it: it was sealed anew, or is another session"
+    )
+
+
+_Kind = TypeVar("_Kind", SessionFigures, ModelFigures)
+
+
+@dataclass(frozen=True)
+class _File:
+    """A file of the folder: its path in it, its path, and its stamp before it was read."""
+
+    name: str
+    path: Path
+    stamp: Stamp
+
+
+class _Reading:
+    """Reads sessions and models, from the index where it knows them.
+
+    Attributes:
+        of: files in all.
+        left_out: name and reason of those that cannot be read.
+        worked_out: how many were read.
+    """
+
+    def __init__(self, kept: Kept, progress: Callable[[int, int], None], of: int) -> None:
+        self.of = of
+        self.left_out: list[tuple[str, str]] = []
+        self.worked_out = 0
+        self._kept = kept
+        self._progress = progress
+        self._done = 0
+
+    def every(
+        self,
+        files: Mapping[str, Path],
+        taken: Callable[[dict[str, Any], str], _Kind],
+        work: Callable[[Path], dict[str, Any] | str],
+        processes: Callable[[Sequence[Path]], int] = lambda _paths: 1,
+    ) -> list[_Kind]:
+        """Return the figures of all files that can be read, in their order.
+
+        Args:
+            files: by name.
+            taken: makes figures of what is kept, and of a file's name.
+            work: works out what is kept, or says why it cannot.
+            processes: how many to work such files out with.
+        """
+        found: dict[str, _Kind] = {}
+        reasons: dict[str, str] = {}
+        unknown: dict[str, list[_File]] = {}
+        for name, path in files.items():
+            try:
+                file = _File(name, path, stamp_of(path))
+                one = _understood(self._kept.of(name, file.stamp), taken, name)
+                if one is None:
+                    digest = digest_of(path)
+                    text = self._kept.of_content(digest)
+                    one = _understood(text, taken, name)
+                    if text is None or one is None:
+                        unknown.setdefault(digest, []).append(file)
+                        continue
+                    self._kept.keep(name, file.stamp, digest, text)
+                found[name] = one
+            except OSError as error:
+                reasons[name] = reason_of(error)
+            self._count()
+        digests, paths = list(unknown), [same[0].path for same in unknown.values()]
+        with closing(each(work, paths, processes(paths))) as outcomes:
+            for place, outcome in outcomes:
+                digest = digests[place]
+                self.worked_out += 1
+                for file in unknown[digest]:
+                    if isinstance(outcome, str):
+                        reasons[file.name] = outcome
+                    else:
+                        text = json.dumps({**outcome, "sha256": digest}, allow_nan=False)
+                        found[file.name] = taken(json.loads(text), file.name)
+                        self._kept.keep(file.name, file.stamp, digest, text)
+                    self._count()
+        self.left_out += [(_called(name), reasons[name]) for name in files if name in reasons]
+        for name in (name for name in files if name in found):
+            note_known(files[name], found[name].sha256)
+        return [found[name] for name in files if name in found]
+
+    def _count(self) -> None:
+        self._done += 1
+        self._progress(self._done, self.of)
+
+
+RUNS_WORTH_PROCESSES = 300
+"""Recordings from which on other cores help: ten seconds of work; a process needs two until it has begun."""
+
+
+def _processes_for(sessions: Sequence[Path]) -> int:
+    """Return how many processes are worth starting for sessions that have to be worked out."""
+    runs = sum(1 for path in sessions for _ in path.parent.glob("runs/*.csv"))
+    return min(os.cpu_count() or 1, len(sessions)) if runs >= RUNS_WORTH_PROCESSES else 1
+
+
+def _session_data(path: Path) -> dict[str, Any] | str:
+    """Return what is kept of a session, or why it cannot be read."""
+    from dbbstation.tasks.session_figures import session_figures  # noqa: PLC0415 - whoever opens an index does not wait for the compiler
+
+    try:
+        data = asdict(session_figures(path.parent))
+    except (StationError, OSError) as error:
+        return _why(error)
+    data["started"] = None if data["started"] is None else data["started"].isoformat()
+    return data
+
+
+def _model_data(path: Path, source_files: Sequence[Path]) -> dict[str, Any] | str:
+    """Return what is kept of a model, or why it cannot be read."""
+    from dbbstation.tasks.session_figures import model_figures  # noqa: PLC0415 - the same
+
+    try:
+        return asdict(model_figures(path, source_files))
+    except (StationError, OSError) as error:
+        return _why(error)
+
+
+def _why(error: StationError | OSError) -> str:
+    return reason_of(error) if isinstance(error, OSError) else _first_of(error)
+
+
+def _called(name: str) -> str:
+    """Return the name of a file, of a session that of its folder."""
+    return name.removesuffix(f"/{SESSION_FILE}")
+
+
+def _session_of(data: dict[str, Any], name: str) -> SessionFigures:
+    return session_from(data, _called(name))
+
+
+def _understood(text: str | None, taken: Callable[[dict[str, Any], str], _Kind], name: str) -> _Kind | None:
+    """Return what a kept text says; None where there is none, or where somebody else wrote it."""
+    try:
+        return None if text is None else taken(json.loads(text), name)
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return None
+
+
+def _first_of(error: StationError) -> str:
+    """Return what is wrong on one line; of many faults the first, and how many more there are."""
+    lines = str(error).splitlines()
+    return lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else "")
+
+
+def session_from(data: dict[str, Any], folder: str) -> SessionFigures:
+    """Return a session as the index keeps it, under the name that it has now.
+
+    Raises:
+        KeyError, TypeError, ValueError: it is none.
+    """
+    return SessionFigures(
+        name=folder,
+        sha256=data["sha256"],
+        machine=data["machine"],
+        started=None if data["started"] is None else datetime.fromisoformat(data["started"]),
+        runs=tuple(
+            RunFigures(
+                run["test"], run["direction"], run["circle"], tuple(Figure(**figure) for figure in run["figures"])
+            )
+            for run in data["runs"]
+        ),
+        bar=data["bar"],
+        programs=data["programs"],
+        notes=tuple(data["notes"]),
+        anchor=data["anchor"],
+    )
+
+
+def model_from(data: dict[str, Any], name: str) -> ModelFigures:
+    """Return a model as the index keeps it, under the name that it has now; errors as of `session_from`."""
+    parameters = tuple(ModelParameter(**parameter) for parameter in data["parameters"])
+    return ModelFigures(name, data["sha256"], dict(data["sessions"]), parameters)
+
+
+MOST_NAMED = 3
+"""Sessions that are named where many have the same remark."""
+
+
+def _gathered(sessions: Sequence[SessionFigures]) -> list[str]:
+    """Return remarks on sessions, each once."""
+    by_text: dict[str, list[str]] = {}
+    for one in sessions:
+        for note in one.notes:
+            by_text.setdefault(note, []).append(one.name)
+    notes = []
+    for note, names in by_text.items():
+        more = len(names) - MOST_NAMED
+        notes.append(f"{', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}: {note}")
+    return notes
+
+
+def _once(sessions: Iterable[SessionFigures]) -> tuple[list[SessionFigures], list[str]]:
+    """Return each session once, and remarks on its copies."""
+    first: dict[str, SessionFigures] = {}
+    notes = []
+    for one in sessions:
+        before = first.setdefault(one.sha256, one)
+        if before is not one:
+            notes.append(
+                f"{one.name} is a copy of {before.name}, by the SHA-256 of its session file: it is counted once"
+            )
+    return list(first.values()), notes
+
+
+def _check_tests(folder: Path, sessions: Sequence[SessionFigures], asked: Asked) -> None:
+    known = {run.test for one in sessions for run in one.runs}
+    unknown = [name for name in (*asked.tests, *asked.exclude) if name not in known]
+    if unknown:
+        what = f"no session has a test {', '.join(unknown)}"
+        raise InputError([Problem(str(folder), 0, 0, what, f"tests are {', '.join(sorted(known))}")])
+
+
+def _of_one_session(
+    models: Sequence[ModelFigures], sessions: Sequence[SessionFigures]
+) -> tuple[dict[str, ModelFigures], list[str]]:
+    """Return the model of each session by the session's hash, and remarks on models of no session."""
+    known = {one.sha256: one.name for one in sessions}
+    taken: dict[str, ModelFigures] = {}
+    notes = []
+    for model in sorted(models, key=lambda one: (-len(one.parameters), one.file)):
+        if len(model.sessions) != 1:
+            notes.append(
+                f"{model.file} comes from {len(model.sessions)} sessions together: it is no value of one of them"
+            )
+            continue
+        ((name, digest),) = model.sessions.items()
+        if digest not in known:
+            notes.append(f"{model.file} comes from a session {name} that is not here, or was changed since")
+        elif taken.setdefault(digest, model) is not model:
+            other = taken[digest].file
+            notes.append(f"{model.file} and {other} are of one session, {known[digest]}: {other} is taken")
+    return taken, notes

@@ -1,0 +1,129 @@
+"""Writing imported runs as a sealed session, tried out in a folder beside it first: what no command could use is not written."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, OutputError, Problem, TraceError
+from dbbstation.files.atomic import sync_folder
+from dbbstation.files.formats.mapping import mapping_text
+from dbbstation.files.recordings.entries import RunState
+from dbbstation.files.recordings.new_session import write_session
+from dbbstation.files.recordings.session import read_session
+from dbbstation.trace.cut import cut
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from dbbstation.files.formats.mapping import MappingFile
+    from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.files.recordings.session_details import SessionDetails
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.tasks.importing.runs import ImportedRun
+
+IMPORTED = "imported"
+"""Folder in the session with the files as they came, the mapping, and what the import was."""
+
+
+def originals(
+    tables: Mapping[Path, bytes], mapping: MappingFile, provenance: Provenance, statements: Sequence[str]
+) -> dict[str, str | bytes]:
+    """Return what a session keeps of its import, content by path in its folder.
+
+    Args:
+        tables: bytes of the files as they came.
+        mapping: that they were read by.
+        provenance: of the session.
+        statements: what was computed and assumed.
+    """
+    names: dict[str, bytes] = {}
+    for path, data in tables.items():
+        name, k = path.name, 2
+        while name in names:
+            name, k = f"{path.stem} ({k}){path.suffix}", k + 1
+        names[name] = data
+    kept: dict[str, str | bytes] = {f"{IMPORTED}/files/{name}": data for name, data in names.items()}
+    told = {**provenance.data(), "statements": list(statements)}
+    kept[f"{IMPORTED}/mapping.yaml"] = mapping_text(mapping)
+    kept[f"{IMPORTED}/provenance.json"] = json.dumps(told, indent=1, ensure_ascii=False) + "\n"
+    return kept
+
+
+@contextmanager
+def staged(
+    folder: Path,
+    machine: Machine,
+    plan: InlinePlan,
+    runs: Sequence[ImportedRun],
+    details: SessionDetails,
+    more: Mapping[str, str | bytes],
+    *,
+    dry: bool,
+) -> Iterator[Callable[[], None]]:
+    """Write a session beside its place, read it as every command does and cut every accepted run; give what puts it in its place.
+
+    Args:
+        folder: of the session.
+        machine: nominal.
+        plan: as run.
+        runs: in order.
+        details: what the session notes.
+        more: further files by path in its folder.
+        dry: it is never put in its place: it is written where the system keeps what is temporary.
+
+    Yields:
+        What puts the session in its place; it is gone where that was not called.
+
+    Raises:
+        InputError: lengths, times or angles that no circle of the plan has, by the file that they come from.
+        OutputError: the folder exists, or cannot be written.
+    """
+    if folder.exists():
+        raise OutputError("the session folder exists already", where=str(folder), remedy="choose another name")
+    if not folder.parent.is_dir():
+        what = f"cannot be written: there is no folder {folder.parent}"
+        raise OutputError(what, where=str(folder), remedy="make the folder, or name another")
+    beside = None if dry else folder.parent
+    try:
+        made = Path(tempfile.mkdtemp(prefix=f".{folder.name}", suffix=".new", dir=beside))
+    except OSError as error:
+        raise OutputError(f"cannot be written: {error.strerror}", where=str(folder), remedy="check the disk") from error
+    try:
+        written = made / folder.name
+        write_session(written, machine, plan, [one.run for one in runs], details, more)
+        _try_out(written, runs)
+
+        def put() -> None:
+            written.rename(folder)
+            sync_folder(folder.parent)
+
+        yield put
+    finally:
+        shutil.rmtree(made, ignore_errors=True)
+
+
+def _try_out(folder: Path, runs: Sequence[ImportedRun]) -> None:
+    session = read_session(folder)
+    faults: list[Problem] = []
+    for one, entry in zip(runs, session.runs, strict=True):
+        try:
+            recording = session.load(entry).recording
+            if entry.state is not RunState.REJECTED:
+                cut(recording, session.circle(entry))
+        except InputError as error:
+            # Columns have other names in the file that they come from, and rows other lines.
+            faults += [
+                replace(fault, file=one.file, line=0, what=f"as run {one.name}: {fault.what}")
+                for fault in error.problems
+            ]
+        except TraceError as error:
+            faults.append(Problem(one.file, 0, 0, f"as run {one.name}: {error.what}", error.remedy))
+    if faults:
+        raise InputError(faults)

@@ -1,0 +1,305 @@
+"""Recorded sessions as observations: where files, traces and NC programs come together for calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, Problem, StationError
+from dbbstation.files.recordings.entries import RunEntry, RunState
+from dbbstation.files.recordings.session import SessionFolder, read_session
+from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.machine.difference import differences, in_words
+from dbbstation.model.observation import Observation
+from dbbstation.nc.commanded import commanded_poses
+from dbbstation.sources.contract import Thermometer
+from dbbstation.tasks.telling import Telling, never, silent
+from dbbstation.trace.cut import cut
+from dbbstation.trace.thermometers import logged_curve
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from dbbstation.machine.geometry import Machine
+    from dbbstation.tasks.telling import Progress
+    from dbbstation.trace.circle import RawCircle
+    from dbbstation.trace.recording import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Accepted runs of one or more sessions of one machine.
+
+    Attributes:
+        machine: nominal machine, the same in all sessions but for its name, which is that of the first.
+        observations: accepted runs in the order they were recorded.
+        sessions: SHA-256 of each session file by session name.
+        warnings: what was found that does not spoil anything, and runs left out.
+    """
+
+    machine: Machine
+    observations: tuple[Observation, ...]
+    sessions: Mapping[str, str]
+    warnings: tuple[str, ...]
+
+
+Sessions = str | PathLike[str] | Iterable[str | PathLike[str]]
+"""One session or several: folders or session files."""
+
+READING = "reading runs"
+"""Stage of a task that reads sessions."""
+
+
+def load(
+    sessions: Sessions,
+    *,
+    tests: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
+) -> Recorded:
+    """Read sessions of one machine: their accepted runs, cut to circles, with what was commanded.
+
+    Args:
+        sessions: session folders or session files.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        progress: told how far it is.
+        stop: asked after each run whether to stop.
+        say: told what is noticed in the files.
+
+    Raises:
+        InputError: every fault of every file and trace; as `load_sessions`.
+        StoppedError: `stop` returned True.
+    """
+    return loaded(sessions, tests, exclude, Telling(progress, stop, say))
+
+
+def loaded(sessions: Sessions | Recorded, tests: Sequence[str], exclude: Sequence[str], telling: Telling) -> Recorded:
+    """Return sessions, read where they are not yet; of those that are, the tests that were chosen.
+
+    Args:
+        sessions: paths, or what `load` returned.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        telling: told how far it is and what was noticed.
+
+    Raises:
+        InputError: as `load_sessions`; no run of loaded sessions is left.
+    """
+    if not isinstance(sessions, Recorded):
+        found = load_sessions(paths_of(sessions), exclude, telling.counted(READING), tests)
+        telling.note(*found.warnings)
+        return found
+    if not tests and not exclude:
+        return sessions
+    left = [o for o in sessions.observations if (not tests or o.test in tests) and o.test not in exclude]
+    unknown = [name for name in (*tests, *exclude) if name not in {o.test for o in sessions.observations}]
+    if unknown or not left:
+        what = f"no session has a test {', '.join(unknown)}" if unknown else "no accepted run is left"
+        raise InputError([Problem(", ".join(sessions.sessions), 0, 0, what, "name others")])
+    return replace(sessions, observations=tuple(left))
+
+
+def paths_of(sessions: Sessions) -> list[Path]:
+    """Return sessions as paths."""
+    return [Path(sessions)] if isinstance(sessions, str | PathLike) else [Path(one) for one in sessions]
+
+
+def load_sessions(
+    paths: Sequence[Path],
+    exclude: Sequence[str] = (),
+    progress: Callable[[int, int], None] = lambda _done, _of: None,
+    only: Sequence[str] = (),
+) -> Recorded:
+    """Read sessions, cut their accepted runs to circles and attach what was commanded.
+
+    Args:
+        paths: session folders or session files.
+        exclude: names of tests to leave out.
+        progress: told how many runs of a session, of how many, are read.
+        only: names of tests to take; empty for all.
+
+    Raises:
+        InputError: every fault of every file and trace; a session that is given twice; sessions of different
+            machines; no accepted run; a test that is named and that no session has.
+    """
+    sessions = _unique_names([read_session(path) for path in paths])
+    warnings = _check_one_machine(sessions)
+    _check_no_copies(sessions)
+    every = {test for session in sessions for test in session.plan.tests}
+    check_named(sessions, every, exclude, " to exclude")
+    check_named(sessions, every, only)
+    exclude = [*exclude, *(test for test in every if only and test not in only)]
+    observations: list[Observation] = []
+    problems: list[Problem] = []
+    logs: dict[str, list[tuple[float, Recording]]] = {}
+    for session in sessions:
+        wanted = [run for run in session.in_state(RunState.ACCEPTED) if run.test not in exclude]
+        unjudged = session.in_state(RunState.COMPLETE, RunState.RECORDING)
+        warnings += [f"{session.name}: run {run.label} is {run.state}, not accepted: left out" for run in unjudged]
+        logged: list[tuple[float, Recording]] = []
+        for run, read in zip(wanted, session.load_all(wanted, progress), strict=True):
+            warnings += [str(warning) for warning in (*read.warnings, *session.loss(run, read.recording))]
+            began = session.started_s(run)
+            if began is not None and read.recording.temperature_degc:
+                logged.append((began, read.recording))
+            try:
+                lost = 0 if run.counts is None else run.counts.lost
+                raw = cut(replace(read.recording, name=str(run.path)), session.circle(run), counted_lost=lost)
+                observations.append(_observation(session, run, raw))
+            except InputError as error:
+                problems += error.problems
+            except StationError as error:
+                problems.append(Problem(str(run.path), 0, 0, error.what, error.remedy))
+        warnings += _under_spindle(session, wanted)
+        logs[session.name] = [*logged, *_left_out(session, exclude)] if logged else []
+    if problems:
+        raise InputError(problems)
+    if not observations:
+        places = ", ".join(str(session.folder) for session in sessions)
+        raise InputError([Problem(places, 0, 0, "no accepted run is left", "accept runs, or exclude fewer tests")])
+    observations = _with_thermometers(_with_shared_balls(observations, sessions), logs)
+    hashes = {session.name: session.sha256 for session in sessions}
+    return Recorded(sessions[0].machine, tuple(observations), hashes, tuple(warnings))
+
+
+def _observation(session: SessionFolder, run: RunEntry, raw: RawCircle) -> Observation:
+    observation = Observation(
+        run.test, run.repeat, raw, session.setup(run, raw.temperature_degc), session.started_s(run)
+    )
+    if run.program is None:
+        return observation
+    path, faults = run.program.path, list[Problem]()
+    data = read_bytes(path, faults, is_input=False)  # its hash stands in the session
+    text = None if data is None else decode(data, str(path), faults)
+    if text is None:
+        raise InputError(faults)
+    return replace(observation, commanded=commanded_poses(text, str(path), observation))
+
+
+def _under_spindle(session: SessionFolder, runs: Sequence[RunEntry]) -> list[str]:
+    """Say which centres tell nothing of the machine's place: those about balls put up under the spindle [CAL III-A]."""
+    tests = dict.fromkeys(run.test for run in runs if not session.plan.tests[run.test].ball.place_known)
+    if not tests:
+        return []
+    where = "every test" if len(tests) == len({run.test for run in runs}) else f"test {', '.join(tests)}"
+    what = f"{session.name}: the ball was put up under the spindle in {where}"
+    shows = (
+        "centre deviations there, and rms values with them, show how it was put up, less what a micrometer read of that"
+    )
+    return [f"{what}: {shows}, and not how far the machine is off; circularity counts"]
+
+
+def _with_shared_balls(observations: Sequence[Observation], sessions: Sequence[SessionFolder]) -> list[Observation]:
+    """Give a ball that two sessions have from one CMM sheet one name, so that it has one error in both of them."""
+    names: dict[tuple[object, ...], str] = {}
+    of = {session.name: session for session in sessions}
+    shared = []
+    for observation in observations:
+        ball = of[observation.setup.session].plan.tests[observation.test].ball
+        sheet = (ball.name, ball.bore, ball.holder, ball.centre_mm, ball.uncertainty_mm)
+        name = names.setdefault(sheet, observation.setup.ball)
+        shared.append(replace(observation, setup=replace(observation.setup, ball=name)))
+    return shared
+
+
+def _with_thermometers(
+    observations: Sequence[Observation], logs: Mapping[str, Sequence[tuple[float, Recording]]]
+) -> list[Observation]:
+    """Tell every run what the thermometers of its session showed in all runs: those that all runs in use have.
+
+    Args:
+        observations: runs in use.
+        logs: of each session, when runs with thermometers began [s] and what they hold, those that were left out too: leaving
+            one out must not change where growth is counted from.
+    """
+    of = {}
+    for session, runs in logs.items():
+        known = (set(o.raw.temperature_degc) for o in observations if o.setup.session == session)
+        names = sorted(set.intersection(*known)) if runs else []
+        of[session] = {name: _thermometer(name, runs) for name in names}
+    return [replace(o, setup=replace(o.setup, thermometers=of[o.setup.session])) for o in observations]
+
+
+def _thermometer(name: str, runs: Sequence[tuple[float, Recording]]) -> Thermometer:
+    logs = [(began + run.t_s, run.temperature_degc) for began, run in runs]
+    return Thermometer(*logged_curve([(time_s, degc[name]) for time_s, degc in logs if name in degc]))
+
+
+def _left_out(session: SessionFolder, exclude: Sequence[str]) -> list[tuple[float, Recording]]:
+    """Accepted runs of tests that are left out, as far as they can be read, for their thermometers."""
+    found = []
+    for run in session.in_state(RunState.ACCEPTED):
+        began = session.started_s(run)
+        if run.test not in exclude or began is None:
+            continue
+        try:
+            found.append((began, session.load(run).recording))
+        except InputError:
+            continue  # its faults are why it was left out
+    return found
+
+
+def _unique_names(sessions: list[SessionFolder]) -> list[SessionFolder]:
+    """Number sessions whose folders have one name, so that their mountings are not taken for the same."""
+    names = [session.name for session in sessions]
+    return [
+        replace(session, name=f"{session.name} ({names[: k + 1].count(session.name)})")
+        if names.count(session.name) > 1
+        else session
+        for k, session in enumerate(sessions)
+    ]
+
+
+def _check_no_copies(sessions: Sequence[SessionFolder]) -> None:
+    """Refuse a session and its copy: they would count as two measurements, and uncertainties come out too small."""
+    first: dict[str, SessionFolder] = {}
+    for session in sessions:
+        other = first.setdefault(session.sha256, session)
+        if other is not session:
+            what = f"this is the same session as {other.folder}"
+            raise InputError([Problem(str(session.folder), 0, 0, what, "give every session once")])
+
+
+def _check_one_machine(sessions: Sequence[SessionFolder]) -> list[str]:
+    """Refuse sessions whose machine files disagree; only the name may differ, and that is told.
+
+    Whatever the file holds decides something: joints and reference lengths the prediction, masses and compliance what
+    gravity does, tolerances the prior, travel what is proposed and exported.
+    """
+    first = sessions[0]
+    told, faults = [], []
+    for other in sessions[1:]:
+        serials = first.serial_number, other.serial_number
+        if all(serials) and serials[0] != serials[1]:
+            what = f"it is of machine {serials[1]}, {first.folder} of machine {serials[0]}"
+            faults.append(Problem(str(other.folder), 0, 0, what, "fit the sessions of one machine together"))
+        elif unlike := differences(first.machine, other.machine):
+            what = (
+                f"its machine file is not that of {first.folder}: {in_words(unlike)}, in {first.name} and {other.name}"
+            )
+            remedy = (
+                "fit sessions together only where the control had the same joints and reference lengths; where it had, "
+                "correct the wrong machine.yaml, so that both say the same"
+            )
+            faults.append(Problem(str(other.machine_path), 0, 0, what, remedy))
+        elif first.machine.name != other.machine.name:
+            names = f"{first.machine.name} in {first.name}, {other.machine.name} in {other.name}"
+            told.append(f"the machine files have two names ({names}) and agree in all values: taken for one machine")
+    if faults:
+        raise InputError(faults)
+    return told
+
+
+def check_named(sessions: Sequence[SessionFolder], every: set[str], named: Sequence[str], why: str = "") -> None:
+    """Refuse names of tests that no session has."""
+    unknown = [name for name in named if name not in every]
+    if unknown:
+        what = f"no session has a test {', '.join(unknown)}{why}"
+        known = f"tests are {', '.join(sorted(every))}"
+        raise InputError([Problem(str(sessions[0].folder), 0, 0, what, known)])

@@ -1,0 +1,75 @@
+"""Models as tasks take them: loaded, as a file, or as part of a result."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from dbbstation.files.formats.model import read_model as read_model_file
+from dbbstation.files.formats.model import write_model as write_model_file
+from dbbstation.files.own_sources import every_source
+from dbbstation.model.identified import IdentifiedModel
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.sources.contract import ErrorSource
+
+
+class HasModel(Protocol):
+    """A result with a model, such as that of `calibrate`."""
+
+    @property
+    def model(self) -> IdentifiedModel:
+        """The model."""
+
+
+Model = str | PathLike[str] | IdentifiedModel | HasModel
+"""A file, a model, or a result that has one."""
+
+
+def model_of(model: Model, known: Mapping[str, ErrorSource] | None = None) -> IdentifiedModel:
+    """Return a model, read where it is a file.
+
+    Args:
+        model: a file, a model, or a result that has one.
+        known: every error source by name; None: the package's and those of installed packages.
+
+    Raises:
+        InputError: every fault of the file with its place.
+    """
+    if isinstance(model, str | PathLike):
+        return read_model_file(Path(model), every_source() if known is None else known)
+    return model if isinstance(model, IdentifiedModel) else model.model
+
+
+def read_model(path: str | PathLike[str], *, source_files: Sequence[str | PathLike[str]] = ()) -> IdentifiedModel:
+    """Read a model that `calibrate` or `diagnose` wrote.
+
+    Args:
+        path: of the file.
+        source_files: Python files with error sources of one's own that it names; they are executed.
+
+    Raises:
+        InputError: every fault of the files with its place.
+    """
+    return read_model_file(Path(path), every_source([Path(file) for file in source_files]))
+
+
+def write_model(
+    path: str | PathLike[str], model: Model, *, provenance: Provenance | None = None, force: bool = False
+) -> None:
+    """Write a model, whole or not at all.
+
+    Args:
+        path: of the file.
+        model: a model, or the result of `calibrate` or `diagnose`.
+        provenance: where it comes from; None: the file does not say.
+        force: overwrite an existing file.
+
+    Raises:
+        OutputError: the file exists and `force` is not given, or the disk refuses.
+    """
+    write_model_file(Path(path), model_of(model), provenance=provenance, force=force)

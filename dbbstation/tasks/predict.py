@@ -1,0 +1,103 @@
+"""Predict: actual poses for commanded ones, with their uncertainties."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.files.formats.number_language import PLAIN
+from dbbstation.files.formats.pose_table import PoseTable, read_poses, write_poses
+from dbbstation.files.provenance import refuse_existing_table
+from dbbstation.machine.travel import check_travel
+from dbbstation.model.uncertainty import predicted_poses
+from dbbstation.results.prediction import PredictionResult, prediction_result
+from dbbstation.tasks.models import model_of
+from dbbstation.tasks.provenance import from_python
+from dbbstation.tasks.telling import Telling, never, silent
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import ArrayLike
+
+    from dbbstation.files.formats.number_language import NumberLanguage
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.tasks.models import Model
+    from dbbstation.tasks.telling import Progress
+
+STAGES = {"reading": 0, "travel": 32, "predicting": 48, "writing": 67}
+"""Stages of a prediction, and the share of its time that has passed by then [%]."""
+
+AXES = 6
+
+
+def predict(
+    model: Model,
+    poses: ArrayLike | str | PathLike[str],
+    *,
+    out: str | PathLike[str] | None = None,
+    force: bool = False,
+    numbers: NumberLanguage = PLAIN,
+    known: Mapping[str, ErrorSource] | None = None,
+    provenance: Callable[[], Provenance] = from_python,
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+) -> PredictionResult:
+    """Predict the actual poses for commanded ones, with standard uncertainties.
+
+    Args:
+        model: a model, a file of one, or the result of `calibrate` or `diagnose`.
+        poses: commanded X, Y, Z [mm] and A, B, C [deg]: numbers of any type, shape (n, 6) or (6,), or a CSV file with the columns
+            x_mm, y_mm, z_mm, a_deg, b_deg, c_deg.
+        out: CSV file to write; None: none.
+        force: overwrite it.
+        numbers: how numbers of a CSV file are written.
+        known: every error source by name, for a file of a model; None: the package's and those of installed packages.
+        provenance: asked, when all is read, where the file comes from.
+        progress: told each stage.
+        stop: asked at each stage whether to stop.
+
+    Raises:
+        InputError: faults of files.
+        TravelError: a pose outside the machine's travel.
+        KinematicsError: a pose that the actual machine cannot take.
+        ModelError: a source needs more than poses.
+        OutputError: `out` exists and `force` is not given.
+        ValueError: numbers of another shape.
+        StoppedError: `stop` returned True.
+    """
+    telling = Telling(progress, stop)
+    if out is not None:
+        refuse_existing_table(Path(out), force=force)
+    identified = model_of(model, known)
+    telling.stage("reading poses")
+    table, where = _table(poses, numbers)
+    telling.stage("travel")
+    check_travel(identified.model.machine, table.poses, where=where)
+    actual, uncertainty_mm = predicted_poses(identified, table.poses, telling.counted("predicting pose"))
+    if out is not None:
+        telling.stage("writing")
+        write_poses(
+            Path(out),
+            actual,
+            uncertainty_mm,
+            table.others,
+            provenance(),
+            why_unknown=identified.why_unknown,
+            force=force,
+        )
+    return prediction_result(identified, table.poses, actual, uncertainty_mm, None if out is None else str(out))
+
+
+def _table(poses: ArrayLike | str | PathLike[str], numbers: NumberLanguage) -> tuple[PoseTable, str]:
+    """Return commanded poses, and where they stand."""
+    if isinstance(poses, str | PathLike):
+        return read_poses(Path(poses), numbers), str(poses)
+    given = np.atleast_2d(np.asarray(poses, dtype=np.float64))
+    if given.ndim != 2 or given.shape[1] != AXES or not np.isfinite(given).all():  # noqa: PLR2004 - rows and columns
+        raise ValueError(f"poses are rows of six finite numbers, X, Y, Z [mm], A, B, C [deg], not {given.shape}")
+    return PoseTable(given, {}), "poses"

@@ -1,0 +1,103 @@
+"""What writing compensated programs shares: the model with its origin, files by hash, the text of a program."""
+
+from __future__ import annotations
+
+import hashlib
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.source_text import decode, read_bytes
+from dbbstation.nc.compensate import Prefer
+from dbbstation.nc.export import Inverse
+from dbbstation.results.prediction import unknown_causes
+from dbbstation.tasks.models import model_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from dbbstation.files.provenance import Provenance
+    from dbbstation.sources.contract import ErrorSource
+    from dbbstation.tasks.models import Model
+
+
+def inverse_of(
+    model: Model,
+    known: Mapping[str, ErrorSource] | None = None,
+    *,
+    time_s: float | None,
+    largest_mm: float,
+    prefer: str | None,
+    accept_chord_um: float | None,
+) -> Inverse:
+    """Return the model to compensate with; the header of programs will name its file and its sessions by hash.
+
+    Args:
+        model: a model, a file of one, or a result that has one.
+        known: every error source by name, for a file.
+        time_s: start of a program after the session's start [s].
+        largest_mm: greatest correction that is applied [mm].
+        prefer: what to keep where chord error and feed cannot both be kept.
+        accept_chord_um: chord error that is accepted where the one asked for is missed [µm].
+
+    Raises:
+        InputError: every fault of the file with its place.
+        ValueError: `prefer` is none of its words.
+    """
+    identified = model_of(model, known)
+    origin = {"model file": hashed(Path(model))} if isinstance(model, str | PathLike) else {}
+    origin |= {f"cause unknown {k}": name for k, name in enumerate(unknown_causes(identified.model), start=1)}
+    origin |= {f"session {name}": f"sha256 {digest}" for name, digest in identified.sessions.items()}
+    keeping = None if prefer is None else Prefer(prefer)
+    return Inverse(identified.model, origin, time_s, identified, largest_mm, keeping, accept_chord_um)
+
+
+def origin_of(named: Mapping[str, Path], inverse: Inverse | None, provenance: Provenance) -> dict[str, str]:
+    """Return what the header of a program says of its origin: files by their part in it, program, command, other inputs.
+
+    Args:
+        named: the files that were given, by what they are.
+        inverse: the model to compensate with, which says in the header where it comes from by itself.
+        provenance: of the command or script.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    files = {what: hashed(path) for what, path in named.items()}
+    return {**files, **provenance.comments({**files, **({} if inverse is None else inverse.origin)})}
+
+
+def hashed(path: Path) -> str:
+    """Return a file's name and SHA-256, without its folder: the same file gives the same program anywhere.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    return f"{path.name}, sha256 {sha256_of(path)}"
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file; raises InputError where it cannot be read."""
+    return hashlib.sha256(_content(path)).hexdigest()
+
+
+def program_text(path: Path) -> str:
+    """Return the text of a program.
+
+    Raises:
+        InputError: it cannot be read, or is not UTF-8.
+    """
+    faults: list[Problem] = []
+    text = decode(_content(path), str(path), faults)
+    if text is None:
+        raise InputError(faults)
+    return text
+
+
+def _content(path: Path) -> bytes:
+    faults: list[Problem] = []
+    data = read_bytes(path, faults)
+    if data is None:
+        raise InputError(faults)
+    return data

@@ -1,0 +1,162 @@
+"""From one session folder, or one model file, to what a history knows of it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from dbbstation.circles.budget import budgets
+from dbbstation.circles.quantity import Quantity
+from dbbstation.files.formats.model import read_model
+from dbbstation.files.gateway import digest_of
+from dbbstation.files.inputs import input_book
+from dbbstation.files.own_sources import every_source
+from dbbstation.files.recordings.anchors import anchor_of
+from dbbstation.history.order import moment_words
+from dbbstation.history.record import Figure, ModelFigures, ModelParameter, RunFigures, SessionFigures
+from dbbstation.plan.tolerance import CircleFigure
+from dbbstation.results.tolerances import TOLERATED, tolerated_circles
+from dbbstation.sources.contract import Owner
+from dbbstation.tasks.circles import load_circles
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    from dbbstation.files.recordings.entries import RunEntry
+    from dbbstation.files.recordings.session import SessionFolder
+    from dbbstation.plan.circle import Circle
+    from dbbstation.results.circles import MeasuredCircle
+    from dbbstation.results.tolerances import ToleratedCircle
+
+
+def session_figures(folder: Path) -> SessionFigures:
+    """Read a session and work out the figures of its accepted runs.
+
+    Args:
+        folder: of the session.
+
+    Raises:
+        InputError: every fault of its files; no accepted run.
+    """
+    with input_book():  # recordings are inputs of what is kept, not of the command that happens to read them
+        found = load_circles([folder], TOLERATED)
+    session = found.sessions[0]
+    shown = [one for one in found.circles if one.analysis is not None]
+    runs = tuple(map(_figures, shown, tolerated_circles(shown)))
+    moments = [one.entry.started for one in found.circles if one.entry.started is not None]
+    return SessionFigures(
+        name=session.name,
+        sha256=session.sha256,
+        machine=session.serial_number or session.machine.name,
+        started=min(moments, default=None),
+        runs=runs,
+        bar="" if session.bar is None else session.bar.serial_number,
+        programs=_programs([one.entry for one in found.circles]),
+        notes=(
+            *(note.removeprefix(f"{session.name}: ") for note in found.warnings),
+            *_clock(session.runs),
+            *_lacks(session, found.circles),
+        ),
+        anchor=anchor_of(session.seal),
+    )
+
+
+def _figures(one: MeasuredCircle, tolerated: ToleratedCircle) -> RunFigures:
+    analysis = one.analysis
+    if analysis is None:
+        raise ValueError("a run without a circle has no figures")
+    known = budgets(analysis, one.known, (Quantity.X, Quantity.Y))
+    x_mm, y_mm = analysis.centre_mm
+    g, centre, radial = (
+        tolerated.sizes[figure]
+        for figure in (CircleFigure.CIRCULAR_DEVIATION, CircleFigure.CENTRE_DEVIATION, CircleFigure.MEAN_RADIAL_ERROR)
+    )
+    return RunFigures(
+        test=one.entry.test,
+        direction=str(one.entry.direction),
+        circle=_in_words(analysis.raw.circle),
+        figures=(
+            Figure("G", g.um, g.known_um),
+            Figure("X", 1e3 * x_mm, known[Quantity.X].known_um),
+            Figure("Y", 1e3 * y_mm, known[Quantity.Y].known_um),
+            Figure("R", analysis.mean_radial_error_um, radial.known_um),
+            Figure("C", centre.um, centre.known_um),
+        ),
+    )
+
+
+def _as_printed(parameter: ModelParameter) -> ModelParameter:
+    """Return a parameter as `calibrate` prints it: lengths in micrometres, its name without its unit."""
+    name = parameter.name.removesuffix("_mm").replace("_", " ")
+    if parameter.unit != "mm":
+        return replace(parameter, name=name)
+    u_um = None if parameter.u is None else 1e3 * parameter.u
+    return replace(parameter, name=name, value=1e3 * parameter.value, u=u_um, unit="µm")
+
+
+def _in_words(circle: Circle) -> str:
+    """Return what two circles share where their figures are comparable: place, bar, tilt, elevation and feed."""
+    place = " ".join(f"{axis}{round(value)}" for axis, value in zip("XYZ", circle.ball_mm, strict=True))
+    tilt = " ".join(f"{axis}{value:g}" for axis, value in zip("ABC", circle.tilt_deg, strict=True) if value)
+    raised = f", bar raised {circle.elevation_deg:g}°" if circle.elevation_deg else ""
+    return f"bar {circle.bar_mm:g} mm at {place}{', ' + tilt if tilt else ''}{raised}, {circle.feed_mm_min:g} mm/min"
+
+
+def _programs(runs: Iterable[RunEntry]) -> str:
+    """Return a hash over what was commanded instead of the plan's circles: models of the programs, or themselves."""
+    found = sorted({run.program.model_sha256 or run.program.sha256 for run in runs if run.program is not None})
+    return hashlib.sha256("\n".join(found).encode()).hexdigest()[:16] if found else ""
+
+
+def _clock(runs: Sequence[RunEntry]) -> list[str]:
+    """Say where a run started before the one that is listed before it."""
+    dated = [run for run in runs if run.started is not None]
+    return [
+        f"run {after.label} is dated {moment_words(after.started)}, before run {before.label} that was started earlier: was the "
+        "clock set while it was measured?"
+        for before, after in pairwise(dated)
+        if before.started is not None and after.started is not None and after.started < before.started
+    ]
+
+
+def _lacks(session: SessionFolder, circles: Sequence[MeasuredCircle]) -> list[str]:
+    """Say what a session has not, where its figures mean less for it."""
+    found = []
+    directions = Counter(str(one.entry.direction) for one in circles)
+    if len(directions) == 1:
+        found.append(f"all its runs are {next(iter(directions))}")
+    warm = any(one.analysis is not None and one.analysis.raw.temperature_degc for one in circles)
+    if session.ambient_temp_c is None and not warm:
+        found.append("no temperature is noted: U lacks what the bar has grown by")
+    if not session.serial_number:
+        found.append(f"no serial number is noted: it counts for a machine called {session.machine.name}")
+    return found
+
+
+def model_figures(path: Path, source_files: Sequence[Path] = ()) -> ModelFigures:
+    """Read the machine's parameters of a model.
+
+    Args:
+        path: of its file.
+        source_files: with error sources that it may name.
+
+    Raises:
+        InputError: every fault of the file.
+    """
+    with input_book():
+        identified = read_model(path, every_source(source_files))
+    u = identified.uncertainties_between_sessions
+    parameters = []
+    for fitted in identified.model.sources:
+        if fitted.source.belongs_to is not Owner.MACHINE:
+            continue
+        for parameter, value in zip(fitted.source.parameters(identified.model.machine), fitted.values, strict=True):
+            sure = u.get((fitted.source.name, fitted.shared, parameter.name)) or None  # zero: held at nominal
+            parameters.append(
+                _as_printed(ModelParameter(fitted.source.name, parameter.name, float(value), sure, parameter.unit))
+            )
+    return ModelFigures(path.name, digest_of(path), dict(identified.sessions), tuple(parameters))

@@ -1,0 +1,28 @@
+"""Keys of `--json` stay: what every command prints has the keys, types and words that the committed files say."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.cli.golden_json import GOLDEN, keys_of, lines_of, without_place
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory, run):
+    """Keys of what every command printed, by the name of its golden file; in their order, since some take what others wrote."""
+    return {name: run(*arguments, "--json") for name, arguments in lines_of(tmp_path_factory.mktemp("golden")).items()}
+
+
+@pytest.mark.slow
+def test_every_command_prints_the_keys_that_others_rely_on(printed):
+    failed = {name: outcome.err for name, outcome in printed.items() if outcome.code != 0}
+    assert failed == {}
+    found = {name: keys_of(without_place(outcome.data)) for name, outcome in printed.items()}
+    assert sorted(found) == sorted(path.stem for path in GOLDEN.glob("*.txt"))
+    for name, keys in found.items():
+        assert keys.splitlines() == (GOLDEN / f"{name}.txt").read_text(encoding="utf-8").splitlines(), name
+
+
+def test_a_key_that_is_renamed_is_noticed():
+    assert keys_of({"runs": [{"g_um": 1.0}]}) != keys_of({"runs": [{"g_mm": 1.0}]})
+    assert keys_of({"unit": "µm"}) != keys_of({"unit": "mm"})

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dbbstation.catalogue import in_words
+from dbbstation.catalogue import in_words, line_in
 from dbbstation.diagnosis.simulator.contract import Simulator
 from dbbstation.diagnosis.simulator.model import Model, Output, Parameter, Port, Recorded
 from dbbstation.diagnosis.simulator.own import PortSource
@@ -19,7 +19,6 @@ from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_sim
 from dbbstation.files.gateway import content_of
 from dbbstation.files.own_classes import classes_in_files
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
-from dbbstation.report.sheet import line_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,12 +9,11 @@ from contextlib import ExitStack
 from time import monotonic
 from typing import TYPE_CHECKING
 
-from dbbstation.catalogue import in_words
+from dbbstation.catalogue import in_words, line_in
 from dbbstation.diagnosis.simulator.ports import simulated
 from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
 from dbbstation.errors import CalibrationError
 from dbbstation.processes import deaf, processes
-from dbbstation.report.sheet import line_in
 from dbbstation.simulators.loading import simulator_of
 
 if TYPE_CHECKING:

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.source_files import source_file_option
+from dbbstation.tasks.chosen import chosen_of
 
 
 @click.command()

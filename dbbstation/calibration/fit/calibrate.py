@@ -185,7 +185,7 @@ def calibrate(
         else:
             solution = solve(blocks, layout.known, noise.effective, held)
         update = layout.nominal + solution.x
-        sigma = np.sqrt(np.diag(solution.covariance))
+        sigma = np.sqrt(solution.variance)
         settled_at = np.maximum(CONVERGED * layout.known.scale, CONVERGED_SIGMA * sigma)
         step = update - x
         change = float(np.abs(step / settled_at).max(initial=0.0))

@@ -203,7 +203,7 @@ class DryRun:
 
 
 @dataclass(frozen=True)
-class Seen:
+class SampledPlan:
     """What an instrument sees of a plan.
 
     Attributes:
@@ -217,14 +217,16 @@ class Seen:
     notes: list[str]
 
 
-def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[Seen]:
+def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[SampledPlan]:
     from dbbstation.cli.sampling import sampling_data, sampling_notes
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.instrument.library import load_instrument
 
     protocol = load_instrument(instrument, profile)
     read = [(file, read_plan(file)) for file in plans]
-    return [Seen(file, sampling_data(plan, protocol), list(sampling_notes(plan, protocol))) for file, plan in read]
+    return [
+        SampledPlan(file, sampling_data(plan, protocol), list(sampling_notes(plan, protocol))) for file, plan in read
+    ]
 
 
 def _check_one(file: Path, known: Mapping[str, ErrorSource]) -> Checked:

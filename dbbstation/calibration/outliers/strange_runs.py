@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
-from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Kind, Outlier
+from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Outlier, OutlierKind
 from dbbstation.calibration.outliers.run_remainder import left_of, rms_um, without_shift
 from dbbstation.inference.square_root import solve
 
@@ -119,7 +119,7 @@ def leave_out(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> 
 
 def _looks_like(
     calibration: Calibration, others: Sequence[Observation], run: Observation, residual: NDArray[np.float64]
-) -> tuple[Kind, str]:
+) -> tuple[OutlierKind, str]:
     """What a run that does not belong most resembles."""
     noise = _strange_from_um(np.array([rms_um(left) for _, left in left_of(calibration)]))
     best, where = np.inf, run
@@ -134,15 +134,18 @@ def _looks_like(
     if best < noise:
         what = f"it is what test {where.test} {where.raw.circle.direction} should read, to {best:.1f} µm"
         if where.test == run.test:
-            return Kind.WRONG_PLACE, f"{what}; was the other direction run?"
-        return Kind.WRONG_PLACE, f"{what}; the ball stood in that bore, or the run was filed under the wrong test"
+            return OutlierKind.WRONG_PLACE, f"{what}; was the other direction run?"
+        return (
+            OutlierKind.WRONG_PLACE,
+            f"{what}; the ball stood in that bore, or the run was filed under the wrong test",
+        )
     step, at = _step(residual)
     if rms_um(_without_step(residual, at)) < 0.5 * rms_um(residual - residual.mean()):
         return (
-            Kind.RUN,
+            OutlierKind.RUN,
             f"the reading steps by {1e3 * step:.1f} µm at {run.raw.theta_deg[at]:.0f}°; bar or holder was bumped",
         )
-    return Kind.RUN, "no circle of this machine and no step; a bump, a loose ball, or another machine's run?"
+    return OutlierKind.RUN, "no circle of this machine and no step; a bump, a loose ball, or another machine's run?"
 
 
 def _step(residual: NDArray[np.float64]) -> tuple[float, int]:

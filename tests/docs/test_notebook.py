@@ -1,4 +1,4 @@
-"""The notebook of the documentation runs, says what is true of what it invents, and shows what it prints."""
+"""The notebooks of the documentation run, say what is true of what they invent, and show what they print."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ import pytest
 
 from tests.docs.notebooks import executed, printed
 
-NOTEBOOK = Path(__file__).resolve().parents[2] / "docs" / "mismatch.ipynb"
+NOTEBOOKS = sorted((Path(__file__).resolve().parents[2] / "docs").glob("*.ipynb"))
 
 
 @pytest.mark.slow
-def test_the_notebook_prints_what_it_shows(tmp_path, monkeypatch):
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_notebook_prints_what_it_shows(notebook, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    shown = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
+    shown = json.loads(notebook.read_text(encoding="utf-8"))
     code = [cell for cell in shown["cells"] if cell["cell_type"] == "code"]
     for before, now in zip(code, executed(shown), strict=True):
         assert printed(now) == printed(before)

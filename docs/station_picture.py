@@ -12,6 +12,7 @@ import asyncio
 import html
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,19 +24,28 @@ from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.reading import Reading
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.plan.circle import Direction
+from dbbstation.quality.conformity import Conformity
 from dbbstation.service.board import SequenceOpened
+from dbbstation.service.front import Front
+from dbbstation.service.memory import Memory
+from dbbstation.service.operated import Answered, Operated, read_operated
 from dbbstation.sources.contract import Fitted
 from dbbstation.sources.registry import sources_named
 from dbbstation.station.commands import Accept, Start
+from dbbstation.station.events import StateChanged
 from dbbstation.station.run_record import recording_of
 from dbbstation.station.schedule import Schedule
 from dbbstation.station.sequencer import Sequencer
+from dbbstation.station.states import State
+from dbbstation.tui.app import StationApp
+from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
 from dbbstation.tui.shown import Shown
-from dbbstation.tui.still import still_svg
+from dbbstation.tui.still import Happened, still_svg
 from dbbstation.virtual.machine import VirtualMachine
 from dbbstation.virtual.truth import random_kinematics
 
 if TYPE_CHECKING:
+    from dbbstation.service.choice import Choice
     from dbbstation.station.events import Event
 
 SHARE_OF_RANDOM = 0.06
@@ -84,10 +94,65 @@ SCREENS = {"station": (), "station-overview": ("o",), "station-large": ("f",)}
 
 def picture(screen: str = "station") -> str:
     """Return a screen as SVG, the same each time."""
-    svg = asyncio.run(still_svg(*happened(), press=SCREENS[screen]))
+    svg = asyncio.run(operator_svg(screen) if screen in OPERATOR else still_svg(*happened(), press=SCREENS[screen]))
     # Names that Rich makes from a hash of the content, so that two pictures can stand in one page.
     svg = re.sub(r"terminal-\d+-", "station-", svg)
     return _BLANKS_FIRST.sub(_moved, svg)
+
+
+class _Job(Operated):
+    """A job whose session has the same name each day."""
+
+    def choice(self) -> Choice:
+        return replace(super().choice(), folder=Path("monday-check-2026-11-23"), operator="Ann")
+
+
+class _Answer:
+    """An answer that is there at once: that of the example."""
+
+    def look(self) -> Answered:
+        kept = "Every circle is within the shop's tolerances."
+        keep = "The circles need no correction. Measure again after a crash, a repair or a move of the machine."
+        return Answered(Conformity.WITHIN, (kept,), (keep,), Path("monday-check-2026-11-23-results/report.html"))
+
+    def close(self) -> None:
+        pass
+
+
+OPERATOR = ("operator-job", "operator-set-up", "operator-circle", "operator-answer")
+"""Screens of a job, in the order in which an operator sees them."""
+
+
+async def operator_svg(screen: str) -> str:
+    """Return one of the operator's screens as SVG."""
+    example = shipped_folder("fixtures") / "jobs" / "virtual.yaml"
+    changed = {
+        "name": "Monday check of hexapod 7",
+        "machine": "hexapod-7.yaml",
+        "plan": "ten-minute-check.yaml",
+        "instrument": "heidenhain-nd281b",
+        "port": "/dev/ttyUSB0",
+        "may_change": ("operator", "temperature"),
+    }
+    shown, events = happened()
+    set_up = next(k for k, event in enumerate(events) if isinstance(event, StateChanged) and event.state is State.ARMED)
+    runner = Happened(events[:set_up] if screen == "operator-set-up" else events)
+    job = _Job(example, read_operated(example).job)
+    front = Front(Path(), Memory(Path("none.json")))
+    app = StationApp(shown, runner, clock=lambda: 0.0, front=front, operated=job)
+    async with app.run_test(size=(100, 30)) as pilot:
+        if screen == "operator-job":
+            top = JobScreen(app, front, replace(job, job=job.job.model_copy(update=changed)))
+            top.search = lambda: top._found(job.choice())  # noqa: SLF001 - nothing is looked for
+            app.push_screen(top)
+        elif screen == "operator-answer":
+            app.push_screen(AnswerScreen(_Answer(), lambda: None))
+        else:
+            app.push_screen(OperateScreen(app, shown))
+        for _ in range(4):
+            await pilot.pause()
+            app.look()
+        return app.export_screenshot(title="dbbstation station --job")
 
 
 _BLANKS_FIRST = re.compile(r' x="([\d.]+)"([^>]*) textLength="([\d.]+)"([^>]*)>((?:&#160;)+)([^<]*)')
@@ -104,5 +169,5 @@ def _moved(text: re.Match[str]) -> str:
 if __name__ == "__main__":
     target = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parent / "images")
     target.mkdir(parents=True, exist_ok=True)
-    for screen in SCREENS:
+    for screen in (*SCREENS, *OPERATOR):
         (target / f"{screen}.svg").write_text(picture(screen), encoding="utf-8")

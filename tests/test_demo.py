@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import json
+import runpy
 import subprocess
 import sys
+from contextlib import chdir
+from pathlib import Path
 
 import pytest
+
+import dbbstation as dbb
+
+SCRIPT = Path(__file__).parents[1] / "docs" / "examples" / "whole_job.py"
 
 
 @pytest.mark.slow
@@ -32,6 +39,41 @@ def test_the_whole_job(tmp_path):
     assert max(run["circularity_um"] for run in after) < 4
     for name in ("measured", "verified", "programs", "kinematic.yaml", "joint.yaml", "report.html"):
         assert (tmp_path / "job" / name).exists()
+    _from_python(tmp_path / "job", result)
+
+
+def _from_python(folder, result):
+    """A script of twenty lines that knows the public names only comes to the numbers of the commands, to the last bit but rounding."""
+    with chdir(folder):
+        found = runpy.run_path(str(SCRIPT))
+    assert len([line for line in SCRIPT.read_text().splitlines() if line]) <= 21  # with the line that says what it is
+    plain = {key: value for key, value in result["calibration"].items() if key != "provenance"}
+    assert same(found["kinematic"].to_dict(), plain)
+    assert same(found["joint"].to_dict(), {k: v for k, v in result["diagnosis"].items() if k != "provenance"})
+    measured = {
+        (run.test, when): run.measured.centre_deviation_um
+        for when in ("before", "after")
+        for run in found[when].runs
+        if run.direction == "ccw"
+    }
+    for run in result["runs"]:
+        for when in ("before", "after"):
+            assert measured[run["test"], when] == pytest.approx(run[when]["centre_deviation_um"], rel=1e-9)
+    by_command = dbb.read_model(folder / "joint.yaml")
+    by_script = dbb.read_model(folder / "from-python.yaml")
+    assert by_script.covariance_rows == by_command.covariance_rows
+    assert by_script.covariance == pytest.approx(by_command.covariance, rel=1e-6, abs=1e-15)
+
+
+def same(one, other):
+    """Whether two JSON values are the same, numbers but for rounding."""
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, list):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, float):
+        return other == pytest.approx(one, rel=1e-6, abs=1e-9)
+    return one == other
 
 
 def test_a_folder_that_exists_is_left_alone(tmp_path):

@@ -6,7 +6,6 @@ import threading
 
 import numpy as np
 import pytest
-from dbbstation.recorded import load_sessions
 from threadpoolctl import ThreadpoolController
 
 from dbbstation.calibration.fit import calibrate as fit
@@ -19,6 +18,7 @@ from dbbstation.diagnosis.table.mismatch import find_mismatch
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.model.machine_model import MachineModel
+from dbbstation.tasks.load import load_sessions
 from dbbstation.threads import with_one_thread
 
 THREADS = 2

@@ -81,7 +81,7 @@ COMMANDS = {
     help="Show on standard error what goes into the log; may stand anywhere on the line.",
 )
 @click.option(_DEBUG, is_flag=True, help="Show the traceback of an error; may stand anywhere on the line.")
-def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:
+def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:  # noqa: ARG001 - read from the line before
     """Measure a hexapod machine tool with a double ball bar, calibrate it, find what its model lacks.
 
     \b
@@ -90,6 +90,10 @@ def cli(*, settings: str | None, verbose: bool, debug: bool) -> None:
       dbbstation calibrate SESSION --out model.yaml    fit the errors of a recorded machine
       dbbstation COMMAND --help                        what a command does, with examples
     """  # noqa: D301 - \b is click's mark for "do not wrap"
+    if settings is not None and not os.path.isfile(settings):  # noqa: PTH113 - before anything else is imported
+        from dbbstation.errors import InputError, Problem
+
+        raise InputError([Problem(settings, 0, 0, "there is no such file", "check the path")])
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

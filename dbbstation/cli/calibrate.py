@@ -82,7 +82,7 @@ def calibrate(
     drives, and with cog-shift the centre of gravity.
     """
     from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import stage_bar
+    from dbbstation.cli.progress import task_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.files.atomic import refuse_outputs, write_bytes
     from dbbstation.files.formats.model import write_model
@@ -95,7 +95,7 @@ def calibrate(
     every = every_source(source_files)
     for name in set(sources_of(source_files, every)) - set(chosen or ()):
         say(f"note: {name} is known now, but not fitted: name it with --sources")
-    with stage_bar("calibration", STAGES) as progress:
+    with task_bar("calibration", STAGES) as progress:
         result = calibrated(
             sessions,
             sources=chosen,

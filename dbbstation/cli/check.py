@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.circle_options import approach_of, circle_options
 from dbbstation.cli.output import echo
 from dbbstation.cli.source_files import source_file_option
+from dbbstation.tasks.chosen import chosen_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -45,7 +46,11 @@ def _anchor(_context: click.Context, _option: click.Parameter, given: str | None
     help="Say whether the sessions still hold what they did when this was noted.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-@click.option("--schema", metavar="FORMAT", help="Print the JSON Schema of a format, such as dbb-plan/2, and stop.")
+@click.option(
+    "--schema",
+    metavar="FORMAT",
+    help="Print the JSON Schema of a format, such as dbb-plan/2, or of a command's --json, such as calibrate, and stop.",
+)
 def check(
     files: tuple[Path, ...],
     *,
@@ -198,7 +203,7 @@ class DryRun:
 
 
 @dataclass(frozen=True)
-class Seen:
+class SampledPlan:
     """What an instrument sees of a plan.
 
     Attributes:
@@ -212,14 +217,16 @@ class Seen:
     notes: list[str]
 
 
-def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[Seen]:
+def _seen(plans: Sequence[Path], instrument: str, profile: str | None) -> list[SampledPlan]:
     from dbbstation.cli.sampling import sampling_data, sampling_notes
     from dbbstation.files.formats.plan import read_plan
     from dbbstation.instrument.library import load_instrument
 
     protocol = load_instrument(instrument, profile)
     read = [(file, read_plan(file)) for file in plans]
-    return [Seen(file, sampling_data(plan, protocol), list(sampling_notes(plan, protocol))) for file, plan in read]
+    return [
+        SampledPlan(file, sampling_data(plan, protocol), list(sampling_notes(plan, protocol))) for file, plan in read
+    ]
 
 
 def _check_one(file: Path, known: Mapping[str, ErrorSource]) -> Checked:
@@ -276,11 +283,14 @@ def _dry_run(
 def _print_schema(name: str) -> None:
     from dbbstation.cli.output import print_plain_json
     from dbbstation.files.formats.every_format import SCHEMAS, json_schema
+    from dbbstation.results.schemas import RESULTS, result_schema
 
+    if name in RESULTS:
+        print_plain_json(result_schema(name))
+        return
     try:
         schema = json_schema(name)
     except KeyError:
-        raise click.BadParameter(
-            f"{name!r} is no format; there are {', '.join(SCHEMAS)}", param_hint="--schema"
-        ) from None
+        what = f"{name!r} is no format; there are {', '.join(SCHEMAS)}, and of `--json` {', '.join(RESULTS)}"
+        raise click.BadParameter(what, param_hint="--schema") from None
     print_plain_json(schema)

@@ -15,7 +15,7 @@ from dbbstation.cli.source_files import source_file_option
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dbbstation.results.diagnosis import CauseResult, DiagnosisResult, UnexplainedCurve, WorkspaceGain
+    from dbbstation.results.diagnosis import CauseResult, DiagnosisFigures, UnexplainedCurve, WorkspaceGain
 
 
 @click.command()
@@ -63,7 +63,7 @@ def diagnose(
     """
     from dbbstation.cli.calibrate import names_in
     from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import stage_bar
+    from dbbstation.cli.progress import task_bar
     from dbbstation.cli.provenance import provenance
     from dbbstation.cli.unknown_causes import say_unknown_causes
     from dbbstation.files.atomic import refuse_outputs, write_bytes
@@ -75,7 +75,7 @@ def diagnose(
     if keep_unexplained and out is None:
         raise click.UsageError("--keep-unexplained keeps it in the model of --out: give that too")
     refuse_outputs((out, figure), force=force)
-    with stage_bar("diagnosis", STAGES) as progress:
+    with task_bar("diagnosis", STAGES) as progress:
         result = diagnosed(
             sessions,
             sources=names_in(sources or None),
@@ -104,7 +104,7 @@ UNPREDICTABLE_UM = 1000.0
 """A prediction that is off by more says that nothing was predicted [µm]."""
 
 
-def _print(result: DiagnosisResult) -> None:
+def _print(result: DiagnosisFigures) -> None:
     _print_mismatch(result)
     for outlier in result.outliers:
         echo(f"outlier, kept out of the fits: {outlier.text}")
@@ -128,7 +128,7 @@ def _print(result: DiagnosisResult) -> None:
     _print_next_tests(result)
 
 
-def _print_mismatch(result: DiagnosisResult) -> None:
+def _print_mismatch(result: DiagnosisFigures) -> None:
     """Print whether the recordings differ from the kinematic model; before that, where what was found predicts worse."""
     if result.held_out_worse:
         echo("Held-out tests are predicted worse than by the kinematic calibration alone. Nothing is identified.\n")
@@ -165,7 +165,7 @@ def _print_workspace(elsewhere: WorkspaceGain) -> None:
 STILL_OPEN = frozenset({"ambiguous", "not-testable"})
 
 
-def _print_next_tests(result: DiagnosisResult) -> None:
+def _print_next_tests(result: DiagnosisFigures) -> None:
     """Print which tests to measure next; that none helps, where a verdict is open; nothing where none is."""
     if result.next_test:
         tests = [result.next_test, *result.further_tests]
@@ -204,7 +204,7 @@ def _print_curve(curve: UnexplainedCurve) -> None:
         echo(f"  ({curve.convention})")
 
 
-def _print_gain(result: DiagnosisResult) -> None:
+def _print_gain(result: DiagnosisFigures) -> None:
     """Print residual and prediction of held-out tests before and after."""
     residual, held_out = result.residual_rms_um, result.held_out_rms_um
     echo(f"\nresidual within mountings {residual.before:.2f} -> {residual.after:.2f} µm rms")

@@ -46,7 +46,7 @@ def evaluate(
     """
     from dbbstation.cli.figures import print_runs
     from dbbstation.cli.output import print_result, say
-    from dbbstation.cli.progress import stage_bar
+    from dbbstation.cli.progress import task_bar
     from dbbstation.cli.shop import shop_settings
     from dbbstation.cli.tolerances import print_tolerances
     from dbbstation.files.own_sources import every_source
@@ -54,7 +54,7 @@ def evaluate(
     from dbbstation.tasks.evaluate import evaluate as evaluated
 
     settings = shop_settings()
-    with stage_bar("evaluation", STAGES) as progress:
+    with task_bar("evaluation", STAGES) as progress:
         result = evaluated(
             sessions,
             model,

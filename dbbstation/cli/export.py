@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.output import echo
 
-if TYPE_CHECKING:
-    from dbbstation.files.recordings.entries import RunEntry
-    from dbbstation.files.recordings.session import SessionFolder
-
-FORMATS = (".csv", ".parquet")
 STATES = ("accepted", "complete", "rejected", "recording")
 
 
@@ -53,28 +47,27 @@ def export(
       dbbstation export session --out session.csv
       dbbstation export monday tuesday --state accepted --out week.parquet
     """
-    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.output import print_result, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.cli.provenance import provenance
-    from dbbstation.files.atomic import refuse_existing
-    from dbbstation.files.provenance import refuse_existing_table
-    from dbbstation.files.recordings.session import read_session
-    from dbbstation.tasks.export import exporting, write_csv, write_parquet
+    from dbbstation.tasks.export import FORMATS
+    from dbbstation.tasks.export import export as exported
 
     if out.suffix.lower() not in FORMATS:
         raise click.UsageError(f"--out {out}: name a file that ends in {' or '.join(FORMATS)}")
-    is_csv = out.suffix.lower() == FORMATS[0]
-    (refuse_existing_table if is_csv else refuse_existing)(out, force=force)
-    runs: list[tuple[SessionFolder, RunEntry]] = []
-    for path in sessions:
-        session = read_session(path)
-        chosen = set(chosen_of(session.plan.name, session.plan.tests, tests, exclude))
-        runs += [(session, run) for run in session.runs if run.test in chosen and run.state in (states or STATES)]
-    what = exporting(runs)
     with count_bar("export") as progress:
-        write = write_csv if is_csv else write_parquet
-        rows = write(out, what, provenance, progress, lambda text: say(f"note: {text}"), force=force)
+        result = exported(
+            sessions,
+            out,
+            tests=tests,
+            exclude=exclude,
+            states=states,
+            force=force,
+            provenance=provenance,
+            progress=lambda _, done=0, of=0: progress(done, of),
+            say=lambda text: say(f"note: {text}"),
+        )
     if as_json:
-        print_json({"table": str(out), "runs": len(runs), "rows": rows, "columns": list(what.names)})
+        print_result(result)
     else:
-        echo(f"{rows} rows of {len(runs)} runs written to {out}")
+        echo(f"{result.rows} rows of {result.runs} runs written to {out}")

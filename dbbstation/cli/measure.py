@@ -97,6 +97,7 @@ def measure(
     """
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
+    from dbbstation.files.recordings.entries import ReadBy
     from dbbstation.instrument.driver import Instrument
     from dbbstation.instrument.library import at_rate
     from dbbstation.station.assembly import Job, assemble
@@ -121,6 +122,8 @@ def measure(
         rate_hz=protocol.fastest_hz(baud),
         range_mm=protocol.length.range_mm,
         model=judging_model(model_file, source_files),
+        # A real machine neither has a control address of `emulate` nor runs faster than it does.
+        instrument=ReadBy(chosen.name, profile or "", port, virtual=auto is not None or time_scale != 1.0),
     )
     job.check(str(plan_file))
     say_sampling(plan.to_domain(), protocol, baud)

@@ -51,7 +51,7 @@ _ASKED = {
     State.PAUSED: "Enter: go on   q: quit",
 }
 
-_ASKED_OF_WRONG = "Enter: repeat   a: accept all the same   x: reject   q: quit"
+_ASKED_OF_WRONG = "Enter: repeat   a WHY: accept all the same   x: reject   q: quit"
 
 
 class Talk:
@@ -199,14 +199,20 @@ class Keyboard:
             self._wrong = bool(event.wrong)
 
     def _on_enter(self) -> Command | None:
-        doubtful = self._state is State.COMPLETE and self._wrong
-        return Repeat() if doubtful else _ON_ENTER.get(self._state)
+        return Repeat() if self._doubtful else _ON_ENTER.get(self._state)
+
+    @property
+    def _doubtful(self) -> bool:
+        """Whether a run waits for its verdict with which something is wrong."""
+        return self._state is State.COMPLETE and self._wrong
 
     def _listen(self) -> None:
         for line in self._lines:
             word = line.strip()
             command = _command_of(word) if word else self._on_enter()
-            if command is not None:
+            if isinstance(command, Accept) and not command.reason and self._doubtful:
+                echo("  something is wrong with it: `a WHY` accepts it for a reason, Enter repeats it", err=True)
+            elif command is not None:
                 self._send(command)
             elif word:
                 echo(f"  `{word}` is no answer", err=True)
@@ -219,6 +225,8 @@ def _command_of(line: str) -> Command | None:
     word, _, rest = line.partition(" ")
     if word.lower() == "g" and rest.strip():
         return GoTo(rest.strip())
+    if word.lower() == "a" and rest.strip():
+        return Accept(rest.strip())
     if word.lower() == "n" and rest.strip():
         return Note(rest.strip())
     if word.lower() == "t" and rest.strip():
@@ -260,8 +268,18 @@ def _lines(event: events.Event, centre: str) -> list[str]:  # noqa: PLR0911 - a 
         ):
             wrong = event.wrong if isinstance(event, events.RunCompleted) else ()
             texts = [_of_run(event, centre), *(f"{finding.name} wrong: {finding.text}" for finding in wrong)]
+            if isinstance(event, events.RunCompleted):
+                texts.insert(0, _word_of(event))
             return [f"  {event.run.label}: {text}" for text in texts]
     return []
+
+
+def _word_of(completed: events.RunCompleted) -> str:
+    """The run in one word, with what comes first of what caused it."""
+    found = completed.answer
+    if found.unseen:
+        return f"{found.word}: {', '.join(found.unseen)}"
+    return f"{found.word}: {found.causes[0]}" if found.causes and completed.figures is not None else str(found.word)
 
 
 def _of_run(

@@ -55,7 +55,7 @@ def plot(
     from dbbstation.cli.output import print_json, say
     from dbbstation.cli.progress import count_bar
     from dbbstation.files.atomic import refuse_outputs, write_bytes
-    from dbbstation.report.plot import Kind, Plotted, plot_figure
+    from dbbstation.report.plot import PlotKind, Plotted, plot_figure
     from dbbstation.tasks.circles import load_circles
 
     refuse_outputs([out], force=force)
@@ -65,7 +65,7 @@ def plot(
     for warning in found.warnings:
         say(f"note: {warning}")
     wanted = format_of(out)
-    plotted = Plotted(Kind(kind), found, chosen, wanted.provenance.program)
+    plotted = Plotted(PlotKind(kind), found, chosen, wanted.provenance.program)
     numbers = plotted.numbers()
     write_bytes(out, plot_figure(plotted, wanted), force=force)
     for one in numbers["one_direction_only"]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.circle_options import approach_of, circle_options
 from dbbstation.cli.correction import largest_correction_option
 from dbbstation.cli.keeping import keeping_options
@@ -14,6 +14,7 @@ from dbbstation.cli.number_types import Finite
 from dbbstation.cli.shop import shop_option
 from dbbstation.cli.source_files import source_file_option
 from dbbstation.nc.limits import CIRCLE_CHORD_MM
+from dbbstation.tasks.chosen import chosen_of
 
 _FILE = click.Path(path_type=Path, dir_okay=False)
 

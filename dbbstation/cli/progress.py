@@ -85,6 +85,29 @@ def stage_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
         bar.end()
 
 
+@contextmanager
+def task_bar(label: str, stages: Mapping[str, int]) -> Iterator[Tell]:
+    """Show how far a task has come that reads sessions first: a bar for that, and one for its stages.
+
+    What was noticed in the files is said between both, on lines of its own.
+
+    Args:
+        label: what is being done.
+        stages: of the task once runs are read, as `stage_bar` takes them.
+    """
+    from dbbstation.tasks.load import READING
+
+    with count_bar(READING) as reading, stage_bar(label, stages) as rest:
+
+        def tell(text: str, done: int = 0, of: int = 0) -> None:
+            if text == READING:
+                reading(done, of)
+            else:
+                rest(text, done, of)
+
+        yield tell
+
+
 class _StageBar:
     """One bar over several stages."""
 

@@ -115,7 +115,9 @@ def _print(found: Settings) -> None:
         rows.append([key, value, one["from"] or ""])
     print_table(["setting", "value", "from"], rows)
     for one in data["tolerances"]:
-        echo(f"tolerance: {one['quantity']} at most {one['largest_um']:g} µm, {which_circles(one)}")
+        echo(
+            f"tolerance: {one['quantity']} at most {one['largest_um']:g} µm, {which_circles(one['tests'], one['directions'])}"
+        )
     if found.tolerances_from:
         echo(f"tolerances from {found.tolerances_from}")
     if not found.files:

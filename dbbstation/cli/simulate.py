@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
-from dbbstation.cli.chosen_tests import chosen_of, chosen_tests_options
+from dbbstation.cli.chosen_tests import chosen_tests_options
 from dbbstation.cli.number_types import Finite
 from dbbstation.cli.source_files import source_file_option
+from dbbstation.tasks.chosen import chosen_of
 
 
 @click.command()
@@ -56,7 +57,9 @@ def simulate(
     from dbbstation.files.formats.model import read_model
     from dbbstation.files.formats.plan import read_inline_plan
     from dbbstation.files.own_sources import every_source
+    from dbbstation.files.recordings.entries import ReadBy
     from dbbstation.files.recordings.new_session import FinishedRun, write_session
+    from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.model.simulation import setup_of, simulate_circle
     from dbbstation.virtual.under_spindle import SetUp, put_up
 
@@ -83,7 +86,7 @@ def simulate(
             columns = {"t_s": turn.t_s, "length_mm": turn.length_mm, "theta_deg": turn.theta_deg}
             started = begun + timedelta(seconds=started_s)
             runs.append(FinishedRun(test.name, direction, columns, repeat, mounting, started))
-    write_session(out, machine_model.machine, inline, runs)
+    write_session(out, machine_model.machine, inline, runs, SessionDetails(instrument=ReadBy("simulate", virtual=True)))
     if as_json:
         print_json({"session": str(out), "runs": len(runs), "tests": chosen})
     else:

@@ -95,9 +95,15 @@ def station(
       dbbstation station                               choose on the screen what is measured
       dbbstation station --virtual                     try it without hardware
       dbbstation station --virtual --time-scale 10     the same, ten times faster
+      dbbstation station --job monday-check.yaml       one job for an operator, by its file
       dbbstation station --plan table2.yaml --machine machine.yaml --instrument heidenhain-nd281b \
         --port /dev/ttyUSB0 --out 2026-11-20-hexapod-7 --bar bar.yaml
     """
+    if told["job"].endswith((".yaml", ".yml")):
+        if virtual or any(given is not None for given in (plan_file, machine_file, out)):
+            raise click.UsageError("a job says what is measured: leave out --plan, --machine, --out and --virtual")
+        _check_terminal()
+        return _operate(Path(told["job"]), judging_model(model_file, source_files))
     # The shop's instrument stands elsewhere: a virtual one brings its own line.
     port = None if virtual and from_settings("port") else port
     baud = None if virtual and from_settings("baud") else baud
@@ -117,10 +123,13 @@ def station(
     from dbbstation.cli.measure_talk import Log
     from dbbstation.files.formats.machine import read_machine
     from dbbstation.files.formats.plan import read_inline_plan
+    from dbbstation.files.recordings.entries import ReadBy
+    from dbbstation.files.recordings.session import SESSION_FILE, read_session
     from dbbstation.files.shipped import shipped_folder
     from dbbstation.service.held_line import HeldLine
     from dbbstation.service.opening import opener
     from dbbstation.station.assembly import Job
+    from dbbstation.station.opening import check_not_mixed
     from dbbstation.station.programs import load_programs
 
     def demo(what: str) -> Path:
@@ -144,8 +153,13 @@ def station(
             rate_hz=protocol.fastest_hz(baud),
             range_mm=protocol.length.range_mm,
             model=judging_model(model_file, source_files),
+            instrument=ReadBy(
+                protocol.name, profile or "", _virtual_port(time_scale) if virtual else str(port), virtual
+            ),
         )
         job.check(str(plan_file))
+        if (folder / SESSION_FILE).is_file():
+            check_not_mixed(folder, read_session(folder), job.instrument)
         if not virtual:
             require_bar(job, largest_bar_age_h)
         helper = None
@@ -190,6 +204,12 @@ def _check_options(
         raise click.UsageError("--time-scale goes with --virtual: real machines take their time")
 
 
+def _virtual_port(time_scale: float) -> str:
+    """What stands where a real session has the name of a port."""
+    usual = "virtual machine"
+    return usual if time_scale == 1.0 else f"{usual}, {time_scale:g} times faster"
+
+
 def _check_terminal() -> None:
     """Refuse to draw into a file.
 
@@ -228,6 +248,19 @@ def _begin(given: Choice, limits: Limits, model: IdentifiedModel | None) -> int:
         Path.cwd(), Memory(), limits, [Log()], model, given, None if named is None else Path(named).absolute()
     )
     return _shown(StationApp(None, None, front=front))
+
+
+def _operate(path: Path, model: IdentifiedModel | None) -> int:
+    """Show the screens of a job until they are closed; arguments as of `Front`, errors as of `_run`."""
+    from dbbstation.cli.measure_talk import Log
+    from dbbstation.service.front import Front
+    from dbbstation.service.memory import Memory
+    from dbbstation.service.operated import read_operated
+    from dbbstation.tui.app import StationApp
+
+    operated = read_operated(path)
+    front = Front(operated.sessions, Memory(), observers=[Log()], model=model)
+    return _shown(StationApp(None, None, front=front, operated=operated))
 
 
 def _line(

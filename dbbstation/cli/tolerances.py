@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from dbbstation.results.evaluation import EvaluatedTolerance, WorstRun
 
 
-def which_circles(tolerance: EvaluatedTolerance) -> str:
-    """Say which circles a tolerance holds for."""
-    tests = f"tests {', '.join(tolerance.tests)}" if tolerance.tests else "every test"
-    return tests + (f", {', '.join(tolerance.directions)} only" if tolerance.directions else "")
+def which_circles(tests: Sequence[str], directions: Sequence[str]) -> str:
+    """Say which circles a tolerance holds for: no test is every test, no direction is both."""
+    named = f"tests {', '.join(tests)}" if tests else "every test"
+    return named + (f", {', '.join(directions)} only" if directions else "")
 
 
 def print_tolerances(held: Sequence[EvaluatedTolerance], origin: str) -> None:
@@ -31,7 +31,14 @@ def print_tolerances(held: Sequence[EvaluatedTolerance], origin: str) -> None:
     rows = []
     for one in held:
         worst = [_told(each) for each in (one.before, one.after)]
-        rows.append([one.quantity, which_circles(one), f"{one.largest_um:g}", *(t for pair in worst for t in pair)])
+        rows.append(
+            [
+                one.quantity,
+                which_circles(one.tests, one.directions),
+                f"{one.largest_um:g}",
+                *(t for pair in worst for t in pair),
+            ]
+        )
     print_table(["quantity", "circles", "at most", "nominal machine", "", "model", ""], rows)
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def uncertainties(calibration: Calibration, held: NDArray[np.float64]) -> NDArray[np.float64]:
     """Standard uncertainty of every column, shape (k,), directions that were held as in `held_variance`."""
-    seen = np.maximum(np.diag(calibration.solution.covariance), 0.0)
+    seen = np.maximum(calibration.solution.variance, 0.0)
     return np.asarray(np.sqrt(seen + held_variance(calibration, held)), dtype=np.float64)
 
 

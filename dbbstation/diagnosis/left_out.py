@@ -91,10 +91,10 @@ def widened_by_tests(calibration: Calibration) -> Calibration:
 
     of_all, others = without(None), [without(group) for group in np.unique(groups)]
     moved = np.array([other.x - of_all.x for other in others])
-    variances = [np.diag(solution.covariance) for solution in (of_all, *others)]
+    variances = [solution.variance for solution in (of_all, *others)]
     factor = np.where(known.random, 1.0, widening(variances[0], moved, np.array(variances[1:])))
-    covariance = np.outer(factor, factor) * calibration.solution.covariance
-    return replace(calibration, solution=replace(calibration.solution, covariance=covariance))
+    spreads = calibration.solution.spreads.times(factor)
+    return replace(calibration, solution=replace(calibration.solution, spreads=spreads))
 
 
 def groups_of(observations: Sequence[Observation]) -> NDArray[np.int64] | None:

@@ -11,6 +11,7 @@ from dbbstation.errors import InputError, Problem, TravelError, few
 from dbbstation.files.formats.bar import parse_bar
 from dbbstation.files.formats.every_format import SCHEMAS
 from dbbstation.files.formats.jig import parse_jig
+from dbbstation.files.formats.job import parse_job
 from dbbstation.files.formats.machine import parse_machine
 from dbbstation.files.formats.mapping import parse_mapping
 from dbbstation.files.formats.model import parse_model
@@ -102,6 +103,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         "dbb-model": lambda: _model(checked, known_sources),
         "dbb-settings": lambda: _settings(checked),
         "dbb-bar": lambda: _bar(checked),
+        "dbb-job": lambda: _job(checked),
         "dbb-mapping": lambda: _mapping(checked),
         "dbb-simulator": lambda: _simulator(checked),
     }
@@ -148,6 +150,14 @@ def _settings(checked: Checked) -> None:
         return
     count = len(settings.values) + len(settings.tolerances)
     checked.summary = f"settings: {_count(count, 'value')}"
+
+
+def _job(checked: Checked) -> None:
+    job = parse_job(checked.path, checked.problems)
+    if job is not None:
+        left = ", ".join(job.may_change) or "nothing"
+        limits = _count(len(job.tolerances), "tolerance")
+        checked.summary = f"job {job.name}: {limits}, {left} left to the operator"
 
 
 def _bar(checked: Checked) -> None:

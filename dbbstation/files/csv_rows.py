@@ -25,19 +25,23 @@ _NONE = "-"
 """What tables hold where there is nothing."""
 
 
-def csv_text(rows: Iterable[Iterable[object]]) -> str:
+def csv_text(rows: Iterable[Iterable[object]], *, exact: bool = False) -> str:
     """Return rows as CSV text: the one writer of tables that people open in a spreadsheet.
 
     A text that a spreadsheet would take for a formula gets `'` before it. Numbers stay numbers, negative ones too, with `DIGITS` digits.
+
+    Args:
+        rows: of cells.
+        exact: write numbers with as many digits as it takes to read back the same bits: of recordings that come back.
     """
     out = io.StringIO(newline="")
-    csv.writer(out, lineterminator="\n").writerows(map(_guarded, row) for row in rows)
+    csv.writer(out, lineterminator="\n").writerows((_guarded(cell, exact=exact) for cell in row) for row in rows)
     return out.getvalue()
 
 
-def _guarded(cell: object) -> object:
+def _guarded(cell: object, *, exact: bool) -> object:
     if isinstance(cell, float):
-        return float(f"{cell:.{DIGITS}g}")
+        return cell if exact else float(f"{cell:.{DIGITS}g}")
     if not isinstance(cell, str):
         return cell
     shown = printable(cell)  # a carriage return would begin a row, and a formula at its start a cell

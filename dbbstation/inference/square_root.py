@@ -10,10 +10,14 @@ Discrete Sequential Estimation, 1977, ch. II and V]
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_triangular
+
+from dbbstation.inference.arrow import arrow_of, triangles_without
+from dbbstation.inference.triangle import triangle_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,10 +27,6 @@ if TYPE_CHECKING:
 
 ROUNDING = 1e-9
 """A column of which only its prior is known is exactly as uncertain as its scale: rounding must not lose it."""
-
-
-SLAB = 512
-"""Rows that are made a triangle at once: with 32 columns 128 kB, which stay in a core's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Block:
 def compress(columns: NDArray[np.int64], jacobian: NDArray[np.float64], target: NDArray[np.float64]) -> Block:
     """Compress a run, shapes (k,), (n, k) and (n,), to its triangle."""
     stacked = np.column_stack([jacobian, target])
-    triangle = _triangle(stacked)[: jacobian.shape[1] + 1]
+    triangle = triangle_of(stacked)[: jacobian.shape[1] + 1]
     return Block(columns, triangle[:, :-1], triangle[:, -1], len(target), float(target @ target))
 
 
@@ -79,11 +79,25 @@ def spread(blocks: Sequence[Block], columns: int, noise: float | None = None) ->
     return wide
 
 
+def spread_over(blocks: Sequence[Block], columns: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Rows of all blocks over some columns, shape (k,), in their order, target last, shape (r, k + 1); others are left out."""
+    order = np.argsort(columns)
+    narrow = np.zeros((sum(len(block.target) for block in blocks), len(columns) + 1))
+    row = 0
+    for block in blocks:
+        rows = narrow[row : row + len(block.target)]
+        inside = np.isin(block.columns, columns)
+        rows[:, order[np.searchsorted(columns, block.columns[inside], sorter=order)]] = block.triangle[:, inside]
+        rows[:, -1] = block.target
+        row += len(rows)
+    return narrow
+
+
 def joined(blocks: Sequence[Block], columns: int) -> Block:
     """One block over all columns that says what several blocks of one noise say together."""
     if any(block.noise is not None for block in blocks):
         raise ValueError("blocks with a noise of their own cannot be joined with others")
-    triangle = _triangle(spread(blocks, columns))
+    triangle = triangle_of(spread(blocks, columns))
     return Block(
         columns=np.arange(columns),
         triangle=triangle[:, :-1],
@@ -119,6 +133,59 @@ def with_random(known: Columns, sd: NDArray[np.float64]) -> Columns:
 
 
 @dataclass(frozen=True, eq=False)
+class Spreads:
+    """A covariance as what groups of random effects have alone, and what they share with the fitted columns.
+
+    Attributes:
+        shared: a root of the shared part, shape (k, q).
+        own: columns of each group, shape (j,), and a root of what it has alone, shape (j, j).
+        alone: columns that nothing was said of, shape (a,).
+        prior: their standard deviations, shape (a,).
+    """
+
+    shared: NDArray[np.float64]
+    own: tuple[tuple[NDArray[np.int64], NDArray[np.float64]], ...]
+    alone: NDArray[np.int64]
+    prior: NDArray[np.float64]
+
+    @cached_property
+    def variance(self) -> NDArray[np.float64]:
+        """Of each column, shape (k,)."""
+        variance = np.einsum("kq,kq->k", self.shared, self.shared)
+        variance[self.alone] = self.prior**2
+        for columns, root in self.own:
+            variance[columns] += np.einsum("ij,ij->i", root, root)
+        return variance
+
+    @cached_property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of all columns, shape (k, k)."""
+        covariance: NDArray[np.float64] = self.shared @ self.shared.T
+        covariance[self.alone, self.alone] = self.prior**2
+        for columns, root in self.own:
+            covariance[np.ix_(columns, columns)] += root @ root.T
+        return covariance
+
+    def times(self, factor: NDArray[np.float64]) -> Spreads:
+        """The same with each standard deviation so many times as large, shape (k,); correlations stay."""
+        return Spreads(
+            factor[:, None] * self.shared,
+            tuple((columns, factor[columns, None] * root) for columns, root in self.own),
+            self.alone,
+            factor[self.alone] * self.prior,
+        )
+
+    def square_of(self, columns: NDArray[np.int64], rows: NDArray[np.float64]) -> float:
+        """Trace of rows over some of the columns, shape (r, j), times their covariance times the rows."""
+        square = float(np.sum((rows @ self.shared[columns]) ** 2))
+        for group, root in self.own:
+            _, place, within = np.intersect1d(columns, group, assume_unique=True, return_indices=True)
+            if len(place):
+                square += float(np.sum((rows[:, place] @ root[within]) ** 2))
+        return square
+
+
+@dataclass(frozen=True, eq=False)
 class Directions:
     """Directions of the fitted columns, in units of their scales, from best seen to worst.
 
@@ -137,7 +204,7 @@ class Solution:
 
     Attributes:
         x: all columns, shape (k,).
-        covariance: of all columns, shape (k, k); zero along directions that were held.
+        spreads: how uncertain they are.
         directions: what the measurement sees of the fitted columns, the random ones averaged over.
         held: orthonormal rows of directions, in units of the scales, that were held at zero, shape (h, f).
         chi2: weighted sum of squares that remains, priors included.
@@ -146,12 +213,22 @@ class Solution:
     """
 
     x: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    spreads: Spreads
     directions: Directions
     held: NDArray[np.float64]
     chi2: float
     stated_chi2: float
     freedom_used: float
+
+    @property
+    def variance(self) -> NDArray[np.float64]:
+        """Of each column, shape (k,): the diagonal of the covariance, without the work of the rest."""
+        return self.spreads.variance
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of all columns, shape (k, k); zero along directions that were held."""
+        return self.spreads.covariance
 
 
 def solve(
@@ -168,9 +245,9 @@ def solve(
         noise: standard deviation of one measurement, where a block does not state its own.
         held: orthonormal rows of fitted directions, in units of the scales, to keep at zero, shape (h, f).
     """
-    random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
-    root, target, chi2_floor = _stacked(blocks, known, noise, np.concatenate([random, fitted]))
-    m = len(random)
+    arrow = arrow_of(blocks, known, noise)
+    random, fitted = arrow.random, arrow.fitted
+    root, target, m = arrow.root, arrow.target, len(arrow.random)
     inner, cross = root[:m, :m], root[:m, m:]
     scale = known.scale[fitted]
     seen = root[m:, m:] * scale
@@ -180,41 +257,73 @@ def solve(
     u, s, vt = np.linalg.svd(seen @ free.T, full_matrices=False)
     towards = free.T @ vt.T
     x = np.zeros(len(known.prior))
-    x[fitted] = scale * (towards @ ((u.T @ target[m : m + len(fitted)]) / s))
+    x[fitted] = scale * (towards @ ((u.T @ target[m:]) / s))
     x[random] = solve_triangular(inner, target[:m] - cross @ x[fitted]) if m else x[random]
     spread = scale[:, None] * towards / s
     inner_inverse = solve_triangular(inner, np.eye(m)) if m else np.zeros((0, 0))
-    pull = -inner_inverse @ (cross @ spread)
-    factor = np.zeros((len(known.prior), m + len(s)))
-    factor[random, :m] = inner_inverse
-    factor[random, m:] = pull
-    factor[fitted, m:] = spread
-    covariance = factor @ factor.T
+    shared = np.zeros((len(known.prior), m + len(s)))
+    shared[random, :m] = inner_inverse
+    shared[random, m:] = -inner_inverse @ (cross @ spread)
+    shared[fitted, m:] = spread
+    own = []
+    for one in arrow.groups:
+        back = solve_triangular(
+            one.inner, np.column_stack([one.target, one.across @ x[one.border], one.across @ shared[one.border]])
+        )
+        x[one.columns] = back[:, 0] - back[:, 1]
+        shared[one.columns] = -back[:, 2:]
+        own.append((one.columns, solve_triangular(one.inner, np.eye(len(one.columns)))))
+    spreads = Spreads(shared, tuple(own), arrow.alone, known.prior[arrow.alone])
     remaining = target - root @ np.concatenate([x[random], x[fitted]])
     with_prior = np.isfinite(known.prior)
     stated_chi2 = float(np.sum((x[with_prior] / known.prior[with_prior]) ** 2))
-    used = m + len(s) - float(np.sum(np.diag(covariance)[with_prior] / known.prior[with_prior] ** 2))
+    used = float(np.count_nonzero(known.random) + len(s))
+    used -= float(np.sum(spreads.variance[with_prior] / known.prior[with_prior] ** 2))
     for block in blocks:
         if block.noise is not None:
             rows = block.triangle / block.noise
             stated_chi2 += float(np.sum((rows @ x[block.columns] - block.target / block.noise) ** 2))
-            used -= float(np.sum((rows @ factor[block.columns]) ** 2))
+            used -= spreads.square_of(block.columns, rows)
     return Solution(
         x=x,
-        covariance=covariance,
+        spreads=spreads,
         directions=directions,
         held=held,
-        chi2=chi2_floor + float(remaining @ remaining),
+        chi2=arrow.floor + float(remaining @ remaining),
         stated_chi2=stated_chi2,
         freedom_used=used,
     )
 
 
+def chi2_without(
+    blocks: Sequence[Block],
+    known: Columns,
+    noise: float,
+    held: NDArray[np.float64],
+    parts: Sequence[Sequence[int]],
+) -> list[float]:
+    """Weighted sum of squares that a fit without the blocks of a part leaves, priors included, for each part.
+
+    Args:
+        blocks: compressed runs.
+        known: priors and scales.
+        noise: standard deviation of one measurement, where a block does not state its own.
+        held: orthonormal rows of fitted directions, in units of the scales, to keep at zero, shape (h, f).
+        parts: places of the blocks that are left out.
+    """
+    towards = known.scale[~known.random][:, None] * complement(held).T
+    found = []
+    for root, target, floor in triangles_without(blocks, known, noise, parts):
+        seen, _ = np.linalg.qr(root @ towards)
+        rest = target - seen @ (seen.T @ target)
+        found.append(floor + float(rest @ rest))
+    return found
+
+
 def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> NDArray[np.float64]:
     """Orthonormal rows of fitted directions, in units of the scales, that the blocks leave uncertain by more than 1."""
-    random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
-    root, _, _ = _stacked(blocks, known, noise, np.concatenate([random, fitted]))
-    directions = directions_of(root[len(random) :, len(random) :] * known.scale[fitted])
+    arrow = arrow_of(blocks, known, noise)
+    directions = directions_of(arrow.root_of_fitted * known.scale[arrow.fitted])
     return directions.vectors[directions.singular < 1.0 - ROUNDING]
 
 
@@ -233,11 +342,11 @@ def unseen_combinations(
         noise: standard deviation of one measurement, where a block does not state its own.
         held: orthonormal rows of fitted directions that were kept at zero, in units of the scales, shape (h, f).
     """
-    random, fitted = np.flatnonzero(known.random), np.flatnonzero(~known.random)
     combinations = np.zeros((len(held), len(known.prior)))
     if len(held):
-        root, _, _ = _stacked(blocks, known, noise, np.concatenate([random, fitted]))
-        seen, free = root[len(random) :, len(random) :] * known.scale[fitted], complement(held)
+        arrow = arrow_of(blocks, known, noise)
+        fitted = arrow.fitted
+        seen, free = arrow.root_of_fitted * known.scale[fitted], complement(held)
         follow, *_ = np.linalg.lstsq(seen @ free.T, -seen @ held.T, rcond=None)
         orthonormal, _ = np.linalg.qr(held.T + free.T @ follow)
         combinations[:, fitted] = orthonormal.T * known.scale[fitted]
@@ -250,45 +359,6 @@ def directions_of(seen: NDArray[np.float64]) -> Directions:
     padded = np.zeros(seen.shape[1])
     padded[: len(singular)] = singular
     return Directions(padded, vectors)
-
-
-def _stacked(
-    blocks: Sequence[Block],
-    known: Columns,
-    noise: float,
-    order: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Triangle and right-hand side of all blocks and priors, columns in `order`, and the residual below it."""
-    total = len(known.prior)
-    place = np.empty(total, dtype=np.int64)
-    place[order] = np.arange(total)
-    rows = spread(blocks, total, noise)[:, [*order, total]]
-    finite = np.flatnonzero(np.isfinite(known.prior))
-    priors = np.zeros((len(finite), total + 1))
-    priors[np.arange(len(finite)), place[finite]] = 1.0 / known.prior[finite]
-    triangle = _triangle(np.vstack([rows, priors, np.zeros((total + 1, total + 1))]))
-    floor = float(triangle[total, total] ** 2)
-    root: NDArray[np.float64] = triangle[:total, :total]
-    return root, triangle[:total, -1], floor
-
-
-def _triangle(stacked: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Upper triangle of the QR factors, without signs; NaN and infinity are refused.
-
-    Slabs of rows that stay in the processor's cache come first, then the triangles that they leave: the same
-    orthogonal transformation in another order, three times as fast as on all rows at once. [Demmel, Grigori, Hoemmen
-    and Langou, SIAM J. Sci. Comput. 34 (2012) A206]
-    """
-    columns = stacked.shape[1]
-    slab = max(SLAB, 4 * columns)  # each round leaves a quarter of the rows at most
-    while len(stacked) >= 2 * slab:
-        whole = len(stacked) // slab * slab
-        triangles = np.asarray(np.linalg.qr(stacked[:whole].reshape(-1, slab, columns), mode="r"), dtype=np.float64)
-        stacked = np.concatenate([triangles.reshape(-1, columns), stacked[whole:]])
-    triangle = np.asarray(np.linalg.qr(stacked, mode="r"), dtype=np.float64)
-    if not np.isfinite(triangle).all():
-        raise ValueError("measurements and their derivatives must be numbers")
-    return triangle
 
 
 def complement(rows: NDArray[np.float64]) -> NDArray[np.float64]:

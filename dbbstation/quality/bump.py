@@ -72,6 +72,7 @@ def bump(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
         "µm",
         f"nothing sticks out: at most {place}{beside}",
         f"{place}{beside}: look for chips, knocks and cables that pull, and repeat the run",
+        f"bump {place}",
     )
 
 

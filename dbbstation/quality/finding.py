@@ -46,6 +46,7 @@ class Finding:
         unit: of both.
         verdict: whether the value keeps the limit.
         text: what was found, where, and what to do where it is wrong; why it cannot be decided where it cannot.
+        short: the same in the fewest words; empty where name, value and limit are that.
     """
 
     name: Name
@@ -54,6 +55,7 @@ class Finding:
     unit: str
     verdict: Verdict
     text: str
+    short: str = ""
 
     @property
     def wrong(self) -> bool:
@@ -61,7 +63,7 @@ class Finding:
         return self.verdict is Verdict.WRONG
 
 
-def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: str) -> Finding:
+def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: str, short: str = "") -> Finding:
     """Return a finding of a value that a limit is held against.
 
     Args:
@@ -71,11 +73,20 @@ def found(name: Name, value: float, limit: float, unit: str, sound: str, wrong: 
         unit: of both.
         sound: text where the limit is kept.
         wrong: text where it is not.
+        short: what was found, in the fewest words.
     """
     verdict = Verdict.WRONG if value > limit else Verdict.GOOD
-    return Finding(name, value, limit, unit, verdict, wrong if verdict is Verdict.WRONG else sound)
+    return Finding(name, value, limit, unit, verdict, wrong if verdict is Verdict.WRONG else sound, short)
 
 
 def undecided(name: Name, why: str, unit: str = "", value: float | None = None) -> Finding:
     """Return a finding that cannot be decided, and why."""
     return Finding(name, value, None, unit, Verdict.CANNOT_TELL, why)
+
+
+def against_limit(finding: Finding) -> str:
+    """Return a finding's number and limit with their unit, as far as there are any."""
+    if finding.value is None:
+        return ""
+    limit = "" if finding.limit is None else f" of {finding.limit:.2f}"
+    return f"{finding.value:.2f}{limit} {finding.unit}".rstrip()

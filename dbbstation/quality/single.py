@@ -165,7 +165,8 @@ def feed(circle: Circle, shown_mm_min: tuple[float, float] | None) -> Finding:
         limit,
         "mm/min",
         stated,
-        f"{stated}: set the feed of the plan to the one that was run, or the override to 100 %",
+        f"{stated}: set the override on the control to 100 % and run it again; a feed that was wanted goes into the plan",
+        f"feed {shown:.0f} of {programmed:g} mm/min",
     )
 
 

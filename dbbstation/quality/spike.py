@@ -84,6 +84,7 @@ def spike(one: CircleAnalysis, reversals_deg: Sequence[float]) -> Finding:
         "µm",
         f"no reading leaves its neighbours: at most {place}",
         f"a reading stands {place}{many}: G holds it; look after plug, cable and earth of the gauge, and repeat the run",
+        f"spike {place}",
     )
 
 

@@ -38,6 +38,7 @@ def conditions(session: SessionFolder, circles: Sequence[MeasuredCircle], job: s
         ("plan", session.plan.name),
         ("runs", _runs(session)),
         ("programs", f"{compensated} of {accepted} accepted runs under NC programs that the session keeps"),
+        ("instrument", _instrument(session)),
         *_bar(session.bar, session.bar_waiver),
         ("temperature of the shop", _shop(session)),
         ("logged temperatures", _logged(circles)),
@@ -54,6 +55,17 @@ def when_measured(runs: Iterable[RunEntry]) -> str:
         return _NOT_NOTED
     first, last = min(moments), max(moments)
     return f"{first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M %Z}" if last > first else f"{first:%Y-%m-%d %H:%M %Z}"
+
+
+def _instrument(session: SessionFolder) -> str:
+    """What read the circles that count, each once."""
+    read = [run.instrument for run in session.in_state(RunState.ACCEPTED)]
+    told = dict.fromkeys(
+        "virtual: " * one.virtual + one.text for one in read or [session.instrument] if one is not None
+    )
+    if not told and session.instrument is not None:
+        return "virtual: " * session.instrument.virtual + session.instrument.text
+    return "; ".join(told) or _NOT_NOTED
 
 
 def _runs(session: SessionFolder) -> str:

@@ -111,6 +111,7 @@ def content_of(reported: Reported, numbers: Mapping[str, Any], provenance: Prove
     return {
         **numbers,
         "machine": found.sessions[0].machine.name,
+        "virtual": [session.name for session in found.sessions if session.virtual],
         "job": reported.job or found.sessions[0].job,
         "sessions": [
             {

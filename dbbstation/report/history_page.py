@@ -34,7 +34,7 @@ _DAY_S = 86400.0
 
 
 @dataclass(frozen=True)
-class Mark:
+class TrendMark:
     """A tick, or an event.
 
     Attributes:
@@ -73,9 +73,9 @@ class Drawing:
     bars: str
     levels: str
     limits: tuple[float, ...]
-    dates: tuple[Mark, ...]
-    heights: tuple[Mark, ...]
-    events: tuple[Mark, ...]
+    dates: tuple[TrendMark, ...]
+    heights: tuple[TrendMark, ...]
+    events: tuple[TrendMark, ...]
     words: str
 
 
@@ -180,29 +180,29 @@ def _levels(one: Mapping[str, Any], at: Mapping[str, tuple[float, float]], y: An
             stretch.append((at[value["session"]][0], level))
 
 
-def _dates(values: Sequence[Mapping[str, Any]], days: Sequence[float], x: Any) -> Iterable[Mark]:  # noqa: ANN401 - as above
+def _dates(values: Sequence[Mapping[str, Any]], days: Sequence[float], x: Any) -> Iterable[TrendMark]:  # noqa: ANN401 - as above
     first, last = values[0]["started"][:10], values[-1]["started"][:10]
     if days[-1] - days[0] < _FEW_DAYS:
-        yield Mark(round(x(days[0]), 1), first)
+        yield TrendMark(round(x(days[0]), 1), first)
         if last != first:
-            yield Mark(round(x(days[-1]), 1), last)
+            yield TrendMark(round(x(days[-1]), 1), last)
         return
     zone = datetime.fromisoformat(values[0]["started"]).tzinfo
     years = range(int(first[:4]) + 1, int(last[:4]) + 1)
     for year in years[:: 1 + len(years) // _MOST_YEARS]:
-        yield Mark(round(x(datetime(year, 1, 1, tzinfo=zone).timestamp() / _DAY_S), 1), str(year))
+        yield TrendMark(round(x(datetime(year, 1, 1, tzinfo=zone).timestamp() / _DAY_S), 1), str(year))
 
 
-def _heights(low: float, high: float, y: Any) -> Iterable[Mark]:  # noqa: ANN401 - as above
+def _heights(low: float, high: float, y: Any) -> Iterable[TrendMark]:  # noqa: ANN401 - as above
     span = high - low
     step = step_of(span / _DIVISIONS) if span > 0.01 else span / 2.0 or 1.0  # noqa: PLR2004 - what `step_of` tells apart
     tick = -(-low // step) * step
     while tick <= high:
-        yield Mark(round(y(tick), 1), f"{tick + 0.0:.4g}" if abs(tick) > step / 2.0 else "0")
+        yield TrendMark(round(y(tick), 1), f"{tick + 0.0:.4g}" if abs(tick) > step / 2.0 else "0")
         tick += step
 
 
-def _event(event: Mapping[str, Any], at: tuple[float, float], unit: str, coverage_factor: float) -> Mark:
+def _event(event: Mapping[str, Any], at: tuple[float, float], unit: str, coverage_factor: float) -> TrendMark:
     difference = difference_in_words({**event, "unit": unit}, coverage_factor)
     words = f"{event['verdict']} since {event['since']}, seen in {event['found']}: {difference}"
-    return Mark(round(at[0], 1), words, event["verdict"].split()[0], round(at[1], 1))
+    return TrendMark(round(at[0], 1), words, event["verdict"].split()[0], round(at[1], 1))

@@ -20,7 +20,7 @@ _SAME_MM = 1.0
 
 
 @dataclass(frozen=True)
-class Place:
+class MapPlace:
     """Where balls stand, one above another.
 
     Attributes:
@@ -38,7 +38,7 @@ class Place:
     marked: bool
 
 
-def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tuple[Place, ...]:
+def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tuple[MapPlace, ...]:
     """Return the places of tests; +X is to the right, +Y up.
 
     Args:
@@ -54,7 +54,7 @@ def plate_map(tests: Mapping[str, PlannedTest], marked: Collection[str]) -> tupl
     scale = (WIDTH - 2.0 * _MARGIN) / width_mm
     middle = _SAME_MM * (max(xs) + min(xs)) / 2.0, _SAME_MM * (max(ys) + min(ys)) / 2.0
     return tuple(
-        Place(
+        MapPlace(
             x=round(WIDTH / 2.0 + scale * (_SAME_MM * x - middle[0]), 1),
             y=round(WIDTH / 2.0 - scale * (_SAME_MM * y - middle[1]), 1),
             label=_label(there),

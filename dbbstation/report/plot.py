@@ -37,7 +37,7 @@ NARROW_IN, WIDE_IN = 7.5, 11.0
 _GAP_IN = 0.2
 
 
-class Kind(StrEnum):
+class PlotKind(StrEnum):
     """What a figure shows."""
 
     POLAR = "polar"
@@ -48,16 +48,16 @@ class Kind(StrEnum):
 
 
 TITLES = {
-    Kind.POLAR: "Deviation from the least-squares circle, polar",
-    Kind.DEVIATION: "Deviation from the least-squares circle over the angle",
-    Kind.SPECTRUM: "Undulations of the circles: amplitude by number per revolution",
-    Kind.MAP: "Centres of the circles where their balls stand, seen from above",
-    Kind.COMPARE: "The same tests in several sessions, to one scale each",
+    PlotKind.POLAR: "Deviation from the least-squares circle, polar",
+    PlotKind.DEVIATION: "Deviation from the least-squares circle over the angle",
+    PlotKind.SPECTRUM: "Undulations of the circles: amplitude by number per revolution",
+    PlotKind.MAP: "Centres of the circles where their balls stand, seen from above",
+    PlotKind.COMPARE: "The same tests in several sessions, to one scale each",
 }
 
 
 @dataclass(frozen=True, eq=False)
-class Panel:
+class PlotPanel:
     """Runs that are drawn in one picture: both directions of one test in one session.
 
     Attributes:
@@ -84,12 +84,12 @@ class Plotted:
         program: name and version of the program that draws.
     """
 
-    kind: Kind
+    kind: PlotKind
     found: Circled
     chosen: Filter
     program: str
 
-    def panels(self) -> list[Panel]:
+    def panels(self) -> list[PlotPanel]:
         """Return what is drawn, session by session.
 
         Raises:
@@ -100,7 +100,7 @@ class Plotted:
             why = "; ".join(f"{one.entry.label}: {one.problem}" for one in self.found.circles)
             raise StationError(f"no run shows a circle: {why}", remedy="record the test again, or choose another")
         several = {one.session for one in shown}
-        if self.kind is Kind.COMPARE and len(several) == 1:
+        if self.kind is PlotKind.COMPARE and len(several) == 1:
             raise StationError(
                 f"only one session is there to compare, {several.pop()}", remedy="name two sessions or more"
             )
@@ -109,13 +109,13 @@ class Plotted:
             for session, test in dict.fromkeys((one.session, one.entry.test) for one in shown)
         ]
 
-    def _panel(self, session: str, test: str, runs: Sequence[MeasuredCircle]) -> Panel:
+    def _panel(self, session: str, test: str, runs: Sequence[MeasuredCircle]) -> PlotPanel:
         drawn = chosen(runs, MOST_DRAWN)
-        return Panel(session, test, tuple(drawn), len(runs) - len(drawn))
+        return PlotPanel(session, test, tuple(drawn), len(runs) - len(drawn))
 
     def on_sheet(self) -> list[MeasuredCircle]:
         """Return the runs that are drawn: of a map all that show a circle, since it draws their mean."""
-        if self.kind is Kind.MAP:
+        if self.kind is PlotKind.MAP:
             return [one for one in self.found.circles if one.analysis is not None]
         return [one for panel in self.panels() for one, _ in panel.drawn]
 
@@ -153,21 +153,21 @@ def draw_plot(plotted: Plotted) -> Figure:
     """
     panels = plotted.panels()
     match plotted.kind:
-        case Kind.POLAR:
+        case PlotKind.POLAR:
             return _grid(plotted, panels, draw_polar, most_columns=4, height_over_width=1.0)
-        case Kind.DEVIATION:
+        case PlotKind.DEVIATION:
             return _grid(plotted, panels, draw_deviation, most_columns=2, height_over_width=0.5)
-        case Kind.SPECTRUM:
+        case PlotKind.SPECTRUM:
             return _grid(plotted, panels, draw_spectrum, most_columns=2, height_over_width=0.55)
-        case Kind.MAP:
+        case PlotKind.MAP:
             return _map(plotted)
-        case Kind.COMPARE:
+        case PlotKind.COMPARE:
             return _compare(plotted, panels)
 
 
 def _grid(
     plotted: Plotted,
-    panels: Sequence[Panel],
+    panels: Sequence[PlotPanel],
     draw: Callable[[Sheet, Box, str, Sequence[Drawn]], None],
     most_columns: int,
     height_over_width: float,
@@ -187,7 +187,7 @@ def _grid(
     return sheet.figure
 
 
-def _compare(plotted: Plotted, panels: Sequence[Panel]) -> Figure:
+def _compare(plotted: Plotted, panels: Sequence[PlotPanel]) -> Figure:
     """Row by row a test: polar traces of each session to one scale, and below them the last runs of all over the angle."""
     tests = {panel.test: [other for other in panels if other.test == panel.test] for panel in panels}
     columns = max(len(of) for of in tests.values())
@@ -227,15 +227,15 @@ def _map(plotted: Plotted) -> Figure:
     return sheet.figure
 
 
-def _sheet(plotted: Plotted, width_in: float, room_in: float, panels: Sequence[Panel]) -> Sheet:
+def _sheet(plotted: Plotted, width_in: float, room_in: float, panels: Sequence[PlotPanel]) -> Sheet:
     tests = list(dict.fromkeys(one.entry.test for one in plotted.found.circles))
     title = f"{TITLES[plotted.kind]}: test{'s' if len(tests) > 1 else ''} {', '.join(tests)}"
     return Sheet(width_in, room_in, title, _keys(plotted, panels), _title_block(plotted, panels))
 
 
-def _keys(plotted: Plotted, panels: Sequence[Panel]) -> list[Key]:
+def _keys(plotted: Plotted, panels: Sequence[PlotPanel]) -> list[Key]:
     """Legend: the directions that are drawn, and repeats where there are any."""
-    if plotted.kind is Kind.MAP:
+    if plotted.kind is PlotKind.MAP:
         return [
             Key("ball", {"color": "#555555", "marker": "o", "markersize": 4.0, "linewidth": 0.0}),
             Key("from the ball to the mean centre of the test's circles, enlarged", {"color": AFTER, "linewidth": 1.4}),
@@ -252,7 +252,7 @@ def _keys(plotted: Plotted, panels: Sequence[Panel]) -> list[Key]:
     return keys
 
 
-def _title_block(plotted: Plotted, panels: Sequence[Panel]) -> list[list[Cell]]:
+def _title_block(plotted: Plotted, panels: Sequence[PlotPanel]) -> list[list[Cell]]:
     """Rows of the title block: one for each session, and one for what was drawn."""
     rows = []
     for session in plotted.found.sessions:
@@ -293,7 +293,7 @@ def _bar(said: dict[str, str]) -> str:
     return f"{said['bar']}, {said['bar calibrated']}"
 
 
-def _name(plotted: Plotted, panel: Panel) -> str:
+def _name(plotted: Plotted, panel: PlotPanel) -> str:
     return f"{panel.session}: test {panel.test}" if len(plotted.found.sessions) > 1 else f"test {panel.test}"
 
 

@@ -37,7 +37,7 @@ _STEPS = (1.0, 2.0, 5.0)
 
 
 @dataclass(frozen=True)
-class Trace:
+class PolarTrace:
     """One run as drawn.
 
     Attributes:
@@ -91,7 +91,7 @@ class Polar:
 
     test: str
     what: str
-    traces: tuple[Trace, ...]
+    traces: tuple[PolarTrace, ...]
     rings: tuple[Ring, ...]
     step_um: float
     scale: float
@@ -111,7 +111,7 @@ def polar(test: str, now: Sequence[MeasuredCircle], before: Sequence[MeasuredCir
     most_um = max(float(np.abs(analysis.residual_um).max()) for _, analysis, _, _ in analysed)
     scale = REACH / max(most_um, 1e-3)  # a perfect circle has no reach of its own
     traces = tuple(
-        Trace(
+        PolarTrace(
             points=_points(analysis.path.theta_deg, analysis.residual_um, scale),
             direction=str(one.entry.direction),
             former=former,

@@ -19,7 +19,7 @@ MOST_TOLD = 5
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ReportVerdict:
     """What a foreman reads first.
 
     Attributes:
@@ -35,7 +35,7 @@ class Verdict:
     to_do: tuple[str, ...]
 
 
-def verdict_of(held: Sequence[Held], found: Circled, coverage_factor: float) -> Verdict:
+def verdict_of(held: Sequence[Held], found: Circled, coverage_factor: float) -> ReportVerdict:
     """Return the verdict of tolerances held against measured circles.
 
     Args:
@@ -48,24 +48,24 @@ def verdict_of(held: Sequence[Held], found: Circled, coverage_factor: float) -> 
     if not said - {None}:
         nothing = "The shop's settings have no tolerance for these circles: there is no verdict."
         write = "Write tolerances into the shop's settings (`dbbstation settings --template` shows how) and make the report anew."
-        return Verdict("none", nothing, (), (*repeat, write))
+        return ReportVerdict("none", nothing, (), (*repeat, write))
     told = [one for one in held if one.conformity in {Conformity.EXCEEDED, Conformity.UNDECIDED}]
     reasons = tuple(_reason(one, coverage_factor) for one in told)
     if Conformity.EXCEEDED in said:
         headline = "The machine is NOT within the shop's tolerances."
-        return Verdict(Conformity.EXCEEDED, headline, reasons, (*repeat, *_cure(found)))
+        return ReportVerdict(Conformity.EXCEEDED, headline, reasons, (*repeat, *_cure(found)))
     if Conformity.UNDECIDED in said:
         headline = "It cannot be told whether the machine is within the shop's tolerances."
         narrow = (
             "A limit lies within the uncertainty U of a figure, or the figure has none. The budget of the figure says what U comes from "
             "(`dbbstation circles --budget`): lessen its largest term, state what the session lacks, or agree on another limit."
         )
-        return Verdict(Conformity.UNDECIDED, headline, reasons, (*repeat, narrow))
+        return ReportVerdict(Conformity.UNDECIDED, headline, reasons, (*repeat, narrow))
     keep = (
         "The circles need no correction. Measure again after a crash, a repair or a move of the machine; the plan "
         "ten-minute-check.yaml shows in three tests whether this still holds."
     )
-    return Verdict(Conformity.WITHIN, "Every circle is within the shop's tolerances.", (), (*repeat, keep))
+    return ReportVerdict(Conformity.WITHIN, "Every circle is within the shop's tolerances.", (), (*repeat, keep))
 
 
 def _reason(held: Held, coverage_factor: float) -> str:

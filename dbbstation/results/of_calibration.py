@@ -149,7 +149,7 @@ def outlier_result(outlier: Outlier) -> OutlierResult:
 
 def _uncertainties(calibration: Calibration) -> NDArray[np.float64]:
     """Standard uncertainty of every column, as the model file has it, shape (k,); NaN where not known."""
-    variance = np.maximum(np.diag(calibration.solution.covariance), 0.0)
+    variance = np.maximum(calibration.solution.variance, 0.0)
     variance += calibration.layout.formula_variance(calibration.x)
     if calibration.prescribed:  # they define coordinates, and all parameters are known in these
         return np.sqrt(variance)

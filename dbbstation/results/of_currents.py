@@ -41,7 +41,7 @@ def currents_result(calibration: Calibration) -> CurrentsResult | None:
 
 def _fitted(calibration: Calibration, source: str) -> dict[str, tuple[float, float]]:
     """Values and standard deviations of a source's parameters."""
-    sigma = np.sqrt(np.maximum(np.diag(calibration.solution.covariance), 0.0))
+    sigma = np.sqrt(np.maximum(calibration.solution.variance, 0.0))
     numbers = zip(calibration.layout.names, calibration.x, sigma, strict=True)
     return {name: (float(value), float(u)) for (of, _, name), value, u in numbers if of == source}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
-from dbbstation.calibration.outliers.outlier import SOURCE_OF, Kind
+from dbbstation.calibration.outliers.outlier import SOURCE_OF, OutlierKind
 from dbbstation.calibration.reporting.evaluation import rms_um
 from dbbstation.inference.verdict import Acts, Verdict
 from dbbstation.results.diagnosis import (
@@ -158,7 +158,7 @@ def _mountings(diagnosis: Diagnosis) -> list[CauseResult]:
 
 
 def _of(outlier: Outlier) -> str:
-    return f"offset ({outlier.test})" if outlier.kind is Kind.BAR else f"distance ({outlier.run})"
+    return f"offset ({outlier.test})" if outlier.kind is OutlierKind.BAR else f"distance ({outlier.run})"
 
 
 BALLS = ("mounting", "ball-coordinate")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from dbbstation.errors import InputError
 from dbbstation.service.former_sessions import keep_models
 from dbbstation.service.work import Progress, Work
+from dbbstation.service.worked_out import DoneStep, counted, keep_steps, steps_before
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -56,7 +59,7 @@ class Result:
 
 
 class After:
-    """Works on one session, one step at a time; results go into a new folder beside it.
+    """Works on one session, one step at a time; results go into a new folder beside it, or stand there from before.
 
     Args:
         session: its folder.
@@ -88,6 +91,14 @@ class After:
         self._waiting: list[Step] = []
         self.former: Former | None = None
         self.kept: tuple[Path, ...] = ()
+        self._counted = ""
+        before = steps_before(self.session)
+        if before is not None:
+            self._folder, done = before
+            self._counted = counted(self.session)
+            for name, one in done.items():
+                path = self._folder / one.path
+                self.results[Step(name)] = Result(Progress.DONE, "", one.passed_s, one.answer, "", path)
 
     @property
     def folder(self) -> Path:
@@ -97,6 +108,14 @@ class After:
             numbered = (parent / (name if k == 1 else f"{name}-{k}") for k in range(1, 1000))
             self._folder = next(path for path in numbered if not path.exists())
         return self._folder
+
+    @property
+    def outdated(self) -> bool:
+        """Whether other runs count now than when the first step was done."""
+        try:
+            return self._counted not in {"", counted(self.session)}
+        except InputError:
+            return False
 
     @property
     def busy(self) -> Step | None:
@@ -152,6 +171,9 @@ class After:
             return
         if progress is Progress.DONE:
             result.answer, result.path = work.answer(), self.folder / self._out(step)
+            keep_steps(self.folder, self.session, self._done())
+            with suppress(InputError):
+                self._counted = self._counted or counted(self.session)
         elif progress is Progress.FAILED:
             result.failure = work.failure()
         work.close()
@@ -198,6 +220,14 @@ class After:
 
         session = read_session(self.session)
         return str(session.plan_path), str(session.machine_path)
+
+    def _done(self) -> dict[str, DoneStep]:
+        """What was done; a comparison is not kept: the session that it is with is chosen anew."""
+        return {
+            step.value: DoneStep(path=one.path.name, passed_s=one.passed_s, answer=one.answer)
+            for step, one in self.results.items()
+            if one.progress is Progress.DONE and one.path is not None and step is not Step.ACCEPTANCE
+        }
 
     @staticmethod
     def _out(step: Step) -> str:

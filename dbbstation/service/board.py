@@ -57,12 +57,14 @@ class SequenceOpened:
         open: those without an accepted recording.
         session: where the recordings are.
         known: what judged runs of the session say, in the order they were recorded.
+        virtual: whether machine and instrument are virtual.
     """
 
     tasks: tuple[Task, ...]
     open: tuple[Task, ...]
     session: str
     known: tuple[JudgedRun, ...] = ()
+    virtual: bool = False
 
 
 _RUN_MARKS = {
@@ -88,6 +90,7 @@ class Board:
         tasks: planned runs in their order.
         marks: how each of them stands.
         session: where the recordings are.
+        virtual: whether machine and instrument are virtual.
         sample: the last one.
         rate: of the readings.
         lost: samples that the line lost during the run that goes on, or went on last.
@@ -114,6 +117,7 @@ class Board:
     tasks: tuple[Task, ...] = ()
     marks: list[Mark] = field(default_factory=list)
     session: str = ""
+    virtual: bool = False
     sample: events.Sample | None = None
     rate: ReadingRate = field(default_factory=ReadingRate)
     lost: int = 0
@@ -221,7 +225,7 @@ class Board:
                 self._begin(event.run)
                 self._trace(event.run, event.samples)
             case events.RunAccepted():
-                self._judge(event.run, Verdict.ACCEPTED)
+                self._judge(event.run, Verdict.ACCEPTED, event.reason)
             case events.RunRejected():
                 self._judge(event.run, Verdict.REJECTED, event.reason)
             case events.SessionFinished():
@@ -234,7 +238,7 @@ class Board:
                 pass
 
     def _open(self, opened: SequenceOpened) -> None:
-        self.tasks, self.session = opened.tasks, opened.session
+        self.tasks, self.session, self.virtual = opened.tasks, opened.session, opened.virtual
         self.marks = [Mark.OPEN if task in opened.open else Mark.ACCEPTED for task in opened.tasks]
         for known in opened.known:
             label = known.completed.run.label

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from dbbstation.files.formats.bar import read_bar
 from dbbstation.files.formats.machine import read_machine
 from dbbstation.files.formats.plan import read_inline_plan
+from dbbstation.files.recordings.entries import ReadBy
 from dbbstation.files.recordings.session import SESSION_FILE, read_session
 from dbbstation.files.recordings.session_details import SessionDetails
 from dbbstation.instrument.library import load_instrument, with_zero
@@ -19,6 +20,7 @@ from dbbstation.service.memory import Line
 from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.station.assembly import Job
 from dbbstation.station.bar_known import USUAL_AGE_H, check_bar_known
+from dbbstation.station.opening import check_not_mixed
 from dbbstation.station.programs import load_programs
 from dbbstation.station.schedule import Schedule
 
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.instrument.protocol import Protocol
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
@@ -187,12 +190,13 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
         rate_hz=protocol.fastest_hz(choice.line.baud),
         range_mm=protocol.length.range_mm,
         model=model,
+        instrument=ReadBy(protocol.name, choice.line.profile, choice.line.port, choice.line.virtual),
     )
     job.check(str(plan_file))
     domain = plan.to_domain()
     if not (choice.goes_on or choice.line.virtual or details.bar_waiver):
         check_bar_known(bar, domain, datetime.now(UTC), limits.largest_bar_age_h)
-    recorded = read_session(choice.folder).runs if choice.goes_on else ()
+    recorded = _recorded(choice.folder, job.instrument) if choice.goes_on else ()
     left = Schedule(domain, lambda _test, _direction: 1, recorded).open
     circles = [domain.tests[task.test].run(task.direction) for task in left]
     names = (*domain.tests, *domain.repeat_at_end)
@@ -206,6 +210,17 @@ def prepare(choice: Choice, limits: Limits | None = None, model: IdentifiedModel
         circles[0] if circles else None,
         height_and_drift([domain.tests[name].circle.centre_mm[2] for name in names], degree=1),
     )
+
+
+def _recorded(folder: Path, instrument: ReadBy | None) -> tuple[RunEntry, ...]:
+    """Return the runs of a session that goes on.
+
+    Raises:
+        InputError: faults of the session; virtual and real circles would be mixed.
+    """
+    session = read_session(folder)
+    check_not_mixed(folder, session, instrument)
+    return session.runs
 
 
 def _protocol(choice: Choice) -> Protocol:

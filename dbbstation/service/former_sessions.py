@@ -87,7 +87,7 @@ def former_sessions(
 ) -> list[tuple[datetime, SessionFolder]]:
     """Return sessions of the same machine, plan and jig that ended before this one began, the last first.
 
-    The nominal machines are the same, serial numbers do not differ, and every test of this session's accepted runs was run there
+    Both are of a real machine or both of a virtual one. The nominal machines are the same, serial numbers do not differ, and every test of this session's accepted runs was run there
     about the same ball in the same place. Before it has an accepted run, that holds for every test of its plan.
 
     Args:
@@ -153,6 +153,8 @@ def keep_models(former: Former, folder: Path) -> tuple[Path, ...]:
 
 
 def _alike(now: SessionFolder, then: SessionFolder, tests: set[str]) -> bool:
+    if bool(now.virtual) is not bool(then.virtual):
+        return False
     serials = {one.serial_number for one in (now, then) if one.serial_number}
     same = all(
         name in now.plan.tests

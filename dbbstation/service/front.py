@@ -13,6 +13,7 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.instrument.library import known_instruments, load_instrument, load_variants, with_zero
 from dbbstation.service.after import JOINT, KINEMATIC, After
 from dbbstation.service.bar_calibration import BarCalibration, Stated
+from dbbstation.service.bar_stated import fault_of
 from dbbstation.service.candidates import Kind, candidates
 from dbbstation.service.choice import Choice, Limits, Part, Prepared, prepare
 from dbbstation.service.held_line import HeldLine, HeldOpen
@@ -20,6 +21,7 @@ from dbbstation.service.memory import VIRTUAL, Line, Memory
 from dbbstation.service.opening import opener
 from dbbstation.service.port_probe import Answer, ports, probe
 from dbbstation.service.runner import Runner
+from dbbstation.service.session_line import line_to_go_on
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.shop_temperature import note_temperature
 from dbbstation.service.virtual_place import virtual_place
@@ -109,7 +111,8 @@ class Front:
 
     def goes_on_with(self, folder: Path) -> Choice:
         """Return the choice to go on with a session: plan and machine lie in its folder, the instrument is remembered."""
-        return Choice(folder, line=self._with_given(self.memory.read().line_of(folder)))
+        line = self.memory.read().line_of(folder)
+        return Choice(folder, line=line_to_go_on(folder, line, self._with_given(line)))
 
     def new_folder(self, name: str = "session") -> Path:
         """Return a folder for a new session that is not there yet."""
@@ -224,6 +227,18 @@ class Front:
         """
         numbers = {name: _number(values, name) for name in ("calibrator_mm", "calibrator_u_um", "temp_c")}
         return Stated(values["serial_number"], values["calibrator"], certified=values["certified"], **numbers)
+
+    def fault_of_stated(self, name: str, text: str, line: Line, reads_mm: float | None) -> str:
+        """Return what is wrong with a text that was typed of bar or calibrator; empty where nothing is.
+
+        Args:
+            name: of the value, as the names of `Stated`.
+            text: as typed.
+            line: instrument; one that shows what it was told says nothing of the calibrator's length.
+            reads_mm: what it reads now [mm]; None: nothing.
+        """
+        length = load_instrument(line.instrument, line.profile or None).length
+        return fault_of(name, text, None if length.relative else reads_mm, length.stroke_mm)
 
     def off_calibrator_um(self, length_mm: float, values: Mapping[str, str]) -> float | None:
         """Return how much longer a reading is than the calibrator [µm]; None where its length is not stated yet."""

@@ -33,7 +33,9 @@ def opener(job: Job, line: HeldLine, *, observers: Sequence[Observer] = ()) -> O
             for observer in observers:
                 workplace.station.subscribe(observer)
             try:
-                yield OpenStation(workplace.station, workplace.schedule, str(job.folder), workplace.judge.known())
+                virtual = workplace.writer.session.virtual is True
+                known = workplace.judge.known()
+                yield OpenStation(workplace.station, workplace.schedule, str(job.folder), known, virtual)
             finally:
                 workplace.close()
 

@@ -36,12 +36,14 @@ class OpenStation:
         schedule: what is left to do.
         session: where the recordings are.
         known: what judged runs of the session say, from disk.
+        virtual: whether machine and instrument are virtual.
     """
 
     station: Station
     schedule: Schedule
     session: str
     known: tuple[JudgedRun, ...] = ()
+    virtual: bool = False
 
 
 Opener: TypeAlias = "Callable[[], AbstractContextManager[OpenStation]]"
@@ -117,7 +119,9 @@ class Runner:
         try:
             with self._opener() as opened:
                 self._mail.put(
-                    SequenceOpened(opened.schedule.tasks, opened.schedule.open, opened.session, opened.known)
+                    SequenceOpened(
+                        opened.schedule.tasks, opened.schedule.open, opened.session, opened.known, opened.virtual
+                    )
                 )
                 opened.station.subscribe(self._observe)
                 self._station = opened.station

@@ -39,6 +39,7 @@ class SessionLine:
         unjudged: runs that wait for a verdict.
         left_s: time that the circles take that are left [s].
         problem: why it cannot be gone on with; empty where it can.
+        virtual: whether its circles are of a virtual machine, as it says itself.
     """
 
     folder: Path
@@ -50,6 +51,7 @@ class SessionLine:
     unjudged: int = 0
     left_s: float = 0.0
     problem: str = ""
+    virtual: bool = False
 
     @property
     def complete(self) -> bool:
@@ -109,6 +111,7 @@ def _line(folder: Path, changed: datetime) -> SessionLine:
         planned=len(schedule.tasks),
         unjudged=len(session.in_state(RunState.COMPLETE)),
         left_s=circles_s(circles),
+        virtual=session.virtual is True,
     )
 
 

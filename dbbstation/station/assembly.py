@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from dbbstation.errors import InputError, Problem
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.recordings.entries import ReadBy
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.machine.geometry import Machine
     from dbbstation.model.identified import IdentifiedModel
@@ -49,6 +50,7 @@ class Job:
         rate_hz: readings per second that the instrument brings; None: not known.
         range_mm: lowest and highest length that it reads; None: not known.
         model: of the machine, which says where circles are expected; None: its nominal geometry does.
+        instrument: what reads the lengths, as session and runs note it; None: not known.
     """
 
     machine: Machine
@@ -62,6 +64,7 @@ class Job:
     rate_hz: float | None = None
     range_mm: tuple[float, float] | None = None
     model: IdentifiedModel | None = None
+    instrument: ReadBy | None = None
 
     def check(self, plan_file: str) -> None:
         """Dry-run the plan; to be done before an instrument is opened.
@@ -123,7 +126,8 @@ def assemble(
         InputError: the folder holds another session, or one with faults.
         OutputError: the folder cannot be written.
     """
-    writer = open_session(job.folder, job.machine, job.plan, job.details, with_programs=bool(job.programs))
+    details = replace(job.details, instrument=job.instrument)
+    writer = open_session(job.folder, job.machine, job.plan, details, with_programs=bool(job.programs))
     plan = job.plan.to_domain()
     kept = {
         key: writer.add_program(program.name, program.content, model_sha256=program.model_sha256)
@@ -133,7 +137,7 @@ def assemble(
     names = {key: program.name for key, program in job.programs.items()}
     # Real runs bear the computer's time, so that they fit what thermometers log.
     now = None if job.time_scale == 1.0 else time_of_day(job.clock, last_end(writer.session))
-    storage = Storage(writer, now, kept, unreadable, asked=asked)
+    storage = Storage(writer, now, kept, unreadable, asked=asked, instrument=job.instrument)
     judge = RunJudge(writer, kept, job.model)
     sequencer = Sequencer(
         plan,

@@ -22,7 +22,13 @@ class Start:
 
 @dataclass(frozen=True)
 class Accept:
-    """The complete run counts; go on to the next."""
+    """The complete run counts; go on to the next.
+
+    Attributes:
+        reason: why, where something was found wrong with it; empty: what was found is kept.
+    """
+
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -30,10 +36,10 @@ class Repeat:
     """The run does not count, neither when complete nor while it goes on: measure it again.
 
     Attributes:
-        reason: kept with the recording.
+        reason: kept with the recording; empty: what was found wrong with it, else that the operator wanted it.
     """
 
-    reason: str = "repeated by the operator"
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -41,10 +47,10 @@ class Reject:
     """The run does not count; go on to the next. What lacks an accepted run is named at the end.
 
     Attributes:
-        reason: kept with the recording.
+        reason: as of `Repeat`.
     """
 
-    reason: str = "rejected by the operator"
+    reason: str = ""
 
 
 @dataclass(frozen=True)

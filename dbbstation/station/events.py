@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from dbbstation.quality.answer import answer
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
     from dbbstation.plan.circle import Circle, Direction
     from dbbstation.plan.plan import Ball
     from dbbstation.plan.sampling import Sampling
+    from dbbstation.quality.answer import Answer
     from dbbstation.quality.finding import Finding
     from dbbstation.station.commands import Command
     from dbbstation.station.states import State
@@ -193,6 +196,11 @@ class RunCompleted:
     doubtful: int = 0
 
     @property
+    def answer(self) -> Answer:
+        """The run in one word, and what caused it."""
+        return answer(self.findings, "" if self.figures is not None else self.problem or "no circle")
+
+    @property
     def wrong(self) -> tuple[Finding, ...]:
         """Findings that pass their limit: reasons to measure the run again."""
         return tuple(finding for finding in self.findings if finding.wrong)
@@ -239,9 +247,15 @@ class Noted:
 
 @dataclass(frozen=True)
 class RunAccepted:
-    """The run counts."""
+    """The run counts.
+
+    Attributes:
+        run: which run.
+        reason: why, although something was found wrong with it; empty where nothing was.
+    """
 
     run: RunId
+    reason: str = ""
 
 
 @dataclass(frozen=True)

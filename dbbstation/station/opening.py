@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
+    from dbbstation.files.recordings.entries import ReadBy
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.files.recordings.session_details import SessionDetails
     from dbbstation.machine.geometry import Machine
@@ -24,9 +25,15 @@ if TYPE_CHECKING:
 
 
 def check_session(
-    folder: Path, machine: Machine, plan: InlinePlan, *, with_programs: bool, session: SessionFolder
+    folder: Path,
+    machine: Machine,
+    plan: InlinePlan,
+    details: SessionDetails,
+    *,
+    with_programs: bool,
+    session: SessionFolder,
 ) -> None:
-    """Refuse to go on with a session of another machine, another plan, or another way to command the circles.
+    """Refuse to go on with a session of another machine, another plan, another way to command the circles, or of the other world.
 
     Raises:
         InputError: everything that differs.
@@ -43,6 +50,31 @@ def check_session(
         was, now = ("plain circles", "NC programs") if with_programs else ("NC programs", "plain circles")
         what = f"its runs were commanded by {was}, now {now} are asked for"
         faults.append(Problem(str(folder), 0, 0, what, "measure them into a session of their own"))
+    faults += _mixed(folder, session, details.instrument)
+    if faults:
+        raise InputError(faults)
+
+
+def _mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> list[Problem]:
+    """Say that virtual and real circles would be mixed; a session of an older program does not tell which it has."""
+    if instrument is None or (not session.runs and session.virtual is None):
+        return []
+    if session.virtual is None and not instrument.virtual:
+        return []
+    if session.virtual is instrument.virtual:
+        return []
+    kinds = {True: "a virtual machine", False: "a real machine", None: "a machine that is not noted as virtual"}
+    what = f"this session is of {kinds[session.virtual]}, and {instrument.text} is that of {kinds[instrument.virtual]}"
+    return [Problem(str(folder), 0, 0, what, "measure into a session of its own: give another --out")]
+
+
+def check_not_mixed(folder: Path, session: SessionFolder, instrument: ReadBy | None) -> None:
+    """Refuse to measure virtual circles into a session of real ones, or the other way round.
+
+    Raises:
+        InputError: they would be mixed.
+    """
+    faults = _mixed(folder, session, instrument)
     if faults:
         raise InputError(faults)
 
@@ -60,7 +92,7 @@ def open_session(
         return SessionWriter.create(folder, machine, plan, details)
     writer = SessionWriter.open(folder)
     try:
-        check_session(folder, machine, plan, with_programs=with_programs, session=writer.session)
+        check_session(folder, machine, plan, details, with_programs=with_programs, session=writer.session)
     except InputError:
         writer.close()
         raise

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from dbbstation.instrument.reading import DOUBTFUL, OK
 from dbbstation.plan.circle import FULL_TURN_DEG
 from dbbstation.plan.sampling import sampling
+from dbbstation.quality.finding import against_limit
 from dbbstation.quality.held import HeldLength
 from dbbstation.station import events
 from dbbstation.station.commands import Accept, Command, GoTo, Judge, Note, Pause, Reject, Repeat, Resume, Skip, Start
@@ -20,6 +21,7 @@ from dbbstation.station.states import (
     FINAL,
     RECORDING,
     TRANSITIONS,
+    VERDICT,
     Cause,
     State,
     commands_allowed,
@@ -111,6 +113,7 @@ class Sequencer:
         self._unjudged = deque(waiting)
         self._waiting_since_s: float | None = None
         self._told_deg = 0.0
+        self._wrong = ""
 
     def begin(self) -> list[Event]:
         """Announce the first run, or one that waits for its verdict."""
@@ -127,7 +130,7 @@ class Sequencer:
             case Start():
                 self._arm(command)
             case Accept():
-                self._accept()
+                self._accept(command)
             case Repeat() | Reject():
                 self._throw_out(command)
             case Skip():
@@ -206,6 +209,7 @@ class Sequencer:
         run = waiting.completed.run
         self._announce(run, self.schedule.number_of(run), put_up=False)
         self._out += [events.RunRestored(run, waiting.samples), waiting.completed]
+        self._wrong = _found_wrong(waiting.completed)
         self._move(Cause.CIRCLE_MISSING if waiting.completed.figures is None else Cause.CIRCLE_FOUND)
 
     def _to_next(self, cause: Cause) -> None:
@@ -222,18 +226,21 @@ class Sequencer:
         self._waiting_since_s = None
         self._move(Cause.START)
 
-    def _accept(self) -> None:
+    def _accept(self, command: Accept) -> None:
         run = self._announced()
         self.schedule.accept(run)
-        self._out.append(events.RunAccepted(run))
+        reason = command.reason or (f"accepted although {self._wrong}" if self._wrong else "")
+        self._out.append(events.RunAccepted(run, reason))
         self._to_next(Cause.ACCEPT)
 
     def _throw_out(self, command: Repeat | Reject) -> None:
         run = self._announced()
+        word = "repeated" if isinstance(command, Repeat) else "rejected"
+        reason = command.reason or (self._wrong if self.state in VERDICT else "") or f"{word} by the operator"
         if self.state in RECORDING:
-            self._complete(problem=command.reason)
+            self._complete(problem=reason)
         if self.state is not State.ARMED:
-            self._out.append(events.RunRejected(run, command.reason))
+            self._out.append(events.RunRejected(run, reason))
         if isinstance(command, Reject):
             self.schedule.pass_over(run)
         self._to_next(COMMAND_CAUSES[type(command)])
@@ -255,7 +262,9 @@ class Sequencer:
         self.schedule.judge(command.test, command.direction, command.repeat, accepted=command.accepted)
         # The mounting of a run that was recorded long ago is not needed to judge it.
         run = events.RunId(command.test, command.direction, command.repeat, 0)
-        verdict = events.RunAccepted(run) if command.accepted else events.RunRejected(run, command.reason)
+        verdict = (
+            events.RunAccepted(run, command.reason) if command.accepted else events.RunRejected(run, command.reason)
+        )
         self._out.append(verdict)
 
     def _stop(self) -> None:
@@ -388,9 +397,9 @@ class Sequencer:
             found, problem = record.circle_figures(recording, self.plan.largest_loss_percent)
             if found is not None and self._judge_run is not None:
                 findings = self._judge_run(record.run, recording)
-        self._out.append(
-            events.RunCompleted(record.run, len(record), record.lost, found, problem, findings, record.doubtful)
-        )
+        completed = events.RunCompleted(record.run, len(record), record.lost, found, problem, findings, record.doubtful)
+        self._out.append(completed)
+        self._wrong = _found_wrong(completed)
         self.schedule.recorded(record.run)
         self._edges = None
         return found is not None
@@ -440,6 +449,13 @@ def _length_gone(reading: Reading, phi_deg: float) -> str:
     said = f" ({reading.said})" if reading.said else ""
     what = f"the instrument reports {reading.status}{said} at {phi_deg:.0f}° of the turn"
     return f"{what}; {reading.remedy or 'check bar and instrument'}, then repeat the run"
+
+
+def _found_wrong(completed: events.RunCompleted) -> str:
+    """What was found wrong with a run, as its reason in the session: every finding with its number and limit."""
+    if completed.problem:
+        return completed.problem
+    return "; ".join(f"{one.name} wrong, {against_limit(one)}".removesuffix(", ") for one in completed.wrong)
 
 
 def _remedy(circle: Circle) -> str:

@@ -18,13 +18,17 @@ from dbbstation.trace.recording import Recording
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from dbbstation.files.recordings.entries import Program, RunEntry
+    from dbbstation.files.recordings.entries import Program, ReadBy, RunEntry
     from dbbstation.files.recordings.journal import RunWriter
     from dbbstation.files.recordings.session_writer import SessionWriter
     from dbbstation.plan.circle import Direction
 
 COLUMNS = ("t_s", "length_mm", "status")
 """What the station records of every instrument."""
+
+
+FASTER_BEGINS_BEFORE = timedelta(days=30)
+"""How far back the time of a faster clock begins: at ten times real time it comes up to the computer's after three days of measuring."""
 
 
 class Storage:
@@ -36,6 +40,7 @@ class Storage:
         programs: NC program, kept in the session already, by test and direction.
         unreadable: what the driver rejected so far, by what was wrong with it.
         asked: whether the instrument is asked for each reading: the time of each then has an uncertainty of its own.
+        instrument: what reads the lengths; None: not known.
     """
 
     def __init__(
@@ -46,6 +51,7 @@ class Storage:
         unreadable: Callable[[], Mapping[str, int]] = dict,
         *,
         asked: bool = False,
+        instrument: ReadBy | None = None,
     ) -> None:
         self._writer = writer
         self._now = now or (lambda: datetime.now(UTC))
@@ -56,6 +62,7 @@ class Storage:
         self._unreadable = unreadable
         self._columns = (*COLUMNS, TIME_UNCERTAINTY) if asked else COLUMNS
         self._unreadable_before: Counter[str] = Counter()
+        self._instrument = instrument
 
     def __call__(self, event: events.Event) -> None:
         """Keep what the event says.
@@ -75,7 +82,7 @@ class Storage:
                 self._writer.finish_run(self._journal, counts)
                 self._journal = None
             case events.RunAccepted():
-                self._writer.judge(self._entry(event.run), accepted=True)
+                self._writer.judge(self._entry(event.run), accepted=True, reason=event.reason)
             case events.RunRejected():
                 self._writer.judge(self._entry(event.run), accepted=False, reason=event.reason)
             case events.Noted():
@@ -137,6 +144,7 @@ class Storage:
             started=self._now(),
             mounting=run.mounting,
             program=self._programs.get((run.test, run.direction)),
+            instrument=self._instrument,
         )
         expected = self._writer.session.folder / "runs" / f"{run.label}.csv"
         if self._journal.sealed_path != expected:
@@ -168,12 +176,15 @@ class Storage:
 
 
 def time_of_day(clock: Callable[[], float], last: datetime | None = None) -> Callable[[], datetime]:
-    """Return the time of day that goes as fast as a scaled `clock`, so that runs on it lie apart as their samples do.
+    """Return a time of day that goes as fast as a scaled `clock`, so that runs on it lie apart as their samples do.
+
+    It begins so far back that it does not overtake the computer's own: nothing is recorded in the future.
 
     Args:
         clock: machine time, faster than real time [s].
         last: start of the last run of a session that goes on; time of day never falls behind it.
     """
     begun_s = clock()
-    begun = datetime.now(UTC) if last is None else max(datetime.now(UTC), last)
+    begun = datetime.now(UTC) - FASTER_BEGINS_BEFORE
+    begun = begun if last is None else max(begun, last)
     return lambda: begun + timedelta(seconds=clock() - begun_s)

@@ -21,7 +21,7 @@ from dbbstation.files.own_sources import every_source
 from dbbstation.results.of_calibration import calibration_figures, calibration_result, report_of
 from dbbstation.sources.laws.by_temperature import following_thermometers
 from dbbstation.sources.registry import sources_named
-from dbbstation.tasks.load import READING, loaded
+from dbbstation.tasks.load import loaded
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from dbbstation.tasks.load import Recorded, Sessions
     from dbbstation.tasks.telling import Progress
 
-STAGES = {READING: 0, "fit": 10, "figures": 42, "observability": 57}
-"""Stages of a calibration, and the share of its time that has passed by then [%]; fits are one or several."""
+STAGES = {"fit": 0, "figures": 36, "observability": 53}
+"""Stages of a calibration once runs are read, and the share of its time that has passed by then [%]; fits are one or several."""
 
 
 def calibrate(

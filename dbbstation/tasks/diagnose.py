@@ -18,7 +18,7 @@ from dbbstation.results.of_calibration import calibration_figures, report_of
 from dbbstation.results.of_diagnosis import diagnosis_figures, diagnosis_result
 from dbbstation.results.serialise import plain
 from dbbstation.sources.registry import known_sources, sources_named
-from dbbstation.tasks.load import READING, loaded
+from dbbstation.tasks.load import loaded
 from dbbstation.tasks.telling import Telling, never, silent
 
 if TYPE_CHECKING:
@@ -33,15 +33,14 @@ if TYPE_CHECKING:
     from dbbstation.tasks.telling import Progress
 
 STAGES = {
-    READING: 0,
-    "kinematic calibration": 5,
-    "candidates": 14,
-    "joint fit": 47,
-    "verdicts": 76,
-    "held-out tests": 78,
-    "next test": 81,
+    "kinematic calibration": 0,
+    "candidates": 10,
+    "joint fit": 45,
+    "verdicts": 75,
+    "held-out tests": 77,
+    "next test": 80,
 }
-"""Stages of a diagnosis, and the share of its time that has passed by then [%]; joint fits are none or several."""
+"""Stages of a diagnosis once runs are read, and the share of its time that has passed by then [%]; joint fits are none or several."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from dbbstation.calibration.reporting.prediction import predicted_circles
 from dbbstation.machine.difference import check_model_is_of
 from dbbstation.results.evaluation import EvaluationResult, LowPassedCircularity
 from dbbstation.results.of_evaluation import evaluated_runs, evaluated_tolerances
-from dbbstation.tasks.load import READING, loaded
+from dbbstation.tasks.load import loaded
 from dbbstation.tasks.models import model_of
 from dbbstation.tasks.telling import Telling, never, silent
 
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from dbbstation.tasks.models import Model
     from dbbstation.tasks.telling import Progress
 
-STAGES = {READING: 0, "predicting runs": 30}
-"""Stages of an evaluation, and the share of its time that has passed by then [%]."""
+STAGES = {"predicting runs": 0}
+"""Stages of an evaluation once runs are read, and the share of its time that has passed by then [%]."""
 
 
 def evaluate(

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dbbstation.errors import InputError, OutputError, Problem, TraceError
-from dbbstation.files.atomic import streamed, write_text
+from dbbstation.files.atomic import refuse_existing, streamed, write_text
 from dbbstation.files.csv_rows import csv_text
-from dbbstation.files.provenance import beside_table
+from dbbstation.files.provenance import beside_table, refuse_existing_table
 from dbbstation.files.recordings.entries import RunState
 from dbbstation.files.recordings.run_lines import split_head
+from dbbstation.files.recordings.session import read_session
 from dbbstation.plan.circle import FULL_TURN_DEG
+from dbbstation.tasks.chosen import chosen_of
+from dbbstation.tasks.load import paths_of
+from dbbstation.tasks.provenance import from_python
+from dbbstation.tasks.telling import Telling, never, silent
 from dbbstation.trace import columns
 from dbbstation.trace.cut import edges_of, progress_deg
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
+    from os import PathLike
 
     from numpy.typing import NDArray
 
@@ -28,7 +34,80 @@ if TYPE_CHECKING:
     from dbbstation.files.recordings.entries import RunEntry
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.plan.circle import Circle
+    from dbbstation.tasks.load import Sessions
+    from dbbstation.tasks.telling import Progress
     from dbbstation.trace.recording import Recording
+
+FORMATS = (".csv", ".parquet")
+"""Formats of a table, by the ending of its file."""
+
+
+@dataclass(frozen=True)
+class ExportResult:
+    """A table that was written.
+
+    Attributes:
+        table: its file.
+        runs: in it.
+        rows: in it, one for each sample.
+        columns: names, with units.
+    """
+
+    table: str
+    runs: int
+    rows: int
+    columns: tuple[str, ...]
+
+
+def export(
+    sessions: Sessions,
+    out: str | PathLike[str],
+    *,
+    tests: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    states: Sequence[str] = (),
+    force: bool = False,
+    provenance: Callable[[], Provenance] = from_python,
+    progress: Progress = silent,
+    stop: Callable[[], bool] = never,
+    say: Callable[[str], None] = silent,
+) -> ExportResult:
+    """Write sessions as one tidy table: one row per sample, with test, direction, repeat, state, time, angle, length, deviation.
+
+    Args:
+        sessions: session folders or session files.
+        out: CSV or Parquet file to write.
+        tests: names of tests to take; empty for all.
+        exclude: names of tests to leave out.
+        states: of runs to take; empty for all.
+        force: overwrite.
+        provenance: asked, when all is read, where the table comes from.
+        progress: told how many runs are done.
+        stop: asked after each run whether to stop.
+        say: told of what is missing.
+
+    Raises:
+        InputError: a run cannot be read; no run is left.
+        OutputError: the file's ending is another; a file exists and `force` is not given; pyarrow is not installed.
+        StationError: a test that a plan does not have.
+        StoppedError: `stop` returned True; nothing was written.
+    """
+    path = Path(out)
+    if path.suffix.lower() not in FORMATS:
+        raise OutputError("a table is written as .csv or .parquet", where=str(path), remedy="name such a file")
+    is_csv = path.suffix.lower() == FORMATS[0]
+    (refuse_existing_table if is_csv else refuse_existing)(path, force=force)
+    runs: list[tuple[SessionFolder, RunEntry]] = []
+    for folder in paths_of(sessions):
+        session = read_session(folder)
+        chosen = set(chosen_of(session.plan.name, session.plan.tests, tests, exclude))
+        runs += [(session, run) for run in session.runs if run.test in chosen and (not states or run.state in states)]
+    what = exporting(runs)
+    telling = Telling(progress, stop, say)
+    write = write_csv if is_csv else write_parquet
+    rows = write(path, what, provenance, telling.counted("export"), telling.note, force=force)
+    return ExportResult(str(path), len(runs), rows, what.names)
+
 
 OF_RUN = ("session", "test", "direction", "repeat", "mounting", "state", "started")
 """Columns that are the same in all rows of a run."""
@@ -203,7 +282,7 @@ def write_csv(
         file.write(csv_text([what.names]).encode())
         for block in blocks(what, progress, say):
             cells = [_cells(block[name], whole=name in _WHOLE) for name in what.names]
-            file.write(csv_text(zip(*cells, strict=True)).encode())
+            file.write(csv_text(zip(*cells, strict=True), exact=True).encode())
             rows += len(cells[0])
         told = {**provenance().data(), "columns": _meanings(what)}
         write_text(beside_table(path), json.dumps(told, indent=1, ensure_ascii=False) + "\n", force=force)

@@ -264,7 +264,7 @@ def _check_feed(recording: Recording, circle: Circle, edges: tuple[float, float]
     raise TraceError(
         f"{shown}, the plan says {circle.feed_mm_min:g}",
         where=recording.name,
-        remedy="set the feed of this test in the plan to the one that was run",
+        remedy="set the override on the control to 100 % and run it again; a feed that was wanted goes into the plan",
     )
 
 

@@ -40,8 +40,8 @@ class AcceptanceScreen(RowScreen):
     help_name = "acceptance"
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        ("b", "former", "Session before"),
-        ("x", "cancel", "End"),
+        ("h", "former", "Session before"),
+        ("k", "cancel", "End"),
         ("escape,q", "back", "Back"),
     ]
 
@@ -77,7 +77,7 @@ class AcceptanceScreen(RowScreen):
             return self._after.busy is Step.ACCEPTANCE
         return super().check_action(action, parameters)
 
-    def on_option_list_option_highlighted(self, _chosen: OptionList.OptionHighlighted) -> None:
+    def chosen_another(self) -> None:
         """Tell of the row that the cursor is on."""
         self._draw()
 

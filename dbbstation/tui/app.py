@@ -17,10 +17,12 @@ from dbbstation.service.background import Background
 from dbbstation.service.board import Board
 from dbbstation.service.last_session import last_traces
 from dbbstation.service.messages import Message, Weight
+from dbbstation.service.operated import JobAnswer
 from dbbstation.service.shop_temperature import note_temperature, shop_degc
-from dbbstation.station.commands import Command, Note, Quit
+from dbbstation.service.verdicts import give_verdict
+from dbbstation.station.commands import Command, Judge, Note, Quit
 from dbbstation.station.events import Noted
-from dbbstation.station.states import FINAL, RECORDING, VERDICT
+from dbbstation.station.states import FINAL, RECORDING, VERDICT, State
 from dbbstation.tui.board_screen import BoardScreen, ask_to_give_up
 from dbbstation.tui.controls import show_controls
 from dbbstation.tui.explained import ExplainedScreen
@@ -28,6 +30,8 @@ from dbbstation.tui.help_screen import HelpScreen
 from dbbstation.tui.help_texts import HELP
 from dbbstation.tui.large_screen import LargeScreen
 from dbbstation.tui.measure_screen import MeasureScreen
+from dbbstation.tui.messages_screen import MessagesScreen
+from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import GiveUpQuestion
 from dbbstation.tui.results_screen import ResultsScreen
@@ -48,6 +52,7 @@ if TYPE_CHECKING:
     from dbbstation.service.choice import Choice, Prepared
     from dbbstation.service.front import Front, Opened
     from dbbstation.service.live_trace import LiveTrace
+    from dbbstation.service.operated import Operated
     from dbbstation.station.events import Event
 
 __all__ = ["DARK", "LIGHT", "LOOK_S", "Sequence", "Shown", "StationApp"]
@@ -59,6 +64,9 @@ _TALL_ROWS = 32
 """From so many rows on there is room for more than the necessary."""
 
 DARK, LIGHT = "textual-dark", "textual-light"
+
+_NOT_OPERATED = frozenset({"overview", "large", "results", "temperature", "command_palette"})
+"""What an operator of a job cannot reach."""
 
 
 class Sequence(Protocol):
@@ -96,6 +104,7 @@ class StationApp(App[None]):
         runner: runs the sequence; started when the screen stands; None where `front` opens it.
         clock: real time, for telling an old reading [s].
         front: finds sessions and opens jobs; None: there is only what `runner` runs.
+        operated: the one job that can be measured, for an operator; None: everything can.
     """
 
     TITLE = "dbbstation"
@@ -106,6 +115,7 @@ class StationApp(App[None]):
         ("o", "overview", "Tests"),
         ("f", "large", "Large"),
         ("c", "connect", "Connect again"),
+        Binding("j", "messages", "Messages", show=False),
         # The sentence at the end of the plan names it; until then the footer has no room.
         Binding("e", "results", "Results", show=False),
         Binding("t", "temperature", "Temperature", show=False),
@@ -123,6 +133,7 @@ class StationApp(App[None]):
         *,
         clock: Callable[[], float] = time.monotonic,
         front: Front | None = None,
+        operated: Operated | None = None,
     ) -> None:
         show_controls()
         super().__init__()
@@ -131,13 +142,17 @@ class StationApp(App[None]):
         self._show = shown or Shown("")
         self._runner = runner
         self._front = front
+        self._operated = operated
+        self._answering = False
         self._leaving = self._opening = self._wholly = False
         self._works: list[tuple[Background[Any], Callable[[Any], None], Callable[[Exception], None]]] = []
         self._after: dict[Path, After] = {}
         self._looked_up: tuple[Path, str] | None = None
 
-    def get_default_screen(self) -> MeasureScreen | StartScreen:
+    def get_default_screen(self) -> MeasureScreen | StartScreen | JobScreen:
         """Return the screen at the bottom of the stack."""
+        if self._operated is not None and self._front is not None:
+            return JobScreen(self, self._front, self._operated)
         if self._runner is None and self._front is not None:
             return StartScreen(self, self._front)
         return MeasureScreen(self, self._show, clock=self._clock)
@@ -185,10 +200,32 @@ class StationApp(App[None]):
         self._look_up_last()
         self._drop_stale_question()
         self.draw()
+        if self.board.finished is not None and self._operated is not None and not self._answering:
+            self._answer_job(self._operated)
         if runner.crash is not None:
             self.exit()
         elif self._leaving and not alive:
             self._end()
+
+    def _answer_job(self, operated: Operated) -> None:
+        """Show the answer on a job whose plan is through, behind the temperature where that is asked for."""
+        self._answering = True
+        folder = Path(self.board.session)
+        missing = self.board.finished.missing if self.board.finished is not None else ()
+
+        def failed(error: Exception) -> None:
+            self.board.messages.append(Message(Weight.FAULT, str(error)))
+
+        def show(answer: JobAnswer) -> None:
+            self.push_screen(AnswerScreen(answer, lambda: self.leave(sure=True)))
+
+        def work_out() -> None:
+            self.do(lambda: JobAnswer(operated, folder, missing), show, failed)
+
+        if self.board.temperature_due and "temperature" in operated.job.may_change:
+            self._ask_temperature(work_out)
+        else:
+            work_out()
 
     @property
     def crash(self) -> Exception | None:
@@ -247,19 +284,26 @@ class StationApp(App[None]):
         plan = opened.prepared.job.plan
         self._show = Shown(plan.plan.name, plan.jig.bores, tests=plan.to_domain().tests)
         self.board, self._runner, self._leaving = Board(), opened.runner, False
+        self._answering = False
         self._back_to_start()
-        self.push_screen(MeasureScreen(self, self._show, clock=self._clock))
+        beside = MeasureScreen if self._operated is None else OperateScreen
+        self.push_screen(beside(self, self._show, clock=self._clock))
         opened.runner.start()
 
     def _back_to_start(self) -> None:
-        while not isinstance(self.screen, StartScreen):
+        while not isinstance(self.screen, StartScreen | JobScreen):
             self.pop_screen()
 
     def _end(self) -> None:
         """Close what was measured: back to the start screen where there is one."""
         self._leaving = False
         start = self.screen_stack[0] if self.screen_stack else None
-        if self._wholly or self._front is None or self._runner is None or not isinstance(start, StartScreen):
+        if (
+            self._wholly
+            or self._front is None
+            or self._runner is None
+            or not isinstance(start, StartScreen | JobScreen)
+        ):
             self.exit()
             return
         self._front.close()
@@ -269,6 +313,10 @@ class StationApp(App[None]):
 
     def show_results(self, folder: Path) -> None:
         """Show what can be done with a session that is measured; what was done before still stands there."""
+        known = self._after.get(folder)
+        if known is not None and known.busy is None and known.outdated:
+            known.close()
+            del self._after[folder]
         if folder not in self._after:
             self._after[folder] = After(folder) if self._front is None else self._front.after(folder)
         self.push_screen(ResultsScreen(self._after[folder]))
@@ -285,9 +333,29 @@ class StationApp(App[None]):
             drawn.draw()
 
     def send(self, command: Command) -> None:
-        """Pass a command on to the sequence."""
-        if self._runner is not None:
+        """Pass a command on to the sequence; a verdict also when the plan is through."""
+        if isinstance(command, Judge) and self.board.state is State.FINISHED:
+            self._judge_afterwards(command)
+        elif self._runner is not None:
             self._runner.send(command)
+
+    def _judge_afterwards(self, command: Judge) -> None:
+        """Note a verdict in the session, and begin the sequence anew: what does not count any more is measured again."""
+        runner, folder = self._runner, Path(self.board.session)
+        if runner is None:
+            return
+
+        def write() -> None:
+            runner.wait()
+            give_verdict(folder, command)
+
+        def written(_: None) -> None:
+            runner.start()
+
+        def failed(error: Exception) -> None:
+            self.board.messages.append(Message(Weight.FAULT, str(error)))
+
+        self.do(write, written, failed)
 
     def _drop_stale_question(self) -> None:
         """Take a question back whose circle has ended meanwhile: an answer to it would hit something else."""
@@ -301,12 +369,18 @@ class StationApp(App[None]):
     def _measuring(self) -> bool:
         """Whether the screen on top belongs to the machine, and not to what comes before or after."""
         top = self.screen_stack[-1] if self.screen_stack else None  # none while it closes
-        return self._runner is not None and not isinstance(top, RowScreen)
+        return self._runner is not None and not isinstance(top, RowScreen | AnswerScreen)
 
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+    def check_action(  # noqa: PLR0911 - a line per action, nothing nested
+        self, action: str, parameters: tuple[object, ...]
+    ) -> bool | None:
         """Only keys that mean something now stand in the footer and do something."""
+        if self._operated is not None and action in _NOT_OPERATED:
+            return False
         if action == "connect":
             return self.board.fault is not None and self._measuring
+        if action == "messages":
+            return self._measuring and not isinstance(self.screen_stack[-1], ModalScreen)
         if action == "temperature":
             return self._measuring and bool(self.board.session)
         if action == "results":
@@ -348,6 +422,10 @@ class StationApp(App[None]):
         if explained is not None and not isinstance(self.screen, ModalScreen):
             self.push_screen(HelpScreen(explained.help_name))
 
+    def action_messages(self) -> None:
+        """Show the messages with all their words."""
+        self.push_screen(MessagesScreen(list(self.board.messages)))
+
     def action_connect(self) -> None:
         """Open instrument and session again after a fault."""
         if self._runner is not None:
@@ -375,7 +453,7 @@ class StationApp(App[None]):
             self.exit()
         elif self.board.state in RECORDING and self.drawn is not None:
             ask_to_give_up(self.drawn, "Quit", self.leave)
-        elif self.board.temperature_due and self.board.fault is None and not self._leaving:
+        elif self.board.temperature_due and self.board.fault is None and not self._leaving and self._operated is None:
             self._ask_temperature(lambda: self.leave(sure=True))
         else:
             self.leave(sure=True)

@@ -9,6 +9,7 @@ from textual.widgets import OptionList
 
 from dbbstation.errors import StationError
 from dbbstation.instrument.reading import DOUBTFUL
+from dbbstation.service.bar_stated import doubt_of
 from dbbstation.service.front import NoNumberError
 from dbbstation.tui import texts
 from dbbstation.tui.asking import TypeQuestion
@@ -63,8 +64,13 @@ class BarScreen(RowScreen):
 
         def answered(text: str | None) -> None:
             if text is not None:
+                fault = self._front.fault_of_stated(name, text, self._line, self._reads_mm())
+                if fault:
+                    self._problem = f"{texts.BAR_ROWS[name]}: {fault}"
+                    self.look()
+                    return
                 had_length = self._values["calibrator_mm"]
-                self._values[name], self._problem = text, ""
+                self._values[name], self._problem = text, doubt_of(name, text)
                 if self._values["calibrator_mm"] != had_length:
                     self._reopen()
                 self._show()
@@ -142,6 +148,11 @@ class BarScreen(RowScreen):
             if off_um is not None
             else f"{reading.length_mm:.4f} mm"
         )
+
+    def _reads_mm(self) -> float | None:
+        """What the bar reads now [mm]; None where that is nothing, or doubtful."""
+        reading = None if self._calibration is None else self._calibration.latest
+        return None if reading is None or reading.status == DOUBTFUL else reading.length_mm
 
     def _missing(self) -> list[str]:
         return [name for name, value in self._values.items() if not value]

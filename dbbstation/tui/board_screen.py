@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
+from dbbstation.quality.answer import Word
 from dbbstation.station.commands import Accept, Command, Pause, Reject, Repeat, Resume, Skip, Start
-from dbbstation.station.states import RECORDING
+from dbbstation.station.states import RECORDING, VERDICT
 from dbbstation.tui.explained import ExplainedScreen
 from dbbstation.tui.panel import Panel
 from dbbstation.tui.question import GiveUpQuestion
+from dbbstation.tui.reason_question import ReasonQuestion
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -84,8 +86,9 @@ class RunScreen(BoardScreen):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("enter", "tell('start')", "Start"),
+        ("enter", "next", "Next"),
         ("m", "tell('touched')", "New mounting"),
-        ("a", "tell('accept')", "Accept"),
+        ("a", "accept", "Accept"),
         ("r", "tell('repeat')", "Repeat"),
         ("x", "tell('reject')", "Reject"),
         ("s", "tell('skip')", "Skip"),
@@ -102,7 +105,30 @@ class RunScreen(BoardScreen):
         """Only keys that mean something now stand in the footer and do something."""
         if action == "tell":
             return type(COMMANDS[str(parameters[0])]) in self.desk.board.allowed
+        if action == "accept":
+            return Accept in self.desk.board.allowed
+        if action == "next":
+            return self.desk.board.state in VERDICT
         return super().check_action(action, parameters)
+
+    def action_next(self) -> None:
+        """Do what the word on the run says: accept it, or measure it again. Nothing that is wrong is accepted so."""
+        completed = self.desk.board.completed
+        again = completed is None or completed.answer.word is Word.REPEAT
+        self.desk.send(COMMANDS["repeat" if again else "accept"])
+
+    def action_accept(self) -> None:
+        """Accept the run; one with something wrong for a reason only."""
+        completed = self.desk.board.completed
+        if completed is None or completed.answer.word is not Word.REPEAT:
+            self.desk.send(Accept())
+            return
+
+        def answered(reason: str | None) -> None:
+            if reason and self.desk.board.completed is completed:
+                self.desk.send(Accept(reason))
+
+        self.app.push_screen(ReasonQuestion(completed.run.label, counts=True), answered)
 
     def action_tell(self, name: str) -> None:
         """Send a command, after a question where it gives up a circle that is being recorded."""

@@ -37,15 +37,19 @@ class FiguresPanel(Panel):
 
 def _row(completed: RunCompleted, verdict: Verdict, *, wide: bool) -> Content:
     figures = completed.figures
-    name = f"{_short(completed.run.label):{_NAME}}"
+    rejected = verdict is Verdict.REJECTED
+    name = f"{_short(f'x {completed.run.label}' if rejected else completed.run.label):{_NAME}}"
     if figures is None:
         return Content(f"{name}no circle")
     centre = "".join(f"{1e3 * part:+7.1f}" for part in figures.centre_mm) if wide else ""
     sizes = f"{figures.centre_deviation_um:{_DISTANCE[wide]}.1f}{figures.mean_radial_error_um:+{_MEAN[wide]}.1f}{figures.circularity_um:8.1f}"
     row = f"{name}{centre}{sizes}"
-    return Content.styled(f"{row} x", "dim strike") if verdict is Verdict.REJECTED else Content(row)
+    return Content.styled(row, "dim strike") if rejected else Content(row)
 
 
 def _short(label: str) -> str:
-    """Return a run's name that fits; its end tells direction and repeat."""
-    return label if len(label) < _NAME else f"…{label[2 - _NAME :]}"
+    """Return a run's name that fits; its end tells direction and repeat, its beginning whether it was rejected."""
+    if len(label) < _NAME:
+        return label
+    sign = "x " if label.startswith("x ") else ""
+    return f"{sign}…{label[2 + len(sign) - _NAME :]}"

@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from dbbstation.quality.finding import Verdict
+from dbbstation.quality.answer import Word, rank
+from dbbstation.quality.finding import Verdict, against_limit
 from dbbstation.tui.panel import Panel, lines
 
 if TYPE_CHECKING:
     from dbbstation.quality.finding import Finding
     from dbbstation.service.board import Board
+    from dbbstation.station.events import RunCompleted
 
 _ROW = 37
-"""Columns of a row: as many as the right side has on the smallest terminal."""
+"""Columns of a row where the panel has no size yet: as many as the right side has on the smallest terminal."""
 
 STYLES = {
     Verdict.GOOD: "$text-success",
@@ -26,28 +28,38 @@ STYLES = {
 _ORDER = list(reversed(STYLES))
 """What is wrong stands first: it must not be what the screen has no room for."""
 
+WORD_STYLES = {
+    Word.GOOD: "bold reverse $text-success",
+    Word.CANNOT_TELL: "bold reverse $text-warning",
+    Word.REPEAT: "bold reverse $text-error",
+}
+"""The word on a run stands out whatever the colours."""
+
 
 class FindingsPanel(Panel):
-    """A row for each finding, as many as fit."""
+    """The word on the run, then a row for each finding, as many as fit."""
 
     can_grow = True
 
     def text(self, board: Board) -> Content:
-        """Return the findings of the run that was completed last."""
-        findings = board.completed.findings if board.completed else ()
-        ordered = sorted(findings, key=lambda finding: _ORDER.index(finding.verdict))
-        return lines(*(_row(finding) for finding in ordered))
+        """Return the word on the run that was completed last, and its findings."""
+        if board.completed is None:
+            return Content("")
+        ordered = sorted(board.completed.findings, key=lambda one: (_ORDER.index(one.verdict), rank(one)))
+        return lines(word_of(board.completed), *(_row(finding, self.content_size.width or _ROW) for finding in ordered))
 
 
-def against_limit(finding: Finding) -> str:
-    """Return a finding's number and limit with their unit, as far as there are any."""
-    if finding.value is None:
-        return ""
-    limit = "" if finding.limit is None else f" of {finding.limit:.2f}"
-    return f"{finding.value:.2f}{limit} {finding.unit}".rstrip()
+def word_of(completed: RunCompleted) -> Content:
+    """Return the word on a run, standing out."""
+    word = completed.answer.word
+    return Content.styled(f" {word} ", WORD_STYLES[word])
 
 
-def _row(finding: Finding) -> Content:
+def _row(finding: Finding, width: int) -> Content:
     name, word, numbers = finding.name.value, finding.verdict.value, against_limit(finding)
-    room = max(_ROW - len(name) - len(word) - 1, 0)
+    room = max(width - len(name) - len(word) - 1, 0)
+    if (
+        len(numbers) >= room
+    ):  # at least one column apart: the limit is what there is no room for, it stands in the sentence above
+        numbers = "" if finding.value is None else f"{finding.value:.1f} {finding.unit}".rstrip()
     return Content.assemble(f"{name}{numbers:>{room}} ", (word, STYLES[finding.verdict]))

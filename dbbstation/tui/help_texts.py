@@ -25,9 +25,12 @@ class Help:
 
 
 _RUN_KEYS = {
-    "enter": "The ball stands and the bar is in: the station waits for the machine.",
+    "enter": (
+        "The ball stands and the bar is in: the station waits for the machine. Behind a circle: what the word says. GOOD and CANNOT TELL "
+        "are accepted, REPEAT is measured again."
+    ),
     "m": "The same, and the holder was touched although nobody asked for it: a new mounting begins.",
-    "a": "The complete run counts; the next one is announced.",
+    "a": "The complete run counts; the next one is announced. Where something is wrong with it the station asks why.",
     "r": "The run does not count and is measured again. While the circle runs, the station asks first.",
     "x": "The run does not count and the next one is announced. While the circle runs, the station asks first.",
     "s": "The announced run is left out for now.",
@@ -49,13 +52,14 @@ HELP = {
                 "the plan with a sign and a word each. At the bottom: progress, messages, keys."
             ),
             (
-                "While a run waits for its verdict, its findings stand on the right: number, limit, and good, cannot tell or wrong. "
-                "What is wrong comes first."
+                "While a run waits for its verdict, one word says what to do with it. REPEAT: something is wrong, and what explains most "
+                "comes first, with what to do. CANNOT TELL: nothing is wrong, and a fault that is named would not show yet. GOOD: every "
+                "fault that is looked for would show. On the right stand the findings: number, limit, and good, cannot tell or wrong."
             ),
         ),
         {
             **_RUN_KEYS,
-            "v": (
+            "g": (
                 "As measured; complete circles about their own centre on a scale of their own; the form counter-clockwise less that clockwise."
             ),
         },
@@ -81,7 +85,7 @@ HELP = {
             ),
             (
                 "Below the list stands the last run of the chosen test and direction: centre, mean, circularity, verdict with its "
-                "reason, findings that are wrong with number and limit. E shows the runs before it, rejected ones too."
+                "reason, findings that are wrong with number and limit. H shows the runs before it, rejected ones too."
             ),
             "The time left is that of the circles at their planned feeds. Putting up balls comes on top.",
         ),
@@ -91,12 +95,41 @@ HELP = {
             "left": "The first direction of the test.",
             "right": "The second direction of the test.",
             "enter": "The chosen test and direction is measured next; the plan goes on from there.",
-            "e": "An earlier run of the test and direction; behind the first comes the last again.",
+            "h": "An earlier run of the test and direction; behind the first comes the last again.",
             "x": "The accepted run does not count any more; the station asks for the reason.",
             "a": "The rejected run counts again.",
             "o": "Back.",
             "escape": "Back.",
         },
+    ),
+    "job": Help(
+        "Job",
+        (
+            "One job, decided beforehand by its file. The first row begins it, or goes on with a session of it that is not complete.",
+            "The rows below it are what may be changed. Below the list stand the limits and what a person looks after before the first circle.",
+        ),
+        {"enter": "Begin, or change the row.", "up": "The row above.", "down": "The row below."},
+    ),
+    "operate": Help(
+        "Set-up and circle",
+        (
+            "Before a circle: which ball goes into which bore, tilt and bar. Enter when it stands.",
+            (
+                "During and behind the circle: the length, what happens, and what to do. GOOD and CANNOT TELL go on by Enter; REPEAT is "
+                "measured again by Enter, and nothing else can be done with it."
+            ),
+        ),
+        {key: sentence for key, sentence in _RUN_KEYS.items() if key in {"enter", "m", "r", "p"}},
+    ),
+    "answer": Help(
+        "Answer",
+        (
+            (
+                "WITHIN: every circle keeps its limit, U (k = 2) included. EXCEEDED: a circle passes its limit by more than U. CANNOT TELL: a "
+                "limit lies within U, or a circle is missing."
+            ),
+        ),
+        {"enter": "Back to the job.", "escape": "Back to the job."},
     ),
     "start": Help(
         "Start",
@@ -130,7 +163,7 @@ HELP = {
         {
             "enter": "Change the row: choose from a list, or type.",
             "b": "Begin: read and check everything, then the checklist.",
-            "t": "Ask the port what answers there.",
+            "l": "Listen at the port: what answers there.",
             "delete": "Empty the row.",
             "up": "The row above.",
             "down": "The row below.",
@@ -193,13 +226,14 @@ HELP = {
             ),
         ),
         {
-            "a": "The first four steps, one behind the other.",
-            "c": "Calibrate.",
-            "d": "Diagnose.",
-            "p": "Write compensated NC programs.",
-            "r": "Write the report: the verdict against the shop's tolerances.",
-            "b": "Acceptance: circles as measured before and now, against the shop's tolerances.",
-            "x": "End the step that is being done.",
+            "enter": "The chosen step.",
+            "0": "The first four steps, one behind the other.",
+            "1": "Calibrate.",
+            "2": "Diagnose.",
+            "3": "Write compensated NC programs.",
+            "4": "Write the report: the verdict against the shop's tolerances.",
+            "5": "Acceptance: circles as measured before and now, against the shop's tolerances.",
+            "k": "End the step that is being done.",
             "up": "The step above; its result stands below the list.",
             "down": "The step below.",
             "escape": "Back. A step that is being done is ended, after a question.",
@@ -224,8 +258,8 @@ HELP = {
         ),
         {
             "enter": "Hold the session against the chosen one.",
-            "b": "Choose another session before.",
-            "x": "End the comparison that is being made.",
+            "h": "Choose another session before.",
+            "k": "End the comparison that is being made.",
             "up": "The row above.",
             "down": "The row below.",
             "escape": "Back to the results.",
@@ -236,6 +270,7 @@ HELP = {
         keys={
             "o": "All tests of the plan on a map of the plate.",
             "f": "Large figures for two metres, and back.",
+            "j": "All messages with all their words.",
             "c": "After a fault: open instrument and session again.",
             "e": "Results of the session: calibrate, diagnose, programs, report.",
             "t": "Note the temperature of the shop. After circles it is asked for before the session is left.",

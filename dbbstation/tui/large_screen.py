@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.content import Content
 from textual.widgets import Footer
 
-from dbbstation.station.states import RECORDING
+from dbbstation.quality.answer import Word
+from dbbstation.station.states import RECORDING, State
 from dbbstation.tui.block_letters import HIGH, block_rows, largest
 from dbbstation.tui.board_screen import RunScreen
 from dbbstation.tui.now_line import NowLine
@@ -27,6 +28,14 @@ if TYPE_CHECKING:
 
 NO_LENGTH = "---.----"
 _WIDEST = "hands off"
+
+LARGE_STYLES = {
+    Word.GOOD: "$text-success",
+    Word.CANNOT_TELL: "$text-warning",
+    Word.REPEAT: "bold $text-error",
+}
+"""Colours of the word on a run, which the letters say as well."""
+
 _TEXTS = 3
 
 
@@ -44,15 +53,22 @@ class LargeFigures(Panel):
     def text(self, board: Board) -> Content:
         """Return length, state and next action."""
         state, action = LARGE_WORDS[board.state]
+        state_style = "$text-primary"
+        if board.state is State.COMPLETE and board.completed is not None:
+            word = board.completed.answer.word
+            state, state_style = str(word), LARGE_STYLES[word]
         length = self._length(board)
         # One size for all states: letters that change their size are harder to read than small ones.
         room = self.content_size
-        wide, high = largest((length, NO_LENGTH, _WIDEST), room.width, (room.height - _TEXTS + 1) // _TEXTS)
+        for_one = (room.height - _TEXTS + 1) // _TEXTS
+        _, high = usual = largest((length, NO_LENGTH, _WIDEST), room.width, for_one)
+        # The longest word on a run is the exception.
+        sizes = (usual, min(usual, largest((state,), room.width, for_one)), usual)
         gap = min(max((room.height - _TEXTS * HIGH * high) // (_TEXTS - 1), 0), HIGH * high)
         rows: list[Content] = []
-        styles = ("bold", "$text-primary", "$text-warning" if board.state in RECORDING else "$text-success")
-        for text, style in zip((length, state, action), styles, strict=True):
-            rows += [Content.styled(row, style) for row in block_rows(text, wide, high)]
+        styles = ("bold", state_style, "$text-warning" if board.state in RECORDING else "$text-success")
+        for text, style, size in zip((length, state, action), styles, sizes, strict=True):
+            rows += [Content.styled(row, style) for row in block_rows(text, *size)]
             rows += [Content("")] * gap
         return lines(*rows)
 

@@ -45,7 +45,7 @@ class MeasureScreen(RunScreen):
 
     help_name = "measure"
 
-    BINDINGS: ClassVar[list[BindingType]] = [("v", "view", "View")]
+    BINDINGS: ClassVar[list[BindingType]] = [("g", "view", "View")]
 
     def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(desk, shown, clock=clock)

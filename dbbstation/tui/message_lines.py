@@ -12,7 +12,7 @@ from dbbstation.tui.panel import Panel, lines
 if TYPE_CHECKING:
     from dbbstation.service.board import Board
 
-_STYLES = {Weight.NOTE: "", Weight.WARNING: "$text-warning", Weight.FAULT: "bold $text-error"}
+STYLES = {Weight.NOTE: "", Weight.WARNING: "$text-warning", Weight.FAULT: "bold $text-error"}
 
 
 class MessageLines(Panel):
@@ -32,4 +32,4 @@ def _line(message: Message, width: int) -> Content:
     text = text.replace("\n", " ")
     if len(text) > width > 1:
         text = f"{text[: width - 1]}…"
-    return Content.styled(text, _STYLES[message.weight])
+    return Content.styled(text, STYLES[message.weight])

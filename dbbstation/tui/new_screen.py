@@ -48,7 +48,7 @@ class NewScreen(RowScreen):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         ("b", "begin", "Begin"),
-        ("t", "probe", "Ask the port"),
+        ("l", "probe", "Listen at the port"),
         ("delete", "empty", "Empty"),
         ("escape,q", "back", "Back"),
     ]

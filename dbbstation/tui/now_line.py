@@ -6,11 +6,14 @@ from typing import TYPE_CHECKING
 
 from textual.content import Content
 
+from dbbstation.quality.answer import Word
 from dbbstation.station.states import RECORDING, State
 from dbbstation.tui.panel import Panel
-from dbbstation.tui.sentences import now
+from dbbstation.tui.sentences import now, now_for_operator
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from dbbstation.service.board import Board
 
 _ASKING = {State.ANNOUNCED, State.ARMED, State.COMPLETE, State.PAUSED}
@@ -21,15 +24,24 @@ class NowLine(Panel):
     """One sentence; grows where a fault needs more words."""
 
     can_grow = True
+    _say: Callable[[Board], str] = staticmethod(now)
 
     def text(self, board: Board) -> Content:
         """Return the sentence."""
-        return Content(now(board))
+        return Content(self._say(board))
 
     def show(self, board: Board) -> None:
         """Show the sentence, and whether it asks for something, in colour as well."""
         super().show(board)
-        wrong = board.state is State.COMPLETE and board.completed is not None and bool(board.completed.wrong)
+        wrong = (
+            board.state is State.COMPLETE and board.completed is not None and board.completed.answer.word is Word.REPEAT
+        )
         self.set_class(board.fault is not None or board.state is State.FLAWED or wrong, "-fault")
         self.set_class(board.fault is None and board.state in _ASKING and not wrong, "-asking")
         self.set_class(board.state in RECORDING, "-running")
+
+
+class OperatorNowLine(NowLine):
+    """The same for an operator of a job."""
+
+    _say = staticmethod(now_for_operator)

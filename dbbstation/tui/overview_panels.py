@@ -9,12 +9,12 @@ from textual.content import Content
 
 from dbbstation.plan.circle import Direction
 from dbbstation.plan.duration import circles_s
+from dbbstation.quality.finding import against_limit
 from dbbstation.service.board import Mark, Verdict
 from dbbstation.service.messages import problem_alone
 from dbbstation.station.commands import GoTo
 from dbbstation.tui import texts
 from dbbstation.tui.findings_panel import STYLES as FINDING_STYLES
-from dbbstation.tui.findings_panel import against_limit
 from dbbstation.tui.panel import Panel, lines
 from dbbstation.tui.run_list import SIGNS
 

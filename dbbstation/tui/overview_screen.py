@@ -8,8 +8,10 @@ from textual.binding import Binding
 from textual.containers import Horizontal
 from textual.widgets import Footer
 
+from dbbstation.quality.answer import Word
 from dbbstation.service.board import Verdict
 from dbbstation.station.commands import GoTo, Judge
+from dbbstation.station.states import State
 from dbbstation.tui.board_screen import BoardScreen
 from dbbstation.tui.overview_panels import Choice, ChosenRun, LeftLine, PlateMap, TestList
 from dbbstation.tui.reason_question import ReasonQuestion
@@ -45,7 +47,7 @@ class OverviewScreen(BoardScreen):
         Binding("left", "turn(0)", "First direction", show=False),
         Binding("right", "turn(1)", "Second direction", show=False),
         ("enter", "go_to", "Go to"),
-        ("e", "earlier", "Earlier run"),
+        ("h", "earlier", "Earlier run"),
         ("x", "take_back", "Does not count"),
         ("a", "accept_again", "Counts again"),
         ("o,escape", "back", "Back"),
@@ -87,7 +89,7 @@ class OverviewScreen(BoardScreen):
         if action in _VERDICT_BEFORE:
             run = self._run()
             return (
-                Judge in board.allowed
+                (Judge in board.allowed or board.state is State.FINISHED)
                 and run is not None
                 and (run.figures is not None or action == "take_back")
                 and board.verdicts.get(run.run.label) is _VERDICT_BEFORE[action]
@@ -128,10 +130,19 @@ class OverviewScreen(BoardScreen):
         self.app.push_screen(ReasonQuestion(completed.run.label), answered)
 
     def action_accept_again(self) -> None:
-        """Let a rejected run count."""
+        """Let a rejected run count; one with something wrong for a reason only."""
         completed = self._run()
-        if completed is not None:
+        if completed is None:
+            return
+        if completed.answer.word is not Word.REPEAT:
             self._judge(completed, accepted=True, reason="")
+            return
+
+        def answered(reason: str | None) -> None:
+            if reason:
+                self._judge(completed, accepted=True, reason=reason)
+
+        self.app.push_screen(ReasonQuestion(completed.run.label, counts=True), answered)
 
     def action_back(self) -> None:
         """Go back to the screen below."""

@@ -1,4 +1,4 @@
-"""Asked before an accepted run is taken back: why it does not count."""
+"""Asked before an accepted run is taken back, and before one counts with which something is wrong: why."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
-from dbbstation.tui.texts import REASON_KEYS, REASON_TITLE, REASON_TYPED, REASONS
+from dbbstation.tui.texts import (
+    ALL_THE_SAME,
+    REASON_KEYS,
+    REASON_TITLE,
+    REASON_TITLE_COUNTS,
+    REASON_TYPE,
+    REASON_TYPED,
+    REASONS,
+)
 
 if TYPE_CHECKING:
     from textual.app import ComposeResult
@@ -16,32 +24,36 @@ if TYPE_CHECKING:
 
 
 class ReasonQuestion(ModalScreen[str | None]):
-    """Returns the reason; None where the run counts as before.
+    """Returns the reason; None where all stays as it is.
 
     Args:
         run: name of the run.
+        counts: ask why it counts, and not why it does not.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
         *((key, f"because('{key}')", reason) for key, reason in REASONS.items()),
-        ("t", "type", "Type"),
+        (REASON_TYPE, "type", "Type"),
         ("escape,ctrl+c", "dismiss", "Back"),
     ]
 
-    def __init__(self, run: str) -> None:
+    def __init__(self, run: str, *, counts: bool = False) -> None:
         super().__init__()
         self._run_label = run
+        self._reasons = ALL_THE_SAME if counts else REASONS
+        self._title = REASON_TITLE_COUNTS if counts else REASON_TITLE
 
     def compose(self) -> ComposeResult:
         """Ask."""
-        reasons = "\n".join(f"{key}  {reason}" for key, reason in REASONS.items())
+        reasons = "\n".join(f"{key}  {reason}" for key, reason in self._reasons.items())
         with Vertical():
-            yield Static(f"{REASON_TITLE.format(run=self._run_label)}\n\n{reasons}\n\n{REASON_KEYS}", markup=False)
+            yield Static(f"{self._title.format(run=self._run_label)}\n\n{reasons}\n\n{REASON_KEYS}", markup=False)
             yield Input(placeholder=REASON_TYPED, disabled=True)
 
     def action_because(self, key: str) -> None:
         """Close with a reason of the list."""
-        self.dismiss(REASONS[key])
+        if key in self._reasons:
+            self.dismiss(self._reasons[key])
 
     def action_type(self) -> None:
         """Let the reason be typed."""

@@ -36,13 +36,13 @@ class ResultsScreen(RowScreen):
     help_name = "results"
 
     BINDINGS: ClassVar[list[BindingType]] = [
-        ("a", "every", "All"),
-        ("c", "step('calibrate')", "Calibrate"),
-        ("d", "step('diagnose')", "Diagnose"),
-        ("p", "step('programs')", "Programs"),
-        ("r", "step('report')", "Report"),
-        ("b", "acceptance", "Acceptance"),
-        ("x", "cancel", "End"),
+        ("0", "every", "All"),
+        ("1", "step('calibrate')", "Calibrate"),
+        ("2", "step('diagnose')", "Diagnose"),
+        ("3", "step('programs')", "Programs"),
+        ("4", "step('report')", "Report"),
+        ("5", "acceptance", "Acceptance"),
+        ("k", "cancel", "End"),
         ("escape,q", "back", "Back"),
     ]
 
@@ -74,7 +74,7 @@ class ResultsScreen(RowScreen):
                 return self._after.busy is not None
         return super().check_action(action, parameters)
 
-    def on_option_list_option_highlighted(self, _chosen: OptionList.OptionHighlighted) -> None:
+    def chosen_another(self) -> None:
         """Tell of the step that the cursor is on."""
         self._draw()
 

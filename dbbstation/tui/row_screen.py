@@ -18,8 +18,16 @@ if TYPE_CHECKING:
     from textual.app import ComposeResult
 
 
+CURSOR = "▸ "
+"""Before the chosen row."""
+
+
 class RowScreen(ExplainedScreen):
     """Title, sentence, rows, a text about the chosen row, keys."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._put: list[Content] = []
 
     def compose(self) -> ComposeResult:
         """Put the parts where they belong."""
@@ -59,12 +67,27 @@ class RowScreen(ExplainedScreen):
         if not self.stands:
             return
         options = self.query_one("#rows", OptionList)
+        self._put = list(rows)
         if len(rows) == options.option_count:
-            for place, row in enumerate(rows):
-                options.replace_option_prompt_at_index(place, row)
+            self._mark()
             return
         at = options.highlighted or 0
         options.clear_options()
         options.add_options([Option(row) for row in rows])
         options.highlighted = min(at, len(rows) - 1) if rows else None
+        self._mark()
         options.focus()
+
+    def on_option_list_option_highlighted(self) -> None:
+        """Move the mark: a terminal without colours shows which row is chosen by it alone."""
+        self._mark()
+        self.chosen_another()
+
+    def chosen_another(self) -> None:
+        """Tell of the row that the cursor is on."""
+
+    def _mark(self) -> None:
+        options = self.query_one("#rows", OptionList)
+        for place, row in enumerate(self._put[: options.option_count]):
+            mark = CURSOR if place == options.highlighted else " " * len(CURSOR)
+            options.replace_option_prompt_at_index(place, Content(mark) + row)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from dbbstation.quality.answer import Word
 from dbbstation.service.messages import problem_alone
 from dbbstation.station.states import State
 
@@ -26,6 +27,21 @@ def now(board: Board) -> str:
         return _finished(board)
     say = _SENTENCES.get(board.state)
     return say(board) if say else f"The station is {board.state}."
+
+
+def now_for_operator(board: Board) -> str:
+    """Return the same for an operator of a job, who can only measure again what is wrong."""
+    completed = board.completed
+    if board.fault is not None or board.state not in {State.COMPLETE, State.FLAWED} or completed is None:
+        return now(board) if board.finished is None else _THROUGH
+    found = completed.answer
+    if found.word is Word.REPEAT:
+        return f"{found.word}  {completed.run.label}: {_ended(found.causes[0])} Enter measures it again."
+    unseen = f"Not to be seen yet: {', '.join(found.unseen)}. " if found.unseen else ""
+    return f"{found.word}  {completed.run.label}. {unseen}Enter goes on."
+
+
+_THROUGH = "Every circle is measured: the answer follows."
 
 
 def _set_up(board: Board) -> str:
@@ -52,18 +68,22 @@ def _leaving(_board: Board) -> str:
 
 
 def _verdict(board: Board) -> str:
-    name = board.completed.run.label if board.completed else "The run"
-    wrong = board.completed.wrong if board.completed else ()
-    if wrong:
-        more = f" ({len(wrong) - 1} more)" if len(wrong) > 1 else ""
-        return f"{name}, {wrong[0].name} wrong{more}: {_ended(wrong[0].text)} R measures it again, A accepts it all the same."
-    return f"{name} is complete: A accepts it, R measures it again, X rejects it and goes on."
+    if board.completed is None:
+        return "The run is complete."
+    name, found = board.completed.run.label, board.completed.answer
+    if found.word is Word.REPEAT:
+        more = f" ({len(found.causes) - 1} more)" if len(found.causes) > 1 else ""
+        return f"{found.word}  {name}: {_ended(found.causes[0])}{more} Enter or R measures it again; A asks why it counts all the same."
+    unseen = f"Not to be seen yet: {', '.join(found.unseen)}. " if found.unseen else ""
+    return f"{found.word}  {name}. {unseen}Enter or A accepts it, R measures it again, X rejects it and goes on."
 
 
 def _flawed(board: Board) -> str:
     problem = problem_alone(board.completed) if board.completed else ""
     name = board.completed.run.label if board.completed else "the run"
-    return f"No usable circle in {name}: {_ended(problem)} R measures it again, X leaves it out."
+    return (
+        f"{Word.REPEAT}  {name} has no usable circle: {_ended(problem)} Enter or R measures it again, X leaves it out."
+    )
 
 
 def _paused(_board: Board) -> str:

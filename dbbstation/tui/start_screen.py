@@ -83,7 +83,7 @@ class StartScreen(RowScreen):
                 lambda: self._front.prepare(choice), lambda prepared: self._prepared(choice, prepared), self._failed
             )
 
-    def on_option_list_option_highlighted(self, _chosen: OptionList.OptionHighlighted) -> None:
+    def chosen_another(self) -> None:
         """Tell of the session that the cursor is on."""
         self._tell()
 
@@ -155,8 +155,9 @@ def _row(line: SessionLine) -> Content:
     else:
         state = texts.START_RUNS.format(accepted=line.accepted, planned=line.planned)
         state += texts.START_LEFT.format(time=duration(line.left_s)) if line.left_s else ""
+    state = f"{texts.VIRTUAL_WORD}, {state}" if line.virtual else state
     state += texts.START_UNJUDGED.format(count=line.unjudged) if line.unjudged else ""
-    sign = "✓" if line.complete else "▶"
+    sign = "✓" if line.complete else "◐"
     return Content.assemble(f"{sign} {name} {when}  ", (state, "bold"))
 
 

@@ -21,8 +21,8 @@ LARGE_WORDS: Mapping[State | None, tuple[str, str]] = {
     State.DWELLING: ("feed in", "hands off"),
     State.TURNING: ("circle", "hands off"),
     State.LEAVING: ("feed out", "hands off"),
-    State.COMPLETE: ("done", "A R X ?"),
-    State.FLAWED: ("no circle", "R or X ?"),
+    State.COMPLETE: ("done", "Enter"),
+    State.FLAWED: ("repeat", "Enter"),
     State.PAUSED: ("paused", "P"),
     State.FINISHED: ("finished", "Q"),
     State.STOPPED: ("stopped", "Q"),
@@ -39,7 +39,16 @@ REASONS = {
 """Why a run does not count after all, by key."""
 
 REASON_TITLE = "Why does {run} not count?"
-REASON_KEYS = "T  type another reason      Esc  it counts as before"
+ALL_THE_SAME = {
+    "1": "the cause is known and does not touch what is wanted",
+    "2": "it cannot be measured again",
+    "3": "the machine is to be seen as it is",
+}
+"""Why a run counts although something is wrong with it, by key."""
+
+REASON_TITLE_COUNTS = "Something is wrong with {run}. Why does it count all the same?"
+REASON_TYPE = "5"
+REASON_KEYS = "5  type another reason\n\nEsc  leaves it as it is"
 REASON_TYPED = "type the reason, then Enter"
 
 TIME_LEFT = (
@@ -50,11 +59,34 @@ NOT_NOW = "While the station is {state}, tests are looked at here; going to anot
 NO_RUN = "{test} {direction}: no run yet."
 RUN_FIGURES = "{run}: centre X {x:+.1f} Y {y:+.1f}, mean {mean:+.1f}, circularity {circularity:.1f} µm."
 NO_CIRCLE = "{run}: no circle; {problem}"
+JOB_SAYS = "{job}: Enter begins; a row that may be changed is changed by Enter too."
+JOB_BEGINS = "Begin: session {session}"
+JOB_GOES_ON = "Go on with session {session}"
+JOB_ROWS: Mapping[str, str] = {
+    "operator": "operator",
+    "order": "order number",
+    "port": "port",
+    "temperature": "temperature [°C]",
+}
+"""What an operator may change."""
+JOB_LIMIT = "at most {largest:g} {unit} of {figure}, {tests}"
+JOB_ALL_TESTS = "all tests"
+JOB_BEFORE = "Before you begin:"
+ANSWER_TITLE = "Answer"
+ANSWER_WAITS = "The circles are held against the limits …"
+ANSWER_REPORT = "The report: {path}"
+ANSWERS = ("WITHIN", "EXCEEDED", "CANNOT TELL")
+"""The three answers, which share one size of letters."""
+
+MESSAGES_TITLE = "Messages, the newest first. Esc or J closes."
+MESSAGES_NONE = "There are none."
+VIRTUAL_WORD = "virtual"
+VIRTUAL_BANNER = " VIRTUAL MACHINE "
 NO_VERDICT = "waits for its verdict"
 NO_BORE = "in no bore"
 BORE = "bore {number}"
 CHOOSE = "Arrow keys choose test and direction."
-CHOOSE_RUN = "Run {place} of {count} of this test and direction: E shows an earlier one. Arrow keys choose another."
+CHOOSE_RUN = "Run {place} of {count} of this test and direction: H shows an earlier one. Arrow keys choose another."
 
 START_LOOKS = "Looking for sessions …"
 START_NONE = "No session yet. N begins a new one, V tries everything on a virtual machine, without hardware."
@@ -96,7 +128,7 @@ MISSING_PARTS: Mapping[Part, str] = {
     Part.FOLDER: "a folder for the session",
 }
 NEW_MISSING = "Still missing: {parts}. Enter changes a row."
-NEW_COMPLETE = "Nothing is missing: B begins. T asks the port what answers."
+NEW_COMPLETE = "Nothing is missing: B begins. L listens at the port."
 NEW_CHECKS = "Reading and checking …"
 NEW_ASKS = "Asking {port} for a reading of {instrument} …"
 NEW_ANSWERS = "{port} answers: {text}."
@@ -201,11 +233,11 @@ BAR_DONE = "The bar reads {long:+.2f} µm long, standard uncertainty {u:.2f} µm
 BAR_DRIFTED = " It drifted by {drift:+.2f} µm meanwhile: give it time to cool down, then B reads it again."
 
 STEPS: Mapping[Step, tuple[str, str]] = {
-    Step.CALIBRATE: ("C", "Calibrate: fit the kinematic parameters"),
-    Step.DIAGNOSE: ("D", "Diagnose: what the calibration leaves out"),
-    Step.PROGRAMS: ("P", "Programs: compensated NC programs of the circles"),
-    Step.REPORT: ("R", "Report: verdict against the shop's tolerances"),
-    Step.ACCEPTANCE: ("B", "Acceptance: before and now, as measured"),
+    Step.CALIBRATE: ("1", "Calibrate: fit the kinematic parameters"),
+    Step.DIAGNOSE: ("2", "Diagnose: what the calibration leaves out"),
+    Step.PROGRAMS: ("3", "Programs: compensated NC programs of the circles"),
+    Step.REPORT: ("4", "Report: verdict against the shop's tolerances"),
+    Step.ACCEPTANCE: ("5", "Acceptance: before and now, as measured"),
 }
 STEP_WORDS: Mapping[Progress | None, str] = {
     None: "not yet",
@@ -222,9 +254,9 @@ STEP_SIGNS: Mapping[Progress | None, str] = {
     Progress.CANCELLED: "-",
 }
 STEP_BEGINS = "beginning"
-RESULTS_IDLE = "A does the first four, X ends one; results go to {folder}."
-RESULTS_BUSY = "Working; X ends the step, Esc goes back."
-RESULTS_NO_MODEL = "Programs need a model: C calibrates, D diagnoses."
+RESULTS_IDLE = "Enter does the chosen step, 0 the first four; results go to {folder}."
+RESULTS_BUSY = "Working; K ends the step, Esc goes back."
+RESULTS_NO_MODEL = "Programs need a model: 1 calibrates, 2 diagnoses."
 RESULTS_EMPTY = "Nothing yet."
 RESULTS_CANCELLED = "Ended before it was done; nothing of it was written."
 RESULTS_LEAVE = (
@@ -235,7 +267,7 @@ FITTED = (
     "{count} parameters are identified. The nominal machine leaves {nominal:.1f} µm rms of the readings, the model {left:.2f} µm, "
     "within each mounting {within:.2f} µm; one reading has {noise:.2f} µm of noise."
 )
-PHYSICS_MISSING = "What is left exceeds noise and mountings by {rms:.2f} µm rms: physics is missing, D looks for it."
+PHYSICS_MISSING = "What is left exceeds noise and mountings by {rms:.2f} µm rms: physics is missing, 2 looks for it."
 OUTLIER = "Outlier, kept out of the fit: {text}"
 UNSEEN = "The plan could not see: {text}"
 GAP = "What helps: {text}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from textual.content import Content
 
 from dbbstation.tui.panel import Panel
+from dbbstation.tui.texts import VIRTUAL_BANNER
 
 if TYPE_CHECKING:
     from dbbstation.service.board import Board
@@ -25,9 +26,12 @@ class TitleLine(Panel):
 
     def text(self, board: Board) -> Content:
         """Return the line."""
-        parts = [Content.styled(f" {self._plan}", "bold")]
+        parts = [Content.styled(VIRTUAL_BANNER, "reverse bold $text-warning")] if board.virtual else []
+        parts.append(Content.styled(f" {self._plan}", "bold"))
         if board.announced is not None and board.finished is None:
             parts.append(Content(f"run {board.announced.number} of {board.announced.count}"))
             parts.append(Content.styled(board.announced.run.label, "bold"))
         parts.append(Content(str(board.state) if board.state else "opening"))
+        if board.virtual:
+            return parts[0] + Content(" · ").join(parts[1:])
         return Content(" · ").join(parts)

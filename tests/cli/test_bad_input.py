@@ -261,7 +261,7 @@ def test_files_in_each_others_places(run, fifteen, model):
     assert "this file is a machine (`dbb-machine/1`), a model (`dbb-model/4`) was expected" in outcome.err
     outcome = run("calibrate", model)
     assert outcome.code == FAILED
-    assert "this file is a model (`dbb-model/3`), a session (`dbb-session/5`) was expected" in outcome.err
+    assert "this file is a model (`dbb-model/3`), a session (`dbb-session/6`) was expected" in outcome.err
 
 
 @pytest.mark.parametrize(

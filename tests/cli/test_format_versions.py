@@ -21,6 +21,7 @@ STORED = {
     "dbb-machine/2": FIXTURES / "machines" / "greatest-feed.yaml",
     "dbb-machine/3": FIXTURES / "machines" / "every-key.yaml",
     "dbb-jig/1": FIXTURES / "jigs" / "reference-plate.yaml",
+    "dbb-job/1": FIXTURES / "jobs" / "daily-check.yaml",
     "dbb-plan/1": shipped_folder("protocols") / "plans" / "table2.yaml",
     "dbb-plan/2": FIXTURES / "plans" / "every-key.yaml",
     "dbb-model/1": FIXTURES / "models" / "small.yaml",
@@ -37,6 +38,7 @@ STORED = {
     "dbb-session/3": FIXTURES / "sessions" / "sealed",
     "dbb-session/4": FIXTURES / "sessions" / "begun",
     "dbb-session/5": FIXTURES / "sessions" / "logged",
+    "dbb-session/6": FIXTURES / "sessions" / "virtual",
 }
 """One stored file of each version."""
 

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 
 from dbbstation.cli import DONE, FAILED, progress
-from dbbstation.cli.diagnose import STAGES
 from dbbstation.cli.progress import count_bar, stage_bar, time_left
 from dbbstation.errors import KinematicsError
 from dbbstation.files.shipped import shipped_folder
@@ -27,6 +26,7 @@ from dbbstation.model.identified import IdentifiedModel
 from dbbstation.model.machine_model import MachineModel
 from dbbstation.sources.contract import Fitted, Motion
 from dbbstation.sources.registry import known_sources
+from dbbstation.tasks.diagnose import STAGES
 
 pty = pytest.importorskip("pty", reason="needs a pseudo-terminal")
 

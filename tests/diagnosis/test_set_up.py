@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dbbstation.calibration.outliers.outlier import Kind
+from dbbstation.calibration.outliers.outlier import OutlierKind
 from dbbstation.diagnosis.diagnose import diagnose
 from dbbstation.diagnosis.findings import Verdict
 from dbbstation.results.of_diagnosis import diagnosis_figures
@@ -47,7 +47,7 @@ def named(diagnosis):
 @pytest.mark.parametrize("offset_um", [6.0, pytest.param(-9.0, marks=pytest.mark.nightly)])
 def test_a_bar_that_was_set_wrongly_is_no_warm_plate(tmp_path, offset_um):
     diagnosis = diagnosed(tmp_path / "s", 41, BarOffset(offset_um))
-    assert [outlier.kind for outlier in diagnosis.outliers] == [Kind.BAR]
+    assert [outlier.kind for outlier in diagnosis.outliers] == [OutlierKind.BAR]
     assert named(diagnosis) == set()
     assert diagnosis.mismatch
     (found,) = diagnosis.outliers
@@ -76,7 +76,7 @@ def test_a_badly_seated_ball_beside_gravity_is_found_with_it(tmp_path):
     diagnosis = diagnosed(tmp_path / "s", 42, Gravity(), BadSeating({3: np.array([20.0, -25.0, 0.0])}))
     assert named(diagnosis) == {"gravity"}
     (found,) = diagnosis.outliers
-    assert found.kind is Kind.MOUNTING
+    assert found.kind is OutlierKind.MOUNTING
     # The holder scatters by a micrometre per axis besides; where exactly it stands is partly the joints' matter.
     assert found.size_um == pytest.approx(np.hypot(20.0, 25.0), abs=3 * np.hypot(found.uncertainty_um, 1.0))
     assert 0 < found.uncertainty_um < 6.0

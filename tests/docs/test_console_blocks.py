@@ -15,6 +15,7 @@ import pytest
 from dbbstation.cli import cli
 from dbbstation.cli.diagnose import _print as print_diagnosis
 from dbbstation.files.shipped import shipped_folder
+from dbbstation.results.diagnosis import BeforeAfter, CauseResult, DiagnosisFigures, ParameterShift, UnexplainedResult
 from tests.cli.conftest import Outcome, call
 from tests.plant.mechanisms.kinematics import Kinematics
 from tests.plant.plan import table_ii_plan
@@ -252,39 +253,32 @@ def test_a_command_exists_with_its_options(command):
 
 def test_diagnoses_that_are_not_run_are_shown_in_the_words_of_the_command(capsys):
     """Lines without a cause's own text, numbers aside, against what the command prints of made-up numbers."""
-    source = {
-        "name": "gravity",
-        "verdict": "identified",
-        "probability": 1.0,
-        "concealed": 0.9,
-        "gain": 9.0,
-        "stability": 1.0,
-        "ambiguous_with": [],
-        "class": [],
-        "parameters": {},
-        "text": "",
-    }
-    both = {"before": 2.0, "after": 1.0}
+    source = CauseResult(
+        name="gravity", verdict="identified", probability=1.0, concealed=0.9, gain=9.0, stability=1.0, text=""
+    )
+    both = BeforeAfter(2.0, 1.0)
     print_diagnosis(
-        {
-            "mismatch": True,
-            "misfit_rms_um": 2.0,
-            "probability": 0.0,
-            "outliers": [],
-            "sources": [source],
-            "locations": [],
-            "residual_rms_um": both,
-            "held_out_rms_um": both,
-            "held_out_normalised": both,
-            "workspace": None,
-            "parameter_shift": [{"parameter": "joint", "shift_um": 1.0}],
-            "unexplained": {"text": "Nothing is left beyond noise.", "curve": None},
-            "second_start_agrees": True,
-            "held_out": "tested",
-            "held_out_worse": False,
-            "next_test": None,
-            "further_tests": [],
-        }
+        DiagnosisFigures(
+            mismatch=True,
+            probability=0.0,
+            noise_um=0.5,
+            misfit_rms_um=2.0,
+            residual_rms_um=both,
+            held_out_rms_um=both,
+            held_out_normalised=both,
+            held_out="tested",
+            held_out_worse=False,
+            circularity_um=(),
+            workspace=None,
+            outliers=(),
+            locations=(),
+            sources=(source,),
+            unexplained=UnexplainedResult(0.0, None, None, "Nothing is left beyond noise.", None),
+            parameter_shift=(ParameterShift("joint", 0.0, 1.0, 1.0, 0.1),),
+            second_start_agrees=True,
+            next_test=None,
+            further_tests=(),
+        )
     )
     printed = {_without_numbers(line) for line in capsys.readouterr().out.splitlines()}
     beginnings = ("The recordings", "cause ", "value ±", "residual ", "error of ", "bias of ", "Nothing ")

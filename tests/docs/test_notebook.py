@@ -9,14 +9,14 @@ import pytest
 
 from tests.docs.notebooks import executed, printed
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+NOTEBOOKS = sorted((Path(__file__).resolve().parents[2] / "docs").glob("*.ipynb"))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["mismatch.ipynb", "mismatch-simulator.ipynb"])
-def test_the_notebook_prints_what_it_shows(name, tmp_path, monkeypatch):
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_notebook_prints_what_it_shows(notebook, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    shown = json.loads((DOCS / name).read_text(encoding="utf-8"))
+    shown = json.loads(notebook.read_text(encoding="utf-8"))
     code = [cell for cell in shown["cells"] if cell["cell_type"] == "code"]
     for before, now in zip(code, executed(shown), strict=True):
         assert printed(now) == printed(before)

@@ -1,6 +1,6 @@
-"""Makes the sessions `sealed` and `begun` of `fixtures` and `fixtures/models` anew: `python -m tests.files.make_fixtures`.
+"""Makes the session `virtual` of `fixtures` and `fixtures/models` anew: `python -m tests.files.make_fixtures`.
 
-The sessions `small` and `under-spindle` are of older versions of the format and stay as those wrote them; `make_session` and
+The other sessions are of older versions of the format and stay as those wrote them; `make_session` and
 `make_conventional_session` say what they hold. The recordings of `small` and `sealed` come from the independent virtual machine of tests/plant, those of `under-spindle` from that of
 `emulate`; the numbers of the model are made up.
 """
@@ -20,7 +20,7 @@ from dbbstation.files.formats.model import write_model
 from dbbstation.files.formats.plan import read_inline_plan
 from dbbstation.files.provenance import Provenance
 from dbbstation.files.recordings.amending import amend
-from dbbstation.files.recordings.entries import Counts, Note
+from dbbstation.files.recordings.entries import Counts, Note, ReadBy
 from dbbstation.files.recordings.new_session import FinishedRun, write_session
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_details import SessionDetails
@@ -93,6 +93,29 @@ def make_session(folder: Path) -> None:
         (folder / left).unlink()
 
 
+def make_virtual_session(folder: Path) -> None:
+    """One test on a virtual machine, which session and runs say."""
+    with tempfile.TemporaryDirectory() as scratch:
+        recorded = Path(scratch) / "recorded"
+        record(recorded, seed=7, plan=subset(table_ii_plan(7), "a"), mechanisms=[RandomKinematics()], rate_hz=5.0)
+        source = read_session(recorded)
+        by = ReadBy("streaming-encoder", "crc", "virtual machine", virtual=True)
+        details = SessionDetails("PM600-0007", "first shift", 20.4, instrument=by)
+        plan = read_inline_plan(recorded / "plan.yaml")
+        with SessionWriter.create(folder, source.machine, plan, details, lambda: BEGUN) as writer:
+            for run in source.runs:
+                samples = source.load(run).recording
+                names = ("t_s", "length_mm", "status")
+                with writer.start_run(
+                    run.test, run.direction, names, started=run.started, mounting=run.mounting, instrument=by
+                ) as journal:
+                    for t_s, length_mm in zip(samples.t_s, samples.length_mm, strict=True):
+                        journal.append((t_s, length_mm, "ok"))
+                    entry = writer.finish_run(journal, Counts(journal.samples, 0, {}))
+                writer.judge(entry, accepted=True)
+    (folder / ".lock").unlink()
+
+
 def make_conventional_session(folder: Path) -> None:
     """Two tests about balls put up under the spindle, set up by hand and read with a micrometer to 1 µm."""
     machine = read_machine(FIXTURES / "machines" / "reference.yaml")
@@ -162,7 +185,7 @@ def make_models(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    # `sealed` and `begun` were written by former versions, and stay: every version is read.
-    shutil.rmtree(FIXTURES / "sessions" / "logged", ignore_errors=True)
-    make_session(FIXTURES / "sessions" / "logged")
+    # The others were written by former versions, and stay: every version is read.
+    shutil.rmtree(FIXTURES / "sessions" / "virtual", ignore_errors=True)
+    make_virtual_session(FIXTURES / "sessions" / "virtual")
     make_models(FIXTURES / "models")

@@ -263,3 +263,23 @@ def test_the_uncertainty_of_a_law_holds_what_its_formula_may_be_off_by(form_unce
     exact = 0.1 * np.sqrt(np.linalg.inv(columns.T @ columns)[1, 1])
     assert value.value == pytest.approx(0.003, abs=4.0 * exact)
     assert value.uncertainty == pytest.approx(np.hypot(exact, form_uncertainty * value.value), rel=0.1)
+
+
+@pytest.mark.parametrize(("form_uncertainty", "alike"), [(0.0, ()), (0.03, ("slope", "slope and a little more"))])
+def test_what_two_formulas_may_be_off_by_is_not_decided_between_them(
+    form_uncertainty: float, alike: tuple[str, ...]
+) -> None:
+    """A second law departs from the first by 3 % of it, 90 µm beside a noise of 20 µm: seen, and no more than formulas allow."""
+    data = table(2, lambda d: 0.05 * d.q, noise=0.02)
+    q = data.q - data.q.mean()
+    other = np.cos(np.linspace(0.0, 61.0, len(q)))
+    laws = [
+        Law(name, lambda _, c=c: c[:, None], np.array([0.05]), ("size",), ("mm/mm",), form_uncertainty=form_uncertainty)
+        for name, c in (
+            ("slope", data.q),
+            ("slope and a little more", data.q + 0.03 * other * np.linalg.norm(q) / np.linalg.norm(other)),
+        )
+    ]
+    settled = settle(channel(data, tuple(laws)), look=False, static=False)
+    findings = {finding.name: finding for finding in read_off(settled)}
+    assert findings["slope"].equivalent == alike

@@ -14,7 +14,7 @@ from dbbstation.circles.path import Filter
 from dbbstation.circles.spectrum import spectrum_of
 from dbbstation.report.drawing import in_style
 from dbbstation.report.label_places import Box, place_labels
-from dbbstation.report.plot import Kind, Plotted, draw_plot
+from dbbstation.report.plot import PlotKind, Plotted, draw_plot
 from dbbstation.report.sheet import width_of_in, wrapped
 from dbbstation.tasks.circles import load_circles
 from tests.plant.mechanisms.kinematics import RandomKinematics
@@ -73,11 +73,11 @@ def overlapping(figure):
     ]
 
 
-@pytest.mark.parametrize("kind", list(Kind))
+@pytest.mark.parametrize("kind", list(PlotKind))
 @pytest.mark.parametrize("tests", [{"a"}, {"a", "b"}, None])
 def test_no_label_covers_another_or_leaves_the_sheet(kind, tests, found):
-    of = found if kind is Kind.COMPARE else only(found, {"before"}, tests)
-    if kind is Kind.COMPARE:
+    of = found if kind is PlotKind.COMPARE else only(found, {"before"}, tests)
+    if kind is PlotKind.COMPARE:
         of = only(found, {"before", "after"}, tests or {"a", "f", "k"})
     figure = drawn(kind, of)
     assert overlapping(figure) == []
@@ -87,7 +87,7 @@ def test_no_label_covers_another_or_leaves_the_sheet(kind, tests, found):
         assert 0 <= box.y0 <= box.y1 <= height, text
 
 
-@pytest.mark.parametrize("kind", [Kind.POLAR, Kind.MAP])
+@pytest.mark.parametrize("kind", [PlotKind.POLAR, PlotKind.MAP])
 def test_no_label_covers_another_where_texts_are_long(kind, found):
     of = only(found, {"before"})
     session = replace(
@@ -101,10 +101,10 @@ def test_no_label_covers_another_where_texts_are_long(kind, found):
 def test_a_dollar_sign_is_no_formula(found):
     of = only(found, {"before"}, {"a"})
     session = replace(of.sessions[0], operator="$x_2$ two")
-    assert "$x_2$ two" in {text for text, _ in texts_of(drawn(Kind.POLAR, replace(of, sessions=(session,))))}
+    assert "$x_2$ two" in {text for text, _ in texts_of(drawn(PlotKind.POLAR, replace(of, sessions=(session,))))}
 
 
-@pytest.mark.parametrize("kind", [Kind.POLAR, Kind.DEVIATION])
+@pytest.mark.parametrize("kind", [PlotKind.POLAR, PlotKind.DEVIATION])
 def test_both_directions_and_repeats_stand_in_one_picture(kind, found):
     """A hundred repeats: twenty of each direction are drawn, all but the last thin; the sheet says how many are not."""
     of = only(found, {"before"}, {"a"})
@@ -122,7 +122,7 @@ def test_both_directions_and_repeats_stand_in_one_picture(kind, found):
 def test_the_traces_are_those_of_the_circles(found):
     """The greatest deviation is drawn where it was measured."""
     of = only(found, {"before"}, {"k"})
-    (axes,) = drawn(Kind.DEVIATION, of).axes
+    (axes,) = drawn(PlotKind.DEVIATION, of).axes
     for line, one in zip(axes.lines, of.circles, strict=True):
         where = int(np.argmax(one.analysis.residual_um))
         top = int(np.argmax(line.get_ydata()))
@@ -132,7 +132,7 @@ def test_the_traces_are_those_of_the_circles(found):
 
 def test_compared_circles_have_one_scale(found):
     """Rings of one deviation have one radius in both panels."""
-    figure = drawn(Kind.COMPARE, only(found, {"before", "after"}, {"a"}))
+    figure = drawn(PlotKind.COMPARE, only(found, {"before", "after"}, {"a"}))
     rings = [sorted(patch.radius for patch in axes.patches) for axes in figure.axes[:2]]
     assert rings[0] == rings[1]
     assert len(rings[0]) == 3

@@ -120,7 +120,7 @@ def test_figures_of_a_finished_run_and_the_error_of_one_without_a_circle() -> No
     assert board.marks[0] is Mark.FLAWED
     assert (
         now(board)
-        == "No usable circle in t0-ccw-1: no feed-out found; is it closed? R measures it again, X leaves it out."
+        == "REPEAT  t0-ccw-1 has no usable circle: no feed-out found; is it closed? Enter or R measures it again, X leaves it out."
     )
     assert board.messages[-1].weight is Weight.WARNING
 
@@ -172,7 +172,7 @@ def test_a_rejected_run_is_marked_and_its_trace_goes() -> None:
     assert board.verdicts == {"t0-ccw-1": Verdict.REJECTED}
     assert board.traces == {}
     (row,) = FiguresPanel().text(board).plain.splitlines()[1:]
-    assert row.endswith(" x")
+    assert row.startswith("x ")
 
 
 def test_a_complete_circle_is_seen_about_its_own_centre() -> None:

@@ -282,8 +282,8 @@ def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session:
     after.look()
     assert (after.busy, after.results[Step.DIAGNOSE].progress) == (None, Progress.CANCELLED)
     assert after.model == results / "model.yaml"
-    # Another sitting has another folder: nothing is overwritten.
-    assert After(session).folder == session.parent / "monday-results-2"
+    # The next sitting goes on with it, as long as the same runs count.
+    assert After(session).folder == results
 
 
 def test_a_failure_ends_the_row_and_says_why(session: Path) -> None:

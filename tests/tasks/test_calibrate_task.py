@@ -12,7 +12,7 @@ from dbbstation.errors import InputError, ModelError, OutputError
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.tasks.calibrate import STAGES, calibrate
 from dbbstation.tasks.evaluate import evaluate
-from dbbstation.tasks.load import load
+from dbbstation.tasks.load import READING, load
 from dbbstation.tasks.telling import StoppedError
 
 SMALL = shipped_folder("fixtures") / "sessions" / "small"
@@ -68,8 +68,8 @@ def test_a_result_is_frozen(result):
 def test_every_stage_is_told_in_its_order():
     told = []
     calibrate(SMALL, progress=lambda text, *_: told.append(text))
-    stages = [next(stage for stage in STAGES if text.startswith(stage)) for text in told]
-    assert list(dict.fromkeys(stages)) == list(STAGES)
+    stages = [next(stage for stage in (READING, *STAGES) if text.startswith(stage)) for text in told]
+    assert list(dict.fromkeys(stages)) == [READING, *STAGES]
 
 
 @pytest.mark.parametrize("stage", ["reading runs", "fit", "figures"])

@@ -220,7 +220,7 @@ def test_loss_that_the_line_counted_is_named_before_the_feed():
         cut(recording, circle, counted_lost=5)
     assert counted.value.what.startswith("5 of ")
     assert counted.value.what.endswith(alone.value.what)
-    assert counted.value.remedy.index("cable") < counted.value.remedy.index("set the feed")
+    assert counted.value.remedy.index("cable") < counted.value.remedy.index("set the override")
 
 
 def test_slopes_of_an_overlap_are_those_of_the_fitted_polynomial():

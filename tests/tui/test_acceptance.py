@@ -72,20 +72,20 @@ def test_the_session_before_is_chosen_and_the_verdict_shown(after: After) -> Non
     async def keys(pilot: Pilot[None], app: StationApp) -> None:
         assert "Choose the session measured before" in texts_of(app, "#row-now")
         assert ["tuesday" in rows(app)[0], "monday" in rows(app)[1]] == [True, True]
-        await pilot.press("x", "c", "d", "p", "r", "a")  # mean nothing here
+        await pilot.press("x", "c", "d", "p", "r", "a", "1", "0")  # mean nothing here
         assert after.busy is None
         await pilot.press("down", "enter")
         assert after.busy is Step.ACCEPTANCE
         assert "Comparing: fit of 6 runs" in texts_of(app, "#row-now")
         _, work = after._running
         assert work.arguments[2:4] == ["--before", "/shop/monday"]
-        await pilot.press("b")  # not while it is being compared
+        await pilot.press("h")  # not while it is being compared
         assert isinstance(app.screen, AcceptanceScreen)
         work.progress = Progress.DONE
         app.look()
         await pilot.pause()
         assert texts_of(app, "#row-now").startswith("CANNOT TELL")
-        assert [row.split()[0] for row in rows(app)] == ["test", "level", "side", "high"]
+        assert [row.replace("▸", "").split()[0] for row in rows(app)] == ["test", "level", "side", "high"]
         assert rows(app)[1].split()[-5:] == ["21.4", "4.8", "8", "1.2", "PASS"]
         assert rows(app)[3].split()[-6:] == ["-", "7.6", "8", "1.2", "CANNOT", "TELL"]
         below = texts_of(app, "#row-text")
@@ -95,7 +95,7 @@ def test_the_session_before_is_chosen_and_the_verdict_shown(after: After) -> Non
         assert isinstance(app.screen, HelpScreen)
         await pilot.press("escape")
         await pilot.pause()
-        await pilot.press("b")
+        await pilot.press("h")
         await pilot.pause()
         assert isinstance(app.screen, ChooseQuestion)
         await pilot.press("escape")
@@ -114,12 +114,12 @@ def test_a_comparison_can_be_ended_and_made_again(after: After) -> None:
         await pilot.press("enter")
         await pilot.pause()
         assert after.busy is Step.ACCEPTANCE
-        await pilot.press("x")
+        await pilot.press("k")
         await pilot.pause()
         app.look()
         await pilot.pause()
         assert "Ended before it was done" in texts_of(app, "#row-now")
-        await pilot.press("b")
+        await pilot.press("h")
         await pilot.pause()
         assert isinstance(app.screen, ChooseQuestion)
         await pilot.press("enter")
@@ -132,7 +132,7 @@ def test_a_comparison_can_be_ended_and_made_again(after: After) -> None:
 def test_nothing_to_compare_and_a_session_that_cannot_be_read_are_said(after: After) -> None:
     async def nothing(pilot: Pilot[None], app: StationApp) -> None:
         assert "there is nothing to compare" in texts_of(app, "#row-now")
-        await pilot.press("b", "enter", "x")
+        await pilot.press("h", "enter", "k")
         assert (after.busy, after.former) == (None, None)
 
     async def broken(_pilot: Pilot[None], app: StationApp) -> None:
@@ -151,7 +151,7 @@ def test_the_results_open_it(after: After) -> None:
     async def run() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
             await app.push_screen(ResultsScreen(after))
-            await pilot.press("b")
+            await pilot.press("5")
             assert isinstance(app.screen, AcceptanceScreen)
             await pilot.press("escape")
             assert isinstance(app.screen, ResultsScreen)

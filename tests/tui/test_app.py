@@ -18,14 +18,17 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
+from dbbstation.quality.finding import Name, found
 from dbbstation.report.conditions import conditions
 from dbbstation.service.live_trace import LiveTrace
 from dbbstation.station.commands import Accept, GoTo, Judge, Note, Quit, Repeat, Skip
 from dbbstation.station.states import State
 from dbbstation.tui.app import StationApp
+from dbbstation.tui.findings_panel import FindingsPanel
 from dbbstation.tui.help_texts import HELP
-from dbbstation.tui.large_screen import LargeScreen
+from dbbstation.tui.large_screen import LargeFigures, LargeScreen
 from dbbstation.tui.measure_screen import MeasureScreen
+from dbbstation.tui.messages_screen import MessagesScreen
 from dbbstation.tui.overview_panels import ChosenRun
 from dbbstation.tui.overview_screen import OverviewScreen
 from dbbstation.tui.question import GiveUpQuestion
@@ -161,13 +164,17 @@ def finished() -> Happening:
 STATES = [announced, turning, complete, finished]
 
 
-def played(happening: Happening, play: Callable[[Pilot[None], StationApp], Awaitable[None]]) -> Waits:
+def played(
+    happening: Happening,
+    play: Callable[[Pilot[None], StationApp], Awaitable[None]],
+    size: tuple[int, int] = (80, 24),
+) -> Waits:
     """Play on a screen that shows what happened, and return what was sent."""
     runner = Waits(happening.events)
     app = StationApp(happening.shown(), runner, clock=lambda: 0.0)
 
     async def run() -> None:
-        async with app.run_test(size=(80, 24)) as pilot:
+        async with app.run_test(size=size) as pilot:
             app.look()
             await pilot.pause()
             await play(pilot, app)
@@ -241,7 +248,7 @@ def test_a_reason_is_typed_and_an_empty_one_is_none() -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         await pilot.press("o", "up", "left", "x")
         assert isinstance(app.screen, ReasonQuestion)
-        await pilot.press("t", "enter")
+        await pilot.press("5", "enter")
         assert isinstance(app.screen, ReasonQuestion)
         await pilot.press(*"a chip", "enter")
         assert isinstance(app.screen, OverviewScreen)
@@ -268,7 +275,7 @@ def test_a_question_goes_with_the_circle_that_it_is_about() -> None:
             await pilot.pause()
             assert app.board.state is State.COMPLETE
             assert len(app.screen_stack) == 1
-            await pilot.press("v")
+            await pilot.press("g")
             assert "centred" in app.screen.query_one(TraceView)._caption()
 
     asyncio.run(run())
@@ -303,14 +310,14 @@ def test_a_rejected_run_before_the_last_is_seen_and_counts_again() -> None:
         chosen = app.screen.query_one(ChosenRun)
         assert str(chosen.text(app.board)).startswith("t0-ccw-2: centre")
         await pilot.press("a")  # it counts already
-        await pilot.press("e")
+        await pilot.press("h")
         figures, verdict, which = str(chosen.text(app.board)).splitlines()
         assert figures.startswith("t0-ccw-1: centre X +10.8 Y +16.8")  # 20 µm towards 1 rad
         assert verdict == "rejected: the bar slipped"
         assert which.startswith("Run 1 of 2")
         await pilot.press("x")  # it does not count already
         assert isinstance(app.screen, OverviewScreen)
-        await pilot.press("a", "e", "x", "1")
+        await pilot.press("a", "h", "x", "1")
 
     again, taken_back = played(twice(), play).sent
     assert again == Judge("t0", Direction.CCW, 1, accepted=True, reason="")
@@ -319,7 +326,7 @@ def test_a_rejected_run_before_the_last_is_seen_and_counts_again() -> None:
 
 def test_large_figures_are_one_key_from_the_overview_once_a_question_is_closed() -> None:
     async def play(pilot: Pilot[None], app: StationApp) -> None:
-        await pilot.press("o", "up", "left", "e", "e", "x")
+        await pilot.press("o", "up", "left", "h", "h", "x")
         assert isinstance(app.screen, ReasonQuestion)
         await pilot.press("f")
         assert isinstance(app.screen, ReasonQuestion)
@@ -339,7 +346,7 @@ def test_views_are_those_there_is_something_for() -> None:
         seen = []
         for _ in range(4):
             seen.append(app.screen.query_one(TraceView)._caption().split(" · ")[0])
-            await pilot.press("v")
+            await pilot.press("g")
         return seen
 
     async def running(pilot: Pilot[None], app: StationApp) -> None:
@@ -491,7 +498,7 @@ def test_the_session_before_is_drawn_dim_beneath_its_own_direction_and_test(monk
         assert view._beneath == {Direction.CCW: before}
         assert ((view._members & 30) == _LAST).sum() > 10  # alone in a cell, or on the scale
         assert view._legend(view.size.width).text.strip() == "━━ ccw  ── cw  ── before  ·· nominal"
-        await pilot.press("v")
+        await pilot.press("g")
         assert view._beneath == {Direction.CCW: before.centred}
         app.board.last = {Direction.CCW: LiveTrace(replace(former.run, test="another"), former.circle)}
         app.draw()
@@ -500,3 +507,78 @@ def test_the_session_before_is_drawn_dim_beneath_its_own_direction_and_test(monk
 
     played(happening, play)
     assert asked == [("session-7", former.run.test)]
+
+
+def wrong() -> Happening:
+    told = (
+        found(Name.OTHER_DIRECTION, 144.7, 3.2, "µm", "sound", "something moved"),
+        found(Name.FEED, 100.0, 10.0, "mm/min", "sound", "the feed", "feed 1100 of 1000 mm/min"),
+    )
+    return Happening(findings=told).circle("t0", Direction.CCW)
+
+
+def test_what_is_wrong_is_not_accepted_by_enter_and_for_a_reason_only() -> None:
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        said = " ".join(str(app.screen.query_one("#now").visual).split())
+        assert said.startswith("REPEAT t0-ccw-1: feed 1100 of 1000 mm/min: set the override on the control to 100 %")
+        rows = str(app.screen.query_one(FindingsPanel).text(app.board)).splitlines()
+        assert rows[0].strip() == "REPEAT"
+        assert [row.split()[0] for row in rows[1:]] == ["feed", "other"]
+        assert "direction  " in rows[2]  # name and number do not run together
+        await pilot.press("f")
+        assert "██" in str(app.screen.query_one(LargeFigures).text(app.board))
+        await pilot.press("f", "j")
+        assert isinstance(app.screen, MessagesScreen)
+        await pilot.press("escape", "a")
+        assert isinstance(app.screen, ReasonQuestion)
+        await pilot.press("escape", "enter", "a", "1")
+
+    repeated, accepted = played(wrong(), play, size=(120, 40)).sent
+    assert repeated == Repeat()
+    assert accepted == Accept("the cause is known and does not touch what is wanted")
+    # A sound one: Enter accepts it.
+    sound = (found(Name.NOISE, 0.1, 1.0, "µm", "", ""),)
+
+    async def enter(pilot: Pilot[None], _app: StationApp) -> None:
+        await pilot.press("enter")
+
+    assert played(Happening(findings=sound).circle("t0", Direction.CCW), enter).sent == [Accept()]
+
+
+def test_what_was_found_is_the_reason_of_a_repeat_and_of_what_counts_all_the_same() -> None:
+    for command, says in (
+        (Repeat(), "feed wrong, 100.00 of 10.00 mm/min"),
+        (Accept(), "accepted although other direction wrong, 144.70 of 3.20 µm; feed wrong, 100.00 of 10.00 mm/min"),
+        (Repeat("the bar slipped"), "the bar slipped"),
+        (Accept("it cannot be measured again"), "it cannot be measured again"),
+    ):
+        board = wrong().command(command).board()
+        assert says in board.reasons["t0-ccw-1"]
+    assert complete().command(Accept()).board().reasons["t0-ccw-1"] == ""
+    assert complete().command(Repeat()).board().reasons["t0-ccw-1"] == "repeated by the operator"
+
+
+def test_a_verdict_can_be_changed_when_the_plan_is_through(tmp_path: Path) -> None:
+    session = shutil.copytree(shipped_folder("fixtures") / "sessions" / "virtual", tmp_path / "session")
+    happening = complete().command(Accept())
+    for command in (Skip(),) * 5:
+        happening.command(command)
+    begun: list[bool] = []
+
+    async def play(pilot: Pilot[None], app: StationApp) -> None:
+        assert app.board.state is State.FINISHED
+        app.board.session = str(session)
+        app._runner.start = lambda: begun.append(True)
+        await pilot.press("o", "up", "up", "left", "x")
+        assert isinstance(app.screen, ReasonQuestion)
+        await pilot.press("escape")
+        app.send(Judge("a", Direction.CW, 1, accepted=False, reason="the bar slipped"))
+        for _ in range(200):
+            app.look()
+            if begun:
+                break
+            await pilot.pause(0.02)
+
+    assert played(happening, play).sent == []
+    assert begun == [True]  # the sequence goes on, with what does not count any more left to do
+    assert read_session(session).runs[1].reason == "the bar slipped"

@@ -134,6 +134,14 @@ async def press(app: StationApp, *keys: str) -> None:
         await asyncio.sleep(0.05)
 
 
+async def accept(pilot: Pilot[None], app: StationApp) -> None:
+    """Accept a run; sped up so much, something is wrong with one now and then: then for a reason."""
+    await press(app, "a")
+    if isinstance(app.screen, ReasonQuestion):
+        await press(app, "1")
+        await until(pilot, lambda: not isinstance(app.screen, ReasonQuestion))
+
+
 def said(app: StationApp) -> str:
     return " ".join(str(app.query_one("#now").visual).split())
 
@@ -151,7 +159,7 @@ async def circle(pilot: Pilot[None], app: StationApp, key: str = "enter") -> Non
     await press(app, key)
     await until(pilot, lambda: app.board.state in {State.COMPLETE, State.FLAWED})
     if app.board.state is State.FLAWED:
-        await until(pilot, lambda: "No usable circle in low-" in said(app))
+        await until(pilot, lambda: "has no usable circle" in said(app))
         await press(app, "r")
         await until(pilot, lambda: app.board.state is not State.FLAWED)
         await circle(pilot, app)
@@ -165,11 +173,11 @@ def test_a_whole_plan_with_every_verdict(short_plan: InlinePlan, tmp_path: Path)
         assert "tilt A 0° B 0°" in row(app, "set-up")
         await press(app, "a")  # means nothing yet
         await circle(pilot, app)
-        await until(pilot, lambda: "is complete: A accepts it" in said(app))
+        await until(pilot, lambda: "measures it again" in said(app))
         await press(app, "r")
         await until(pilot, lambda: board.state is State.ANNOUNCED)
         await circle(pilot, app, "m")
-        await press(app, "a")
+        await accept(pilot, app)
         await until(pilot, lambda: board.accepted == 1 and "leave as is" in row(app, "set-up"))
         await circle(pilot, app)
         await until(pilot, lambda: row(app, "figures").count("low-") == 2)
@@ -190,7 +198,9 @@ def test_a_whole_plan_with_every_verdict(short_plan: InlinePlan, tmp_path: Path)
     assert [run.state for run in ccw] == [*[RunState.REJECTED] * (len(ccw) - 1), RunState.ACCEPTED]
     assert len(ccw) >= 2
     assert {run.state for run in cw} == {RunState.REJECTED}
-    assert (ccw[0].reason, cw[-1].reason) == ("repeated by the operator", "rejected by the operator")
+    # What was found wrong is the reason, where anything was.
+    assert ccw[0].reason == "repeated by the operator" or "wrong" in ccw[0].reason
+    assert cw[-1].reason == "rejected by the operator" or "wrong" in cw[-1].reason
     assert (ccw[0].mounting, ccw[-1].mounting, cw[-1].mounting) == (1, 2, 2)
 
 
@@ -247,7 +257,7 @@ def test_a_fault_of_the_line_is_shown_and_the_line_connected_again(short_plan: I
         await until(pilot, lambda: board.fault is None and board.state is State.ANNOUNCED)
         await until(pilot, lambda: "low-ccw-2" in row(app, "title"))
         await circle(pilot, app)
-        await press(app, "a")
+        await accept(pilot, app)
         await until(pilot, lambda: board.accepted == 1)
 
     with switched_on(short_plan, tmp_path / "session") as bench:
@@ -300,11 +310,11 @@ def test_a_verdict_that_was_not_given_is_asked_for_again(short_plan: InlinePlan,
 
     async def go_on(pilot: Pilot[None], app: StationApp) -> None:
         await until(pilot, lambda: app.board.state is State.COMPLETE)
-        await until(pilot, lambda: "is complete: A accepts it" in said(app))
+        await until(pilot, lambda: "measures it again" in said(app))
         assert "waits for its verdict" in row(app, "messages")
         assert row(app, "figures").count("low-") == 1
         assert len(app.board.traces[Direction.CCW]) > 100
-        await press(app, "a")
+        await accept(pilot, app)
         await until(pilot, lambda: app.board.accepted == 1 and app.board.state is State.ANNOUNCED)
 
     with switched_on(short_plan, tmp_path / "session") as bench:
@@ -359,7 +369,7 @@ def test_the_overview_leads_to_another_test_and_takes_verdicts_back(short_plan: 
     async def play(pilot: Pilot[None], app: StationApp) -> None:
         board = app.board
         await circle(pilot, app)
-        await press(app, "a")
+        await accept(pilot, app)
         await until(pilot, lambda: board.accepted == 1 and board.state is State.ANNOUNCED)
         await press(app, "z", "f1")  # a wrong key is harmless
         await until(pilot, lambda: isinstance(app.screen, HelpScreen))
@@ -376,7 +386,7 @@ def test_the_overview_leads_to_another_test_and_takes_verdicts_back(short_plan: 
         await press(app, "1")
         await until(pilot, lambda: board.accepted == 0)
         await until(pilot, lambda: isinstance(app.screen, OverviewScreen))
-        await press(app, "a")
+        await accept(pilot, app)
         await until(pilot, lambda: board.accepted == 1)
         await press(app, "right", "enter")
         await until(pilot, lambda: len(app.screen_stack) == 1 and board.announced.run.direction is Direction.CW)

@@ -118,8 +118,8 @@ def test_one_circle_is_measured_and_accepted_wrong_keys_and_all(terminal: Termin
     terminal.press("zk7\r")
     terminal.until("touch nothing until it has fed out")
     terminal.press("a5\x1b")  # there is nothing to accept yet
-    terminal.until("is complete")
-    terminal.press("a")
+    terminal.until("measures it again")
+    terminal.press("a1")  # 1 is a reason, where one is asked for
     terminal.until("low-ccw-1 accepted")
     terminal.press("q")
     terminal.until("Temperature of the shop now")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.fit.directions import in_words
-from dbbstation.inference.square_root import complement, spread
+from dbbstation.inference.square_root import complement, spread_over
 from dbbstation.threads import with_one_thread
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def visibility(calibration: Calibration) -> Visibility:
     known = calibration.layout.known
     fitted = np.flatnonzero(~known.random)
     scale = known.scale[fitted]
-    whole = spread(calibration.circle_blocks, len(known.random))[:, fitted] * scale
+    whole = spread_over(calibration.circle_blocks, fitted)[:, :-1] * scale
     free = complement(calibration.solution.held)
     singular = np.asarray(np.linalg.svd(whole @ free.T, compute_uv=False), dtype=np.float64)
     singular = singular[singular > ROUNDING * singular[0]]  # circles see nothing of what moves currents only
@@ -174,7 +174,7 @@ def _leverage(calibration: Calibration, fitted: NDArray[np.int64]) -> dict[str, 
     for test, blocks in tests.items():
         own = np.setdiff1d(touched[test], common)
         priors = np.hstack([np.diag(1.0 / known.prior[own]), np.zeros((len(own), len(common)))])
-        rows = spread(blocks, len(known.random))[:, np.concatenate([own, common])] / noise
+        rows = spread_over(blocks, np.concatenate([own, common]))[:, :-1] / noise
         triangle = np.asarray(np.linalg.qr(np.vstack([priors, rows]), mode="r"), dtype=np.float64)
         root = triangle[len(own) :, len(own) :]
         worth[test] = float(np.sum((root @ covariance) * root))

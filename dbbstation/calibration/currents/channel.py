@@ -173,7 +173,7 @@ def current_start(layout: Layout, channel: Channel | None) -> dict[str, NDArray[
         columns, solution = by_themselves(current_blocks(layout, channel, x), layout.known)
         step = layout.nominal[columns] + solution.x - x[columns]
         x[columns] += step
-        sigma = np.sqrt(np.diag(solution.covariance))
+        sigma = np.sqrt(solution.variance)
         if np.all(np.abs(step) <= SETTLED_SIGMA * sigma + ROUNDING * layout.known.scale[columns]):
             break
     touched = set(columns.tolist())

@@ -128,7 +128,7 @@ def _centre_of_gravity(
         for parameter, column in zip(term.parameters, np.r_[term.columns].tolist(), strict=True):
             told = column in place and held[column] <= OPEN
             k = place.get(column, 0)
-            sigma = float(np.sqrt(solution.covariance[k, k]))
+            sigma = float(np.sqrt(solution.variance[k]))
             said[channel][parameter.name] = (float(solution.x[k]), sigma) if told else None
     return said
 
@@ -136,7 +136,7 @@ def _centre_of_gravity(
 def _doubts(layout: Layout, x: NDArray[np.float64], solution: Solution, held: frozenset[str]) -> list[str]:
     """Gains that cannot be right."""
     doubts = []
-    sigma = np.sqrt(np.diag(solution.covariance))
+    sigma = np.sqrt(solution.variance)
     for column, (source, _, name) in enumerate(layout.names):
         if source in _drives(layout) and name in MOTOR_OF_GAIN and name not in held:
             motor = MOTOR_OF_GAIN[name]

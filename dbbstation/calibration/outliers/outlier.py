@@ -22,7 +22,7 @@ LEAST_UM = 3.0
 """... and more than a bar's noise could [µm]."""
 
 
-class Kind(StrEnum):
+class OutlierKind(StrEnum):
     """What does not belong."""
 
     RUN = "run"
@@ -34,11 +34,11 @@ class Kind(StrEnum):
 
 
 SOURCE_OF = {
-    Kind.MOUNTING: "mounting",
-    Kind.MOVED: "mounting",
-    Kind.BALL: "ball-coordinate",
-    Kind.WRONG_PLACE: "ball-coordinate",
-    Kind.BAR: "bar-offset",
+    OutlierKind.MOUNTING: "mounting",
+    OutlierKind.MOVED: "mounting",
+    OutlierKind.BALL: "ball-coordinate",
+    OutlierKind.WRONG_PLACE: "ball-coordinate",
+    OutlierKind.BAR: "bar-offset",
 }
 """Name of the error source that is out of size; a run that is no circle of this machine is none."""
 
@@ -61,7 +61,7 @@ class Outlier:
         why: end of the text, what it may come from.
     """
 
-    kind: Kind
+    kind: OutlierKind
     test: str
     run: str
     size_um: float

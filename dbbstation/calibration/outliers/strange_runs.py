@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
-from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Kind, Outlier
+from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Outlier, OutlierKind
 from dbbstation.calibration.outliers.run_remainder import left_of, rms_um, without_shift
-from dbbstation.inference.square_root import solve
+from dbbstation.inference.square_root import chi2_without
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,17 +47,21 @@ def _strange_test(calibration: Calibration) -> list[int]:
     for k, run in enumerate(calibration.observations):
         tests.setdefault((run.setup.session, run.test), []).append(k)
 
-    def misfit(left_out: Sequence[int]) -> float:
-        blocks = [block for k, block in enumerate(calibration.blocks) if k not in left_out]
-        return solve(blocks, known, noise, held).chi2 / sum(block.count for block in blocks)
+    counts = np.array([block.count for block in calibration.blocks])
 
-    without = {name: misfit(own) for name, own in tests.items()}
+    def misfits(parts: Sequence[Sequence[int]]) -> list[float]:
+        chi2 = chi2_without(calibration.blocks, known, noise, held, parts)
+        return [one / float(counts.sum() - counts[list(part)].sum()) for one, part in zip(chi2, parts, strict=True)]
+
+    of_all, *each = misfits([[], *tests.values()])
+    without = dict(zip(tests, each, strict=True))
     best = min(without, key=without.__getitem__)
-    falls = misfit([]) / without[best]
+    falls = of_all / without[best]
     in_place = falls > FALLS and without[best] < AT_NOISE
     if not (in_place or falls > STANDS_OUT**2):
         return []
-    alone = [k for k in tests[best] if misfit([k]) < ALONE * without[best]]
+    by_run = misfits([[k] for k in tests[best]])
+    alone = [k for k, left in zip(tests[best], by_run, strict=True) if left < ALONE * without[best]]
     return alone[:1] or tests[best]
 
 
@@ -119,7 +123,7 @@ def leave_out(fit: Fit, runs: Sequence[Observation], strange: Sequence[int]) -> 
 
 def _looks_like(
     calibration: Calibration, others: Sequence[Observation], run: Observation, residual: NDArray[np.float64]
-) -> tuple[Kind, str]:
+) -> tuple[OutlierKind, str]:
     """What a run that does not belong most resembles."""
     noise = _strange_from_um(np.array([rms_um(left) for _, left in left_of(calibration)]))
     best, where = np.inf, run
@@ -134,15 +138,18 @@ def _looks_like(
     if best < noise:
         what = f"it is what test {where.test} {where.raw.circle.direction} should read, to {best:.1f} µm"
         if where.test == run.test:
-            return Kind.WRONG_PLACE, f"{what}; was the other direction run?"
-        return Kind.WRONG_PLACE, f"{what}; the ball stood in that bore, or the run was filed under the wrong test"
+            return OutlierKind.WRONG_PLACE, f"{what}; was the other direction run?"
+        return (
+            OutlierKind.WRONG_PLACE,
+            f"{what}; the ball stood in that bore, or the run was filed under the wrong test",
+        )
     step, at = _step(residual)
     if rms_um(_without_step(residual, at)) < 0.5 * rms_um(residual - residual.mean()):
         return (
-            Kind.RUN,
+            OutlierKind.RUN,
             f"the reading steps by {1e3 * step:.1f} µm at {run.raw.theta_deg[at]:.0f}°; bar or holder was bumped",
         )
-    return Kind.RUN, "no circle of this machine and no step; a bump, a loose ball, or another machine's run?"
+    return OutlierKind.RUN, "no circle of this machine and no step; a bump, a loose ball, or another machine's run?"
 
 
 def _step(residual: NDArray[np.float64]) -> tuple[float, int]:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtri, ndtr
 
 from dbbstation.calibration.checks.scatter import UNKNOWN_MM, Seat, seats_of
-from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Kind, Outlier
+from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Outlier, OutlierKind
 from dbbstation.calibration.outliers.run_remainder import left_of, shift_of
 from dbbstation.errors import CalibrationError
 from dbbstation.plan.bar import UNKNOWN_BAR_MM
@@ -54,7 +54,7 @@ def ball_moved(fit: Fit, calibration: Calibration, runs: Sequence[Observation]) 
         f"the ball of test {run.test} moved by {_towards(shift)} between run {run.label} and {others[0].label}: "
         "holder or cup loose, or touched"
     )
-    return Outlier(Kind.MOVED, run.test, run.label, size, _um(shift), text), apart, again
+    return Outlier(OutlierKind.MOVED, run.test, run.label, size, _um(shift), text), apart, again
 
 
 def _moved_in(calibration: Calibration) -> int | None:
@@ -107,7 +107,7 @@ def free_ball(
         why = ", but not when it was put up again: badly seated"
     else:
         why = ": badly seated, or its CMM row is wrong; put it up again to tell"
-    kind = Kind.BALL if together else Kind.MOUNTING
+    kind = OutlierKind.BALL if together else OutlierKind.MOUNTING
     again = fit(freed)
     return _ball(again, kind, (mounting, *sorted(names - {mounting})), why, sure=bool(alike)), freed, again
 
@@ -154,7 +154,7 @@ def free_bar(fit: Fit, runs: Sequence[Observation], session: str) -> Step:
 
 def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
     """What was set free as another fit finds it, such as one with the physics that pulled it; others as they are."""
-    if outlier.kind is Kind.BAR:
+    if outlier.kind is OutlierKind.BAR:
         found = _bar(calibration, outlier.freed[0], outlier.why)
     elif outlier.freed:
         found = _ball(calibration, outlier.kind, outlier.freed, outlier.why, sure=outlier.sure)
@@ -163,7 +163,7 @@ def beside(outlier: Outlier, calibration: Calibration) -> Outlier:
     return replace(found, alike=outlier.alike)
 
 
-def _ball(calibration: Calibration, kind: Kind, freed: tuple[str, ...], why: str, *, sure: bool) -> Outlier:
+def _ball(calibration: Calibration, kind: OutlierKind, freed: tuple[str, ...], why: str, *, sure: bool) -> Outlier:
     """A ball that may stand anywhere, as a fit finds it in the first of its mountings."""
     seat = next(seat for seat in seats_of(calibration) if seat.mounting == freed[0])
     of = [run for run in calibration.observations if run.setup.mounting in freed]
@@ -192,7 +192,7 @@ def _bar(calibration: Calibration, session: str, why: str) -> Outlier:
     sigma = 1e3 * float(np.sqrt(calibration.solution.covariance[column, column]))
     longer = "long" if offset > 0.0 else "short"
     return Outlier(
-        kind=Kind.BAR,
+        kind=OutlierKind.BAR,
         test=session,
         run="all runs",
         size_um=offset,

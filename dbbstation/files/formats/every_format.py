@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from dbbstation.files.formats.bar import BarFile
 from dbbstation.files.formats.jig import JigFile
+from dbbstation.files.formats.job import JobFile
 from dbbstation.files.formats.machine import MachineFile
 from dbbstation.files.formats.mapping import MappingFile
 from dbbstation.files.formats.model_schema import ModelFile
@@ -18,7 +19,18 @@ from dbbstation.files.yaml.schema import format_of, versions_of
 if TYPE_CHECKING:
     from dbbstation.files.yaml.schema import Schema
 
-_NEWEST = (BarFile, JigFile, MachineFile, MappingFile, ModelFile, PlanFile, SessionFile, SettingsFile, SimulatorFile)
+_NEWEST = (
+    BarFile,
+    JigFile,
+    JobFile,
+    MachineFile,
+    MappingFile,
+    ModelFile,
+    PlanFile,
+    SessionFile,
+    SettingsFile,
+    SimulatorFile,
+)
 
 SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _NEWEST}
 """Schema of each format by its name with its newest version, which has all keys of those before."""

@@ -1,4 +1,4 @@
-"""`dbb-session/5`, which has all of `dbb-session/1` to `/4`: what was done in a session, one entry per run."""
+"""`dbb-session/6`, which has all of `dbb-session/1` to `/5`: what was done in a session, one entry per run."""
 
 from datetime import datetime
 from pathlib import PurePosixPath
@@ -67,6 +67,19 @@ class BarSchema(Schema):
     """Of the calibrator."""
 
 
+class InstrumentSchema(Schema):
+    """What read the lengths, and whether it stands at a machine or in a computer."""
+
+    name: str
+    """Name of the instrument or of its protocol file."""
+    profile: str = ""
+    """Its variant; empty: the usual one."""
+    port: str = ""
+    """Name or URL of the port that it was read at."""
+    virtual: bool
+    """Whether machine and instrument are virtual: what was read says nothing of a real machine."""
+
+
 class ProgramSchema(Schema):
     """The NC program that was commanded where it was not the plan's nominal circle."""
 
@@ -115,6 +128,8 @@ class RunSchema(Schema):
     """Covers this entry and the `chain_sha256` of the sealed run before it in the list."""
     counts: CountsSchema | None = None
     """Samples received, rejected and lost; absent where the recording was made elsewhere."""
+    instrument: InstrumentSchema | None = None
+    """What read it; absent in runs of older programs and in recordings made elsewhere."""
     program: ProgramSchema | None = None
     """What was commanded, where that was not the plan's nominal circle."""
     centre_mm: Point | None = None
@@ -204,7 +219,9 @@ class NoteSchema(Schema):
 class SessionFile(Schema):
     """What was done: where the machine and plan stand, the bar, one entry per run."""
 
-    format: Literal["dbb-session/1", "dbb-session/2", "dbb-session/3", "dbb-session/4", "dbb-session/5"]
+    format: Literal[
+        "dbb-session/1", "dbb-session/2", "dbb-session/3", "dbb-session/4", "dbb-session/5", "dbb-session/6"
+    ]
     """Name and version of this format."""
     machine: InsidePath
     """The nominal model that the controller had while measuring, `dbb-machine/1`."""
@@ -218,6 +235,8 @@ class SessionFile(Schema):
     """Job or order number: what it was measured for."""
     ambient_temp_c: TemperatureDegc | None = None
     """Temperature of the shop [degC]."""
+    instrument: InstrumentSchema | None = None
+    """What the session was begun with; all its runs are virtual, or none. Absent in sessions of older programs."""
     bar: BarSchema | None = None
     """The bar."""
     bar_waiver: str = ""

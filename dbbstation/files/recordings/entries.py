@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from dbbstation.files.formats.session import BarSchema, NoteSchema, ProgramSchema, RunSchema
+    from dbbstation.files.formats.session import BarSchema, InstrumentSchema, NoteSchema, ProgramSchema, RunSchema
 
 
 class RunState(StrEnum):
@@ -41,6 +41,34 @@ class Program:
     path: Path
     sha256: str
     model_sha256: str
+
+
+@dataclass(frozen=True)
+class ReadBy:
+    """What read the lengths of a session or a run.
+
+    Attributes:
+        name: of the instrument, or of its protocol file.
+        profile: its variant; empty: the usual one.
+        port: name or URL of the port; empty where there is none.
+        virtual: whether machine and instrument are virtual.
+    """
+
+    name: str
+    profile: str = ""
+    port: str = ""
+    virtual: bool = False
+
+    @property
+    def text(self) -> str:
+        """The instrument in words: `heidenhain-nd281b at /dev/ttyUSB0`."""
+        name = f"{self.name} ({self.profile})" if self.profile else self.name
+        return f"{name} at {self.port}" if self.port else name
+
+
+def read_by(instrument: InstrumentSchema | None) -> ReadBy | None:
+    """Return an instrument as the rest of the program takes it."""
+    return None if instrument is None else ReadBy(**instrument.model_dump())
 
 
 @dataclass(frozen=True)
@@ -108,6 +136,7 @@ class RunEntry:
         centre_mm: centre of the circle as programmed, machine frame (x, y, z) [mm]; None: as planned.
         chain_sha256: its link in the chain of sealed runs; empty where it has none.
         counts: samples received, rejected and lost; None where not noted.
+        instrument: what read it; None where not noted.
     """
 
     test: str
@@ -123,6 +152,7 @@ class RunEntry:
     centre_mm: tuple[float, float, float] | None
     chain_sha256: str = ""
     counts: Counts | None = None
+    instrument: ReadBy | None = None
 
     @property
     def label(self) -> str:
@@ -146,6 +176,7 @@ def run_entry(run: RunSchema, folder: Path) -> RunEntry:
         centre_mm=run.centre_mm,
         chain_sha256=run.chain_sha256 or "",
         counts=None if run.counts is None else Counts(**run.counts.model_dump()),
+        instrument=read_by(run.instrument),
     )
 
 

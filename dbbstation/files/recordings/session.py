@@ -25,6 +25,7 @@ from dbbstation.files.recordings.entries import (
     count_in,
     counts_in,
     note_entry,
+    read_by,
     run_entry,
 )
 from dbbstation.files.recordings.event_log import EVENTS_FILE
@@ -93,6 +94,12 @@ class SessionFolder(SessionDetails):
         """Paths of machine and plan within the folder, with forward slashes."""
         paths = (self.machine_path, self.plan_path)
         return tuple(path.relative_to(self.folder).as_posix() for path in paths)  # type: ignore[return-value]  # two of them
+
+    @property
+    def virtual(self) -> bool | None:
+        """Whether its runs come from a virtual machine; None where nothing says so or otherwise."""
+        stated = [one.virtual for one in (self.instrument, *(run.instrument for run in self.runs)) if one is not None]
+        return any(stated) if stated else None
 
     def in_state(self, *states: RunState) -> tuple[RunEntry, ...]:
         """Return the runs in one of these states; repeats of a circle as they are counted."""
@@ -344,6 +351,7 @@ def parse_session(
         amendments=tuple(map(amendment_entry, session.amendments)),
         notes=tuple(map(note_entry, session.notes)),
         job=session.job,
+        instrument=read_by(session.instrument),
     )
 
 

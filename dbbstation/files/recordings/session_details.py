@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dbbstation.files.recordings.entries import Note
+    from dbbstation.files.recordings.entries import Note, ReadBy
     from dbbstation.files.recordings.seal import Amendment, Seal
     from dbbstation.files.recordings.session_set_up import SetUpReadings
     from dbbstation.plan.bar import Bar
@@ -27,6 +27,7 @@ class SessionDetails:
         amendments: what was changed on purpose after it was sealed.
         notes: what was noted while it was measured, oldest first.
         job: job or order number, what it is measured for.
+        instrument: what it was begun with; None: not noted.
     """
 
     serial_number: str = ""
@@ -39,6 +40,7 @@ class SessionDetails:
     amendments: tuple[Amendment, ...] = ()
     notes: tuple[Note, ...] = ()
     job: str = ""
+    instrument: ReadBy | None = None
 
     @property
     def noted(self) -> bool:

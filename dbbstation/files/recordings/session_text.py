@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from dbbstation.files.recordings.entries import Note, RunEntry
+    from dbbstation.files.recordings.entries import Note, ReadBy, RunEntry
     from dbbstation.files.recordings.seal import Amendment, Seal
     from dbbstation.files.recordings.session_details import SessionDetails
 
@@ -38,6 +38,7 @@ def session_data(
         "operator": details.operator,
         "job": details.job or None,
         "ambient_temp_c": details.ambient_temp_c,
+        "instrument": details.instrument and _instrument_data(details.instrument),
         "bar": bar and {each.name: _plain(getattr(bar, each.name)) for each in fields(bar)},
         "bar_waiver": details.bar_waiver or None,
         "seal": seal and seal_data(seal),
@@ -71,6 +72,11 @@ def _note_data(note: Note) -> object:
     return _without_none({**asdict(note), "made": _plain(note.made), "text": note.text or None})
 
 
+def _instrument_data(instrument: ReadBy) -> dict[str, object]:
+    told = asdict(instrument)
+    return {key: value for key, value in told.items() if value != ""}
+
+
 def _run_data(folder: Path, run: RunEntry) -> dict[str, object]:
     program = run.program and {
         "file": run.program.path.relative_to(folder).as_posix(),
@@ -90,6 +96,7 @@ def _run_data(folder: Path, run: RunEntry) -> dict[str, object]:
         "chain_sha256": run.chain_sha256 or None,
         "counts": run.counts and run.counts.data(),
         "centre_mm": run.centre_mm,
+        "instrument": run.instrument and _instrument_data(run.instrument),
         "program": _without_none(program),
     }
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from dbbstation.files.formats.plan import InlinePlan
-    from dbbstation.files.recordings.entries import Counts
+    from dbbstation.files.recordings.entries import Counts, ReadBy
     from dbbstation.files.recordings.session import SessionFolder
     from dbbstation.machine.geometry import Machine
     from dbbstation.plan.circle import Direction
@@ -163,6 +163,7 @@ class SessionWriter:
         mounting: int | None = None,
         program: Program | None = None,
         centre_mm: tuple[float, float, float] | None = None,
+        instrument: ReadBy | None = None,
     ) -> RunWriter:
         """Start the next repeat of a test: its `.part` is made and noted as `recording`.
 
@@ -174,6 +175,7 @@ class SessionWriter:
             mounting: counts how often the ball was put up.
             program: from `add_program`, where the plan's circle is not what is commanded.
             centre_mm: centre of the circle as programmed where it differs from the plan [mm].
+            instrument: what reads it; None: not noted.
 
         Raises:
             InputError: the plan has no such run.
@@ -198,6 +200,7 @@ class SessionWriter:
             sha256="",
             program=program,
             centre_mm=centre_mm,
+            instrument=instrument,
         )
         self._put(entry)
         self._write("run started")

@@ -20,6 +20,7 @@ FORMATS = {
     "dbb-model": "a model",
     "dbb-settings": "a shop's settings",
     "dbb-bar": "the calibration of a bar",
+    "dbb-job": "a job",
     "dbb-mapping": "the mapping of recordings made elsewhere",
     "dbb-simulator": "a simulator of one's own",
 }
@@ -63,6 +64,7 @@ SINCE: dict[str, dict[str, int]] = {
         "notes": 3,
         "job": 4,
         "log": 5,
+        "instrument": 6,
         **dict.fromkeys(_OF_BARS, 3),
     },
     "dbb-instrument": {"stroke_mm": 2, **_OF_INSTRUMENTS},

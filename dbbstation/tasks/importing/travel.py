@@ -44,7 +44,7 @@ class UnusableTravelError(Exception):
 
 
 @dataclass(frozen=True, eq=False)
-class Travel:
+class TravelledPath:
     """When and where samples of a run were taken.
 
     Attributes:
@@ -130,7 +130,7 @@ def check_span(theta_deg: NDArray[np.float64], stated_deg: float | None, circle:
 
 def travel(
     t_s: NDArray[np.float64] | None, theta_deg: NDArray[np.float64] | None, circle: Circle, trace: str | None
-) -> Travel:
+) -> TravelledPath:
     """Return times and angles of a run.
 
     Args:
@@ -149,20 +149,20 @@ def travel(
     timed, computed = _from_zero(t_s)
     rows = np.arange(len(timed))
     if theta_deg is not None:
-        return Travel(timed, theta_deg, rows, (*computed, *_feed_note(timed, theta_deg, circle)))
+        return TravelledPath(timed, theta_deg, rows, (*computed, *_feed_note(timed, theta_deg, circle)))
     if trace is None:
         raise UnusableTravelError("this run has no angles", "say in the mapping: `trace: whole`, or `turn`")
-    return Travel(timed, None, rows, computed) if trace == "whole" else _turn(timed, circle, computed)
+    return TravelledPath(timed, None, rows, computed) if trace == "whole" else _turn(timed, circle, computed)
 
 
-def _from_angles(theta_deg: NDArray[np.float64], circle: Circle) -> Travel:
+def _from_angles(theta_deg: NDArray[np.float64], circle: Circle) -> TravelledPath:
     progress = circle.direction.sign * (_unwrapped(theta_deg) - theta_deg[0])
     still = np.flatnonzero(np.diff(progress) <= 0.0)
     if len(still):
         what = f"the angle stands still or turns back in row {still[0] + 2} of the run, and there are no times"
         raise UnusableTravelError(what, "export the times too, or sort out these rows")
     said = f"times: computed from the angles {_at(circle)}"
-    return Travel(progress / circle.turning_deg_s, theta_deg, np.arange(len(theta_deg)), (said,))
+    return TravelledPath(progress / circle.turning_deg_s, theta_deg, np.arange(len(theta_deg)), (said,))
 
 
 def _from_zero(t_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
@@ -177,7 +177,7 @@ def _from_zero(t_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str
     return t_s - t_s[0], ("times: counted from the first sample of each run, before that they are those of a clock",)
 
 
-def _turn(t_s: NDArray[np.float64], circle: Circle, computed: tuple[str, ...]) -> Travel:
+def _turn(t_s: NDArray[np.float64], circle: Circle, computed: tuple[str, ...]) -> TravelledPath:
     """Angles of a turn that begins with the first sample, by the programmed feed."""
     progress = (t_s - t_s[0]) * circle.turning_deg_s
     if progress[-1] < LEAST_TURN * FULL_TURN_DEG:
@@ -188,7 +188,7 @@ def _turn(t_s: NDArray[np.float64], circle: Circle, computed: tuple[str, ...]) -
     said = f"angles: computed from the times {_at(circle)}, the first sample at {circle.start_deg:g} degrees"
     beyond = len(t_s) - len(rows)
     more = (f"{beyond} samples beyond the full turn are left out",) if beyond else ()
-    return Travel(t_s[rows], circle.theta_deg(progress[rows]), rows, (*computed, said, *more))
+    return TravelledPath(t_s[rows], circle.theta_deg(progress[rows]), rows, (*computed, said, *more))
 
 
 def _feed_note(t_s: NDArray[np.float64], theta_deg: NDArray[np.float64], circle: Circle) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import pytest
 
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.fit.calibrate import calibrate, default_sources
-from dbbstation.calibration.outliers.outlier import Kind, Outlier
+from dbbstation.calibration.outliers.outlier import Outlier, OutlierKind
 from dbbstation.calibration.outliers.robust import calibrate_robust
 from dbbstation.calibration.outliers.strange_runs import in_place_after_all
 from dbbstation.sources.registry import sources_named
@@ -82,7 +82,7 @@ def test_a_badly_seated_holder_is_named_with_where_the_ball_stands(recorded, sou
     runs = [moved(o, x_mm, y_mm) if o.test == test else o for o in recorded.observations]
     bent = calibrate(recorded.machine, runs)
     calibration, found = robust(recorded, runs)
-    assert [(o.kind, o.test) for o in found] == [(Kind.MOUNTING, test)]
+    assert [(o.kind, o.test) for o in found] == [(OutlierKind.MOUNTING, test)]
     # To the scatter of mounting and CMM itself, and to what fourteen other circles say of the place.
     assert found[0].shift_um[:2] == pytest.approx((1e3 * x_mm, 1e3 * y_mm), abs=8.0)
     assert "put it up again to tell" in found[0].text
@@ -96,7 +96,7 @@ def test_two_badly_seated_holders_are_both_named(recorded, sound):
         for o in recorded.observations
     ]
     calibration, found = robust(recorded, runs)
-    assert {(o.kind, o.test) for o in found} == {(Kind.MOUNTING, "h"), (Kind.MOUNTING, "c")}
+    assert {(o.kind, o.test) for o in found} == {(OutlierKind.MOUNTING, "h"), (OutlierKind.MOUNTING, "c")}
     assert pull(calibration, sound) < 2.5
 
 
@@ -114,11 +114,11 @@ def test_a_wrong_cmm_row_is_wrong_in_every_mounting(recorded, tmp_path):
     ]
     everywhere = [moved(o, 0.0, 0.03) if o.test == "d" else o for o in both]
     _, found = robust(recorded, everywhere)
-    assert [(o.kind, o.test) for o in found] == [(Kind.BALL, "d")]
+    assert [(o.kind, o.test) for o in found] == [(OutlierKind.BALL, "d")]
     assert "its CMM row" in found[0].text
     once = [moved(o, 0.0, 0.03) if (o.test, o.setup.session) == ("d", "again") else o for o in both]
     _, found = robust(recorded, once)
-    assert [(o.kind, o.test) for o in found] == [(Kind.MOUNTING, "d")]
+    assert [(o.kind, o.test) for o in found] == [(OutlierKind.MOUNTING, "d")]
     assert "not when it was put up again" in found[0].text
 
 
@@ -126,7 +126,7 @@ def test_a_ball_that_moved_between_two_runs(recorded, sound):
     k = number(recorded, "d", "cw")
     runs = [moved(o, 0.0, 0.025) if i == k else o for i, o in enumerate(recorded.observations)]
     calibration, found = robust(recorded, runs)
-    assert found[0].kind == Kind.MOVED
+    assert found[0].kind == OutlierKind.MOVED
     assert found[0].test == "d"
     assert found[0].size_um == pytest.approx(25.0, abs=1.0)
     assert pull(calibration, sound) < 2.0
@@ -140,7 +140,7 @@ def test_a_bumped_run_steps(recorded, sound):
     runs = list(recorded.observations)
     runs[k] = replace(run, raw=replace(run.raw, length_mm=length))
     calibration, found = robust(recorded, runs)
-    assert [(o.kind, o.run) for o in found] == [(Kind.RUN, "c ccw 1")]
+    assert [(o.kind, o.run) for o in found] == [(OutlierKind.RUN, "c ccw 1")]
     assert "steps by 20" in found[0].text
     assert pull(calibration, sound) < 1.5
 
@@ -151,7 +151,7 @@ def test_one_run_filed_under_another_test_is_recognised(recorded, sound):
     k, g = number(recorded, "a", "ccw"), number(recorded, "g", "ccw")
     runs[k] = filed(runs[k], runs[g])
     calibration, found = robust(recorded, runs)
-    assert [(o.kind, o.run) for o in found] == [(Kind.WRONG_PLACE, "a ccw 1")]
+    assert [(o.kind, o.run) for o in found] == [(OutlierKind.WRONG_PLACE, "a ccw 1")]
     assert "what test g ccw should read" in found[0].text
     assert pull(calibration, sound) < 2.0
     assert 1e3 * fine_noise_mm(calibration) == pytest.approx(0.5, rel=0.05)
@@ -164,7 +164,9 @@ def test_a_test_done_in_the_wrong_bore_is_recognised(recorded, sound):
         k = number(recorded, "b", direction)
         runs[k] = filed(runs[k], runs[number(recorded, "g", direction)])
     calibration, found = robust(recorded, runs)
-    assert {(o.kind, o.test) for o in found} == {(Kind.WRONG_PLACE, "b")}  # both directions at once, or one by one
+    assert {(o.kind, o.test) for o in found} == {
+        (OutlierKind.WRONG_PLACE, "b")
+    }  # both directions at once, or one by one
     assert all("test g" in o.text for o in found)
     assert pull(calibration, sound) < 2.5
 
@@ -189,7 +191,7 @@ def test_runs_left_out_for_want_of_physics_are_taken_back_with_it_and_bumped_one
     raw = runs[bumped].raw
     runs[bumped] = replace(runs[bumped], raw=replace(raw, length_mm=raw.length_mm + step))
     left_out = tuple(
-        Outlier(Kind.RUN, runs[k].test, runs[k].label, 10.0, None, "no circle of this machine")
+        Outlier(OutlierKind.RUN, runs[k].test, runs[k].label, 10.0, None, "no circle of this machine")
         for k in (*strange, bumped)
     )
     kept = [run for k, run in enumerate(runs) if k not in {*strange, bumped}]

@@ -18,13 +18,14 @@ SESSIONS = FIXTURES / "sessions"
 EXAMPLES = {
     "dbb-machine/3": [FIXTURES / "machines" / "every-key.yaml"],
     "dbb-jig/1": [FIXTURES / "jigs" / "reference-plate.yaml"],
+    "dbb-job/1": [FIXTURES / "jobs" / name for name in ("daily-check.yaml", "virtual.yaml")],
     "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
     "dbb-settings/2": [FIXTURES / "settings" / "every-key.yaml"],
     "dbb-mapping/1": [FIXTURES / "mappings" / "every-key.yaml"],
     "dbb-simulator/1": [FIXTURES / "simulators" / "pendulum.yaml"],
     "dbb-bar/1": [FIXTURES / "bars" / "zerodur.yaml"],
     "dbb-model/4": [FIXTURES / "models" / name for name in ("null-space.yaml", "acceleration.yaml")],
-    "dbb-session/5": [SESSIONS / name / "session.yaml" for name in ("logged", "begun", "under-spindle")],
+    "dbb-session/6": [SESSIONS / name / "session.yaml" for name in ("virtual", "logged", "begun", "under-spindle")],
 }
 UNITS = ("_mm", "_deg", "_um", "_kg", "_temp_c", "_mm_min", "_um_m_k", "_mm_per_n")
 

@@ -1,0 +1,95 @@
+"""`dbb-job/1`: a measurement that an operator runs again and again, with everything that was decided about it beforehand."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.bar import parse_bar
+from dbbstation.files.formats.machine import parse_machine
+from dbbstation.files.formats.plan import parse_plan
+from dbbstation.files.formats.settings_schema import ToleranceSettings
+from dbbstation.files.yaml.schema import Schema, read_document, validate
+from dbbstation.files.yaml.text import YamlDocument
+
+_Text = Annotated[str, Field(min_length=1)]
+
+MayChange = Literal["operator", "order", "port", "temperature"]
+"""What may be left to the operator."""
+
+
+class JobFile(Schema):
+    """A measurement with its limits: what, on what, by what, and what the operator may change."""
+
+    format: Literal["dbb-job/1"]
+    """Name and version of this format."""
+    name: _Text
+    """What the operator reads."""
+    plan: _Text
+    """The plan, a path from this file's folder."""
+    machine: _Text
+    """The nominal machine, likewise."""
+    instrument: _Text
+    """Name of the instrument, or its protocol file."""
+    profile: str = ""
+    """Its variant; absent: the usual one."""
+    port: _Text
+    """Name or URL of the port; `virtual machine`: a virtual one, to try the job."""
+    baud: Annotated[int, Field(ge=1)] | None = None
+    """Baud rate, where the instrument is not set to the usual one [1/s]."""
+    bar: str = ""
+    """Calibration of the bar, a path from this file's folder."""
+    bar_waiver: str = ""
+    """Why it is measured without; one of both where the port is a real one."""
+    sessions: str = "."
+    """Folder that a session is made in each time, a path from this file's folder."""
+    serial_number: str = ""
+    """Of the machine."""
+    operator: str = ""
+    """Who measures, where that is always the same."""
+    order: str = ""
+    """Order number, where that is always the same."""
+    tolerances: Annotated[tuple[ToleranceSettings, ...], Field(min_length=1)]
+    """What the circles may have."""
+    may_change: tuple[MayChange, ...] = ()
+    """What the operator may change before a session; nothing else can be."""
+
+
+def read_job(path: Path) -> JobFile:
+    """Read a job.
+
+    Raises:
+        InputError: every fault of it and of the files that it names.
+    """
+    faults: list[Problem] = []
+    job = parse_job(path, faults)
+    if job is None or faults:
+        raise InputError(faults)
+    return job
+
+
+def parse_job(path: Path, faults: list[Problem]) -> JobFile | None:
+    """Read a job and the files that it names; None where it is none. Faults are added to `faults`."""
+    document = read_document(path, JobFile, faults)
+    job = None if document is None else validate(document, JobFile, faults)
+    if document is None or job is None:
+        return None
+    plan = parse_plan(path.parent / job.plan, faults)
+    parse_machine(path.parent / job.machine, faults)
+    if job.bar:
+        parse_bar(path.parent / job.bar, faults)
+    if job.bar and job.bar_waiver:
+        faults.append(document.problem(("bar_waiver",), "a bar and why there is none", "leave one of both out"))
+    if plan is not None:
+        _check_tests(document, job, set(plan.to_domain().tests), faults)
+    return job
+
+
+def _check_tests(document: YamlDocument, job: JobFile, tests: set[str], faults: list[Problem]) -> None:
+    """Every test that a tolerance names is one of the plan."""
+    for place, tolerance in enumerate(job.tolerances):
+        for unknown in sorted(set(tolerance.tests) - tests):
+            known = ", ".join(sorted(tests))
+            what = f"the plan has no test `{unknown}`"
+            faults.append(document.problem(("tolerances", place, "tests"), what, f"it has {known}"))

@@ -1,0 +1,268 @@
+"""Random effects taken out group by group, before the columns that all groups share are looked at.
+
+Mountings, balls and beginnings of turns act on the few runs that they belong to: their columns and those of the shared parameters form
+an arrow. Each group is made a triangle by itself, and what it leaves says all that it knows of the shared columns. The work grows with
+the number of groups, not with its cube. [Bjorck, Numerical Methods for Least Squares Problems, 1996, sec. 6.3]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from dbbstation.inference.triangle import triangle_of
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.inference.square_root import Block, Columns
+
+SMALL = 1e6
+"""Multiplications, rows times columns squared, below which looking for groups takes longer than it saves: less than a millisecond."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Random effects of some blocks that no other block touches, as a triangle.
+
+    Attributes:
+        columns: of the group, shape (j,).
+        border: columns that its blocks share with others, shape (b,).
+        inner: triangle over the columns of the group, shape (j, j).
+        across: the same rows over the border, shape (j, b).
+        target: the same of the right-hand side, shape (j,).
+        left: what the group says of the border: rows over it, target last, shape (r, b + 1).
+    """
+
+    columns: NDArray[np.int64]
+    border: NDArray[np.int64]
+    inner: NDArray[np.float64]
+    across: NDArray[np.float64]
+    target: NDArray[np.float64]
+    left: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Arrow:
+    """Triangle of all blocks and priors.
+
+    Attributes:
+        groups: random effects that were taken out.
+        alone: random effects that no block touches, of which their prior is all that is known, shape (a,).
+        random: the other random effects, shape (m,).
+        fitted: fitted columns, shape (f,).
+        root: triangle over random, then fitted columns, shape (m + f, m + f).
+        target: of these rows, shape (m + f,).
+        floor: sum of squares that no values of the columns take away.
+    """
+
+    groups: tuple[Group, ...]
+    alone: NDArray[np.int64]
+    random: NDArray[np.int64]
+    fitted: NDArray[np.int64]
+    root: NDArray[np.float64]
+    target: NDArray[np.float64]
+    floor: float
+
+    @property
+    def root_of_fitted(self) -> NDArray[np.float64]:
+        """What is known of the fitted columns, random effects averaged over, shape (f, f)."""
+        return self.root[len(self.random) :, len(self.random) :]
+
+
+def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
+    """Take out what groups of blocks have for themselves, and make the rest one triangle.
+
+    Args:
+        blocks: compressed runs.
+        known: priors of all columns.
+        noise: standard deviation of one measurement, where a block does not state its own.
+    """
+    members, border = _split(blocks, known)
+    groups = tuple(_group([blocks[k] for k in places], columns, known, noise) for places, columns in members)
+    triangle = triangle_of(np.vstack([border.priors(known), *(border.rows(group) for group in groups)]))
+    total = len(border.order)
+    return Arrow(
+        groups=tuple(group for group in groups if len(group.columns)),
+        alone=border.alone,
+        random=border.order[: border.random],
+        fitted=border.order[border.random :],
+        root=triangle[:total, :total],
+        target=triangle[:total, -1],
+        floor=float(triangle[total, total] ** 2),
+    )
+
+
+def triangles_without(
+    blocks: Sequence[Block], known: Columns, noise: float, parts: Sequence[Sequence[int]]
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], float]]:
+    """What all blocks but those of a part say of the fitted columns, for one part after the other.
+
+    Only the groups that a part belongs to are made anew. Of the others, as many as the square root of their number have been put
+    together beforehand.
+
+    Args:
+        blocks: compressed runs.
+        known: priors of all columns.
+        noise: standard deviation of one measurement, where a block does not state its own.
+        parts: places of the blocks that are left out.
+
+    Yields:
+        Triangle over the fitted columns, shape (f, f), its target, shape (f,), and the sum of squares that no values take away.
+    """
+    members, border = _split(blocks, known)
+    group_of = {place: number for number, (places, _) in enumerate(members) for place in places}
+
+    def left_by(number: int, without: Collection[int]) -> NDArray[np.float64]:
+        places, columns = members[number]
+        kept = [blocks[k] for k in places if k not in without]
+        return border.rows(_group(kept, columns, known, noise))
+
+    every = [left_by(number, ()) for number in range(len(members))]
+    size = max(int(np.sqrt(len(every))), 1)
+    bundles = [triangle_of(np.vstack(every[first : first + size])) for first in range(0, len(every), size)]
+    priors, total, first_fitted = border.priors(known), len(border.order), border.random
+    for part in parts:
+        touched = {group_of[place] for place in part}
+        opened = {number // size for number in touched}
+        rows = [priors, *(bundle for number, bundle in enumerate(bundles) if number not in opened)]
+        beside = [k for number in opened for k in range(number * size, min((number + 1) * size, len(every)))]
+        rows += [left_by(k, set(part)) if k in touched else every[k] for k in beside]
+        triangle = triangle_of(np.vstack(rows))
+        root, target = triangle[first_fitted:total, first_fitted:total], triangle[first_fitted:total, -1]
+        yield root, target, float(triangle[total, total] ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Border:
+    """Columns that are not taken out: random effects, then fitted ones.
+
+    Attributes:
+        order: columns, shape (m + f,).
+        random: number of random effects among them, m.
+        place: of each column in that order, shape (k,); -1 for the others.
+        alone: random effects that no block touches.
+    """
+
+    order: NDArray[np.int64]
+    random: int
+    place: NDArray[np.int64]
+    alone: NDArray[np.int64]
+
+    def priors(self, known: Columns) -> NDArray[np.float64]:
+        """Rows of what is known beforehand, and of zeros, so that a triangle has all its rows."""
+        total = len(self.order)
+        bounded = self.order[np.isfinite(known.prior[self.order])]
+        rows = np.zeros((len(bounded) + total + 1, total + 1))
+        rows[np.arange(len(bounded)), self.place[bounded]] = 1.0 / known.prior[bounded]
+        return rows
+
+    def rows(self, group: Group) -> NDArray[np.float64]:
+        """What a group says of these columns, target last."""
+        wide = np.zeros((len(group.left), len(self.order) + 1))
+        wide[:, self.place[group.border]] = group.left[:, :-1]
+        wide[:, -1] = group.left[:, -1]
+        return wide
+
+
+def _split(blocks: Sequence[Block], known: Columns) -> tuple[list[tuple[list[int], NDArray[np.int64]]], _Border]:
+    """Groups, as `_groups` has them, and the columns that stay."""
+    touched = np.zeros(len(known.prior), dtype=np.bool_)
+    for block in blocks:
+        touched[block.columns] = True
+    stated = known.random & np.isfinite(known.prior)
+    members = _groups(blocks, stated & touched)
+    kept = known.random & (touched | ~stated)
+    for _, columns in members:
+        kept[columns] = False
+    random, fitted = np.flatnonzero(kept), np.flatnonzero(~known.random)
+    order = np.concatenate([random, fitted])
+    place = np.full(len(known.prior), -1)
+    place[order] = np.arange(len(order))
+    return members, _Border(order, len(random), place, np.flatnonzero(stated & ~touched))
+
+
+def _group(blocks: Sequence[Block], columns: NDArray[np.int64], known: Columns, noise: float) -> Group:
+    """Take out the columns of some blocks, which no other block touches."""
+    border = np.setdiff1d(np.concatenate([columns, *(block.columns for block in blocks)]), columns)
+    size, total = len(columns), len(columns) + len(border)
+    order = np.concatenate([columns, border])
+    sort = np.argsort(order)
+    rows = np.zeros((size + sum(len(block.target) for block in blocks), total + 1))
+    rows[np.arange(size), np.arange(size)] = 1.0 / known.prior[columns]
+    row = size
+    for block in blocks:
+        part = rows[row : row + len(block.target)]
+        part[:, sort[np.searchsorted(order, block.columns, sorter=sort)]] = block.triangle
+        part[:, -1] = block.target
+        part /= noise if block.noise is None else block.noise
+        row += len(part)
+    triangle = triangle_of(rows) if size or len(rows) > total + 1 else rows
+    top = triangle[:size]
+    return Group(columns, border, top[:, :size], top[:, size:-1], top[:, -1], triangle[size:, size:])
+
+
+def _groups(blocks: Sequence[Block], random: NDArray[np.bool_]) -> list[tuple[list[int], NDArray[np.int64]]]:
+    """Blocks and random effects of each group.
+
+    A random effect that many blocks share, such as the length of a bar, would tie them all together. Effects of up to so many blocks
+    are taken out as makes the work least; the work is counted in rows times columns squared.
+
+    Args:
+        blocks: all of them.
+        random: random effects that may be taken out, shape (k,).
+    """
+    total, count = len(random), sum(len(block.target) for block in blocks)
+    together = [(list(range(len(blocks))), np.zeros(0, dtype=np.int64))]
+    if len(blocks) < 2 or not random.any() or count * np.count_nonzero(random) ** 2 < SMALL:  # noqa: PLR2004 - a pair
+        return together
+    which = np.repeat(np.arange(len(blocks)), [len(block.columns) for block in blocks])
+    touched = np.concatenate([block.columns for block in blocks])
+    lengths = np.array([len(block.target) for block in blocks])
+    times = np.bincount(touched, minlength=total)
+    best, least = together, float(count) * total**2
+    for most in np.unique(times[random]):
+        own = random & (times <= most)
+        found = _tied(blocks, which, touched, own)
+        shared = total - np.count_nonzero(own)
+        work = float(shared) ** 3
+        for places, columns in found:
+            width = len(columns) + len(np.unique(np.concatenate([blocks[k].columns for k in places]))) if places else 1
+            rows = int(lengths[places].sum()) + len(columns)
+            work += float(rows) * width**2 + float(min(rows, width)) * shared**2
+        if work < least:
+            best, least = found, work
+    return best
+
+
+def _tied(
+    blocks: Sequence[Block], which: NDArray[np.int64], touched: NDArray[np.int64], own: NDArray[np.bool_]
+) -> list[tuple[list[int], NDArray[np.int64]]]:
+    """Blocks that share random effects, directly or through others, with these effects.
+
+    Args:
+        blocks: all of them.
+        which: block of each touch, shape (t,).
+        touched: column of each touch, shape (t,).
+        own: columns that are to be taken out, shape (k,).
+    """
+    number, total = len(blocks), len(own)
+    touches = own[touched]
+    edges = (np.ones(int(touches.sum())), (which[touches], number + touched[touches]))
+    _, label = connected_components(coo_array(edges, shape=(number + total, number + total)), directed=False)
+    columns_of: dict[int, list[int]] = {}
+    for column in np.flatnonzero(own):
+        columns_of.setdefault(int(label[number + column]), []).append(int(column))
+    blocks_of: dict[int, list[int]] = {}
+    for k in range(number):
+        blocks_of.setdefault(int(label[k]), []).append(k)
+    return [
+        (blocks_of.get(key, []), np.array(columns_of.get(key, []), dtype=np.int64))
+        for key in dict.fromkeys([*blocks_of, *columns_of])
+    ]

@@ -1,0 +1,112 @@
+"""One word on a run at the machine, before any number: GOOD, REPEAT or CANNOT TELL; what caused it first, and what to do about that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from dbbstation.quality.finding import Finding, Name, Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+class Word(StrEnum):
+    """The word; the text is what people read."""
+
+    GOOD = "GOOD"
+    REPEAT = "REPEAT"
+    CANNOT_TELL = "CANNOT TELL"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What to do with a run.
+
+    Attributes:
+        word: in one word.
+        causes: of REPEAT, the one first that explains most of those behind it: what was found, and what to do, a sentence each.
+        unseen: of CANNOT TELL, what could be wrong and shows in nothing that was measured so far.
+    """
+
+    word: Word
+    causes: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()
+
+
+def answer(findings: Sequence[Finding], problem: str = "") -> Answer:
+    """Return the word on a run.
+
+    REPEAT where anything is wrong. CANNOT TELL where nothing is, and there is a fault that no decided finding would have shown.
+    GOOD where every fault of `SHOWN_BY` would have shown. Without findings nothing was looked for: CANNOT TELL.
+
+    Args:
+        findings: all that was looked for.
+        problem: why the recording holds no circle; empty where it does.
+    """
+    wrong = [one for one in findings if one.wrong]
+    if problem and not any(one.name is Name.CIRCLE for one in wrong):
+        wrong.append(Finding(Name.CIRCLE, None, None, "", Verdict.WRONG, problem))
+    if wrong:
+        return Answer(Word.REPEAT, tuple(cause_of(one) for one in sorted(wrong, key=rank)))
+    decided = {one.name for one in findings if one.verdict is not Verdict.CANNOT_TELL}
+    unseen = tuple(fault for fault, names in SHOWN_BY.items() if not decided & names)
+    return Answer(Word.CANNOT_TELL, unseen=unseen) if unseen else Answer(Word.GOOD)
+
+
+def cause_of(finding: Finding) -> str:
+    """Return what a finding that is wrong found, in short, and what to do."""
+    if finding.name is Name.CIRCLE:  # its text has what to do
+        return finding.text
+    numbers = "" if finding.value is None else f" {finding.value:.2f}"
+    numbers += "" if finding.limit is None else f" of {finding.limit:.2f}"
+    found = finding.short or f"{finding.name}{numbers} {finding.unit}".rstrip()
+    return f"{found}: {DO[finding.name]}"
+
+
+EXPLAINS = (
+    (Name.HELD, Name.LOST),
+    (Name.FEED,),
+    (Name.CIRCLE,),
+    (Name.TEST, Name.DIRECTION, Name.RADIUS),
+    (Name.SPIKE, Name.BUMP, Name.BORE, Name.CLOSURE, Name.DRIFT, Name.NOISE),
+    (Name.OTHER_DIRECTION, Name.REPEAT),
+)
+"""Findings in the order in which one brings others about: a feed that is not the programmed one also moves the end of the turn and
+differs from the other direction, and neither of these changes the feed. Those that stand together are ranked by how many times their
+limit they are: a limit is the same probability for all."""
+
+
+def rank(finding: Finding) -> tuple[int, float]:
+    """Return what findings are sorted by, the one first that explains most of those behind it."""
+    place = next(k for k, names in enumerate(EXPLAINS) if finding.name in names)
+    return place, -(finding.value / finding.limit if finding.value is not None and finding.limit else 0.0)
+
+
+SHOWN_BY = {
+    "whether something moved during the circle": frozenset({Name.CLOSURE, Name.DRIFT}),
+    "whether it is the circle of another test": frozenset({Name.TEST}),
+    "whether it ran the wrong way round": frozenset({Name.DIRECTION}),
+    "whether the ball stands where it stood": frozenset({Name.OTHER_DIRECTION, Name.REPEAT}),
+}
+"""Faults that leave a circle as smooth as a good one, and the findings of which each one shows the fault. Other faults show in every run.
+The finding `bore` is none of them: without a model its limit is the machine's own errors, millimetres, and would show neither."""
+
+DO = {
+    Name.HELD: "the plunger sticks or the stroke ends; free it, check the plug, run the circle again",
+    Name.LOST: "check plug and cable, close other programs on the computer, run the circle again",
+    Name.FEED: "set the override on the control to 100 %, run the circle again",
+    Name.TEST: "check bore, holder, tilt and which program was started, run the circle again",
+    Name.DIRECTION: "this circle or the one before ran the wrong way round: check which program was started (G2 or G3)",
+    Name.RADIUS: "check which bar is in, the radius in the program and the tool length",
+    Name.SPIKE: "check plug, cable and earth of the gauge, run the circle again",
+    Name.BUMP: "look for chips, a cable that pulls and what touches the bar there, run the circle again",
+    Name.BORE: "check bore and holder, press the holder home, run the circle again",
+    Name.CLOSURE: "tighten holder and ball, let bar and machine warm through, run the circle again",
+    Name.DRIFT: "tighten holder and ball, let bar and machine warm through, run the circle again",
+    Name.NOISE: "clean balls and cups, look for what shakes, run the circle again",
+    Name.OTHER_DIRECTION: "ball or holder moved since the other direction: press them home, run both again",
+    Name.REPEAT: "ball or holder moved since the run before: press them home, run it again",
+}
+"""What to do at the machine, in the shop's words."""

@@ -1,0 +1,79 @@
+"""What is typed of a bar and its calibrator, checked when it is typed: numbers against their range and the instrument, dates against the calendar."""
+
+from __future__ import annotations
+
+from datetime import date, datetime
+from typing import TYPE_CHECKING, get_args
+
+from dbbstation.files.formats.bar import BarFile, CalibratorSchema
+from dbbstation.files.formats.quantities import Quantity
+from dbbstation.plan.circle import USUAL_STROKE_MM
+
+if TYPE_CHECKING:
+    from dbbstation.files.yaml.schema import Schema
+
+USUAL_INTERVAL_YEARS = 3.0
+"""Laboratories calibrate gauge blocks anew every one to three years [ISO 3650 leaves it to the user]; older ones are asked about."""
+
+_RANGES: dict[str, tuple[type[Schema], str]] = {
+    "calibrator_mm": (CalibratorSchema, "length_mm"),
+    "calibrator_u_um": (CalibratorSchema, "uncertainty_um"),
+    "temp_c": (BarFile, "temp_c"),
+}
+"""Where the format of a bar's calibration has the range of a number."""
+
+_DAYS_PER_YEAR = 365.25
+
+
+def fault_of(
+    name: str, text: str, reads_mm: float | None = None, stroke_mm: float | None = None, today: date | None = None
+) -> str:
+    """Return what is wrong with a text that was typed; empty where nothing is.
+
+    Args:
+        name: of the value, as the names of `Stated`.
+        text: as typed.
+        reads_mm: what the instrument reads on the calibrator [mm]; None: nothing, or only what it was told.
+        stroke_mm: travel of the gauge either way [mm]; None: not known.
+        today: the date; None: that of the computer.
+    """
+    if name == "certified":
+        return _fault_of_day(text, today or datetime.now().astimezone().date())
+    if name not in _RANGES:
+        return ""
+    try:
+        number = float(text.replace(",", "."))
+    except ValueError:
+        return f"`{text}` is no number"
+    quantity = _quantity(*_RANGES[name])
+    if not quantity.fits(number):
+        return f"{number:g} {quantity.unit} is not plausible, expected {quantity.range}{quantity.guess(number)}"
+    stroke = USUAL_STROKE_MM if stroke_mm is None else stroke_mm
+    if name == "calibrator_mm" and reads_mm is not None and abs(reads_mm - number) > stroke:
+        return f"the bar reads {reads_mm:.4f} mm: it does not stand on a calibrator of {number:.10g} mm"
+    return ""
+
+
+def doubt_of(name: str, text: str, today: date | None = None) -> str:
+    """Return what is doubtful about a text in which nothing is wrong; empty where nothing is."""
+    if name != "certified":
+        return ""
+    years = ((today or datetime.now().astimezone().date()) - date.fromisoformat(text)).days / _DAYS_PER_YEAR
+    if years <= USUAL_INTERVAL_YEARS:
+        return ""
+    return f"the certificate of {text} is {years:.0f} years old: is that the date on it, and does it still hold?"
+
+
+def _fault_of_day(text: str, today: date) -> str:
+    try:
+        day = date.fromisoformat(text)
+    except ValueError:
+        return f"`{text}` is no date, expected such as 2026-11-20"
+    return f"the certificate of {text} is of the future" if day > today else ""
+
+
+def _quantity(schema: type[Schema], key: str) -> Quantity:
+    """The range that a format has for a key."""
+    field = schema.model_fields[key]
+    inside = [each for kind in get_args(field.annotation) for each in getattr(kind, "__metadata__", ())]
+    return next(each for each in (*field.metadata, *inside) if isinstance(each, Quantity))

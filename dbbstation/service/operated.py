@@ -1,0 +1,180 @@
+"""A job that an operator runs: the session that it is measured into, and the one answer at its end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.errors import InputError
+from dbbstation.files.atomic import write_text
+from dbbstation.files.formats.plan import plan_data, read_inline_plan
+from dbbstation.files.formats.settings_schema import SettingsFile
+from dbbstation.files.recordings.session import read_session
+from dbbstation.files.yaml.out import yaml_text
+from dbbstation.files.yaml.schema import format_for
+from dbbstation.quality.conformity import Conformity
+from dbbstation.service.after import After, Step
+from dbbstation.service.choice import Choice
+from dbbstation.service.memory import Line
+from dbbstation.service.session_list import list_sessions
+from dbbstation.service.work import Progress, Work
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from dbbstation.files.formats.job import JobFile
+
+
+@dataclass(frozen=True)
+class Operated:
+    """A job and where its file is.
+
+    Attributes:
+        path: of the file; what it names lies beside it.
+        job: what it says.
+    """
+
+    path: Path
+    job: JobFile
+
+    @property
+    def sessions(self) -> Path:
+        """Folder that sessions are made in."""
+        return self._beside(self.job.sessions)
+
+    def choice(self) -> Choice:
+        """Return what is measured now: the last session of the job where it is not complete and has the same plan, else a new one."""
+        job = self.job
+        line = Line(instrument=job.instrument, profile=job.profile, port=job.port, baud=job.baud)
+        return Choice(
+            folder=self._unfinished() or self._new_folder(),
+            machine=self._beside(job.machine),
+            plan=self._beside(job.plan),
+            line=line,
+            bar=self._beside(job.bar) if job.bar else None,
+            bar_waiver=job.bar_waiver,
+            operator=job.operator,
+            serial_number=job.serial_number,
+            job=job.order,
+        )
+
+    def tolerances_file(self, session: Path) -> Path:
+        """Write the job's tolerances as a settings file beside a session, and return it.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        data = {"tolerances": [one.model_dump(exclude_defaults=True) for one in self.job.tolerances]}
+        path = session.absolute().parent / f"{session.name}-tolerances.yaml"
+        write_text(path, yaml_text({"format": format_for(SettingsFile, data), **data}), force=True, rewrites=True)
+        return path
+
+    def _beside(self, name: str) -> Path:
+        return (self.path.parent / name).absolute()
+
+    def _unfinished(self) -> Path | None:
+        wanted = plan_data(read_inline_plan(self._beside(self.job.plan)))
+        for line in list_sessions(self.sessions):
+            mine = line.folder.parent == self.sessions and line.folder.name.startswith(f"{self.path.stem}-")
+            if not mine or line.problem:
+                continue
+            if line.complete:
+                return None
+            return line.folder if plan_data(read_inline_plan(read_session(line.folder).plan_path)) == wanted else None
+        return None
+
+    def _new_folder(self) -> Path:
+        name = f"{self.path.stem}-{datetime.now().astimezone():%Y-%m-%d}"
+        numbered = (self.sessions / (name if k == 1 else f"{name}-{k}") for k in range(1, 10_000))
+        return next(path for path in numbered if not path.exists())
+
+
+@dataclass(frozen=True)
+class Answered:
+    """The answer on a session.
+
+    Attributes:
+        word: in one word.
+        reasons: a sentence each.
+        to_do: what to do, in order.
+        report: of everything; None where none could be made.
+    """
+
+    word: Conformity
+    reasons: tuple[str, ...]
+    to_do: tuple[str, ...] = ()
+    report: Path | None = None
+
+
+class JobAnswer:
+    """Holds the circles of a session against the job's tolerances, by the command `report`.
+
+    Args:
+        operated: the job.
+        session: its folder.
+        missing: runs of the plan that have no accepted recording, as people read them.
+        start: starts a command; a process of its own.
+    """
+
+    def __init__(
+        self,
+        operated: Operated,
+        session: Path,
+        missing: Sequence[str],
+        start: Callable[[Sequence[str], Path], Work] = Work,
+    ) -> None:
+        self._missing = tuple(missing)
+        self._after = After(session, None, operated.tolerances_file(session), start)
+        self._after.do(Step.REPORT)
+
+    def look(self) -> Answered | None:
+        """Return the answer; None while it is worked out."""
+        self._after.look()
+        result = self._after.results[Step.REPORT]
+        if result.progress in {None, Progress.RUNNING}:
+            return None
+        if result.progress is not Progress.DONE:
+            return Answered(Conformity.UNDECIDED, (result.failure or "the report was ended before it was done",))
+        return answer_of(result.answer["verdict"], self._missing, result.path)
+
+    def close(self) -> None:
+        """End what is being worked out."""
+        self._after.close()
+
+
+def answer_of(verdict: dict[str, Any], missing: Sequence[str], report: Path | None) -> Answered:
+    """Return the answer of a report's verdict; one that is complete needs every run of the plan.
+
+    What exceeds a limit does so whatever is missing; what is within says nothing of circles that were not measured.
+
+    Args:
+        verdict: `verdict` of the report's JSON.
+        missing: runs of the plan without an accepted recording.
+        report: its file.
+    """
+    kinds = {str(one): one for one in Conformity}
+    word = kinds.get(verdict["kind"], Conformity.UNDECIDED)
+    reasons = list(verdict["reasons"]) or [verdict["headline"]]
+    to_do = list(verdict["to_do"])
+    if missing:
+        word = word if word is Conformity.EXCEEDED else Conformity.UNDECIDED
+        reasons.insert(0, f"Not measured: {', '.join(missing)}.")
+        to_do.insert(0, "Measure what is missing: begin the job again.")
+    return Answered(word, tuple(reasons), tuple(to_do), report)
+
+
+def read_operated(path: Path) -> Operated:
+    """Read a job.
+
+    Raises:
+        InputError: every fault of it and of the files that it names.
+    """
+    from dbbstation.files.formats.job import read_job  # noqa: PLC0415 - who measures without a job does not read the format
+
+    if not path.is_file():
+        from dbbstation.errors import Problem  # noqa: PLC0415 - the same
+
+        raise InputError([Problem(str(path), 0, 0, "there is no such file", "check the path")])
+    return Operated(path.absolute(), read_job(path))

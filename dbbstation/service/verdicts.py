@@ -1,0 +1,36 @@
+"""Another verdict on a run of a session that nobody writes into: the plan is through, and its sequence is over."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import OutputError
+from dbbstation.files.recordings.session_writer import SessionWriter
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dbbstation.station.commands import Judge
+
+PATIENCE_S = 5.0
+"""The sequence that has just ended lets go of the session within so long [s]."""
+
+
+def give_verdict(folder: Path, command: Judge) -> None:
+    """Note another verdict in the session.
+
+    Args:
+        folder: of the session.
+        command: the run, and whether it counts.
+
+    Raises:
+        InputError: faults of the session.
+        OutputError: there is no such run, another process writes into the session, or the disk refuses.
+    """
+    with SessionWriter.open(folder, PATIENCE_S) as writer:
+        key = (command.test, command.direction, command.repeat)
+        run = next((one for one in writer.runs if (one.test, one.direction, one.repeat) == key), None)
+        if run is None:
+            name = f"{command.test}-{command.direction}-{command.repeat}"
+            raise OutputError(f"the session has no run {name}", where=str(folder), remedy="choose one that it has")
+        writer.judge(run, accepted=command.accepted, reason=command.reason)

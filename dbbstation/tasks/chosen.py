@@ -1,0 +1,28 @@
+"""Which tests of a plan were chosen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from dbbstation.errors import StationError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+
+def chosen_of(plan: str, known: Iterable[str], tests: Sequence[str], exclude: Sequence[str]) -> list[str]:
+    """Return the tests of a plan that were chosen: those named, in that order, or all; without those left out.
+
+    Raises:
+        StationError: a name that the plan does not have; nothing is left.
+    """
+    names = list(known)
+    unknown = [name for name in (*tests, *exclude) if name not in names]
+    if unknown:
+        raise StationError(
+            f"the plan has no test {', '.join(unknown)}", where=plan, remedy=f"it has {', '.join(names)}"
+        )
+    chosen = [name for name in tests or names if name not in exclude]
+    if not chosen:
+        raise StationError("no test is left", where=plan, remedy="exclude fewer")
+    return chosen

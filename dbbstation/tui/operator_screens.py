@@ -1,0 +1,280 @@
+"""What an operator sees of a job: the job, the set-up and the circle of each run, the answer. Nothing else can be reached."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.content import Content
+from textual.widgets import Footer, Static
+
+from dbbstation.quality.conformity import Conformity
+from dbbstation.service.shop_temperature import shop_degc
+from dbbstation.station.states import State
+from dbbstation.tui import texts
+from dbbstation.tui.asking import TypeQuestion
+from dbbstation.tui.block_letters import block_rows, largest
+from dbbstation.tui.board_screen import RunScreen
+from dbbstation.tui.explained import ExplainedScreen
+from dbbstation.tui.jig_map import JigMap
+from dbbstation.tui.large_screen import LargeFigures
+from dbbstation.tui.now_line import OperatorNowLine
+from dbbstation.tui.panel import lines
+from dbbstation.tui.progress_line import ProgressLine
+from dbbstation.tui.reading_panel import ReadingPanel
+from dbbstation.tui.row_screen import RowScreen
+from dbbstation.tui.set_up_panel import SetUpPanel
+from dbbstation.tui.steps_panel import StepsPanel
+from dbbstation.tui.title_line import TitleLine
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from textual.app import ComposeResult
+    from textual.binding import BindingType
+    from textual.widgets import OptionList
+
+    from dbbstation.service.choice import Choice, Prepared
+    from dbbstation.service.front import Front
+    from dbbstation.service.operated import Answered, JobAnswer, Operated
+    from dbbstation.tui.board_screen import Desk
+    from dbbstation.tui.reception import Reception
+    from dbbstation.tui.shown import Shown
+
+_NAME = 16
+
+
+class JobScreen(RowScreen):
+    """At the bottom of the stack: what is measured, and the few things that may be changed.
+
+    Args:
+        reception: opens the job.
+        front: reads and checks.
+        operated: the job.
+    """
+
+    help_name = "job"
+
+    def __init__(self, reception: Reception, front: Front, operated: Operated) -> None:
+        super().__init__()
+        self._reception, self._front, self._operated = reception, front, operated
+        self._choice: Choice | None = None
+
+    def on_mount(self) -> None:
+        """Find the session."""
+        self.search()
+
+    def search(self) -> None:
+        """Find the session anew: the last one where it is not complete."""
+        self.say(texts.START_LOOKS)
+        self._reception.do(self._operated.choice, self._found, self._failed)
+
+    def on_option_list_option_selected(self, _chosen: OptionList.OptionSelected) -> None:
+        """Begin, or change what may be changed."""
+        if self._choice is None:
+            return
+        if self.at == 0:
+            choice = self._choice
+            self.say(texts.NEW_CHECKS)
+            self._reception.do(
+                lambda: self._front.prepare(choice), lambda prepared: self._prepared(choice, prepared), self._failed
+            )
+            return
+        name = self._operated.job.may_change[self.at - 1]
+        self.app.push_screen(
+            TypeQuestion(texts.JOB_ROWS[name], self._value(name)), lambda text: self._typed(name, text)
+        )
+
+    def _typed(self, name: str, text: str | None) -> None:
+        if text is None or self._choice is None:
+            return
+        if name == "port":
+            self._choice = replace(self._choice, line=self._choice.line.model_copy(update={"port": text}))
+        elif name == "temperature":
+            degc = shop_degc(text)
+            if degc is None:
+                self.say(texts.NO_NUMBER.format(text=text), wrong=True)
+                return
+            self._choice = replace(self._choice, ambient_temp_c=degc)
+        else:
+            self._choice = replace(self._choice, **{_FIELDS[name]: text})  # type: ignore[arg-type]  # both are texts
+        self._show()
+
+    def _value(self, name: str) -> str:
+        if self._choice is None:
+            return ""
+        if name == "port":
+            return self._choice.line.port
+        if name == "temperature":
+            degc = self._choice.ambient_temp_c
+            return "" if degc is None else f"{degc:g}"
+        return str(getattr(self._choice, _FIELDS[name]))
+
+    def _found(self, choice: Choice) -> None:
+        # What was typed for the session before holds for the next: the operator is the same.
+        operator = choice.operator if self._choice is None else self._choice.operator
+        self._choice = replace(choice, operator=operator)
+        self._show()
+
+    def _show(self) -> None:
+        if self._choice is None:
+            return
+        job, choice = self._operated.job, self._choice
+        begin = texts.JOB_GOES_ON if choice.goes_on else texts.JOB_BEGINS
+        name = "" if choice.folder is None else choice.folder.name
+        rows = [Content.styled(begin.format(session=name), "bold")]
+        rows += [
+            Content.assemble(f"{texts.JOB_ROWS[one]:{_NAME}} ", (self._value(one) or texts.UNNAMED, "bold"))
+            for one in job.may_change
+        ]
+        self.put(rows)
+        self.say(texts.JOB_SAYS.format(job=job.name))
+        self.about(lines(*(Content(text) for text in self._about())))
+        self.refresh_bindings()
+
+    def _about(self) -> list[str]:
+        job = self._operated.job
+        limits = [
+            texts.JOB_LIMIT.format(
+                figure=str(one.quantity).replace("-", " "),
+                largest=one.largest,
+                unit=one.unit,
+                tests=", ".join(one.tests) or texts.JOB_ALL_TESTS,
+            )
+            for one in job.tolerances
+        ]
+        by = texts.START_BY.format(instrument=job.instrument, port=job.port)
+        return [f"{job.plan}, {job.machine}", by, *limits, "", texts.JOB_BEFORE, *texts.CONFIRMED.values()]
+
+    def _prepared(self, choice: Choice, prepared: Prepared) -> None:
+        if self.is_current:
+            self.say(texts.START_OPENS.format(folder="" if choice.folder is None else choice.folder.name))
+            self._reception.open(choice, prepared, self._failed)
+
+    def _failed(self, error: Exception) -> None:
+        self.say(str(error), wrong=True)
+
+
+_FIELDS = {"operator": "operator", "order": "job"}
+"""Field of a choice that a row changes."""
+
+
+class OperateScreen(RunScreen):
+    """Before a circle its set-up, during and behind it large letters; of the keys those that measure.
+
+    Args:
+        desk: has the board, and takes commands.
+        shown: plan and plate.
+        clock: real time, for telling an old reading [s].
+    """
+
+    help_name = "operate"
+
+    def __init__(self, desk: Desk, shown: Shown, *, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(desk, shown, clock=clock)
+
+    def compose(self) -> ComposeResult:
+        """Put the parts where they belong."""
+        yield TitleLine(self._show.plan, id="title")
+        yield OperatorNowLine(id="now")
+        with Vertical(id="set-up-view"):
+            yield ReadingPanel(clock=self._clock, id="reading")
+            with Horizontal(id="table"):
+                yield SetUpPanel(id="set-up")
+                yield JigMap(self._show.bores, id="map")
+            yield StepsPanel(id="steps")
+        yield LargeFigures(clock=self._clock, id="circle-view")
+        yield ProgressLine(id="progress")
+        yield Footer(show_command_palette=False)
+
+    def draw(self) -> None:
+        """Draw the set-up before a circle, large letters then."""
+        self.set_class(self.desk.board.state in {None, State.BETWEEN, State.ANNOUNCED, State.PAUSED}, "-set-up")
+        super().draw()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Only keys that mean something now stand in the footer; what is wrong can only be measured again."""
+        if action == "accept" or (action == "tell" and str(parameters[0]) in {"reject", "skip", "accept"}):
+            return False
+        return super().check_action(action, parameters)
+
+
+class AnswerScreen(ExplainedScreen):
+    """The one answer, in large letters, with its reasons and what to do.
+
+    Args:
+        answer: works it out.
+        back: called when it is left.
+    """
+
+    help_name = "answer"
+
+    BINDINGS: ClassVar[list[BindingType]] = [("enter", "read", "Back"), ("escape,q", "back", "Back")]
+
+    def __init__(self, answer: JobAnswer, back: Callable[[], None]) -> None:
+        super().__init__()
+        self._answer, self._back = answer, back
+        self._answered: Answered | None = None
+
+    def compose(self) -> ComposeResult:
+        """Put the parts where they belong."""
+        yield Static(Content(f" dbbstation · {texts.ANSWER_TITLE}"), id="row-title")
+        yield Static(Content(texts.ANSWER_WAITS), id="answer-word")
+        with VerticalScroll(id="answer-why", can_focus=False):
+            yield Static("", id="answer-text", markup=False)
+        yield Footer(show_command_palette=False)
+
+    def on_unmount(self) -> None:
+        """End what is still being worked out."""
+        self._answer.close()
+
+    def on_resize(self) -> None:
+        """Letters are as large as they fit."""
+        self._draw()
+
+    def look(self) -> None:
+        """Show the answer once it is there."""
+        if self._answered is None:
+            self._answered = self._answer.look()
+            self._draw()
+            self.refresh_bindings()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Enter leaves an answer that can be read, and not what is still worked out."""
+        if action == "read":
+            return self._answered is not None
+        return super().check_action(action, parameters)
+
+    def action_read(self) -> None:
+        """Go back to the job."""
+        self._back()
+
+    def action_back(self) -> None:
+        """Go back to the job; an answer that is still worked out is given up."""
+        self._back()
+
+    def _draw(self) -> None:
+        answered = self._answered
+        if answered is None or not self.query("#answer-word"):
+            return
+        word = str(answered.word).upper()
+        wide, high = largest(tuple(texts.ANSWERS), max(self.size.width - 4, 1), max(self.size.height // 3, 5))
+        style = _STYLES[answered.word]
+        self.query_one("#answer-word", Static).update(
+            lines(
+                *(Content.styled(f"  {row}", style) for row in block_rows(word, wide, high)),
+                Content.styled(f"  {word}", style),
+            )
+        )
+        told = [*answered.reasons, "", *(f"{place}. {text}" for place, text in enumerate(answered.to_do, start=1))]
+        told += ["", texts.ANSWER_REPORT.format(path=answered.report)] if answered.report is not None else []
+        self.query_one("#answer-text", Static).update(Content("\n".join(told)))
+
+
+_STYLES = {
+    Conformity.WITHIN: "bold $text-success",
+    Conformity.EXCEEDED: "bold $text-error",
+    Conformity.UNDECIDED: "bold $text-warning",
+}

@@ -1,0 +1,73 @@
+"""One word on a run: what it is where nothing is wrong, and which cause comes first where something is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from dbbstation.quality.answer import DO, EXPLAINS, SHOWN_BY, Word, answer
+from dbbstation.quality.finding import Finding, Name, Verdict, found, undecided
+from dbbstation.quality.judge import SessionRuns
+from dbbstation.quality.knowledge import seen
+from tests.quality.sabotage import at_feed, bumpy, drifting, elsewhere, mirrored, sound
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return sound(tmp_path_factory.mktemp("word") / "session", 5, "abdh")
+
+
+def answered(whole, label, spoiler=None, *sizes):
+    """The word on a run beside those before it, spoilt or as it is."""
+    at = next(k for k, one in enumerate(whole.runs) if one.run.label == label)
+    one = whole.runs[at]
+    if spoiler is not None:
+        one = seen(replace(one.run, recording=spoiler(one.run.recording, one.run.circle, *sizes)))
+    judged = SessionRuns([*whole.runs[:at], one]).judge(one)
+    return answer(judged.findings, one.problem)
+
+
+def test_every_finding_has_its_place_and_what_to_do():
+    ranked = [name for names in EXPLAINS for name in names]
+    assert sorted(ranked) == sorted(Name)
+    assert set(DO) | {Name.CIRCLE} == set(Name)
+    assert set().union(*SHOWN_BY.values()) <= set(Name)
+
+
+def test_a_first_circle_is_good_only_as_far_as_can_be_seen(whole):
+    first = answered(whole, "b ccw 1")
+    assert (first.word, first.causes) == (Word.CANNOT_TELL, ())
+    # The other direction will tell both.
+    assert first.unseen == ("whether it ran the wrong way round", "whether the ball stands where it stood")
+    assert answered(whole, "b cw 1").word is Word.GOOD
+    decided = [Finding(name, 0.0, 1.0, "µm", Verdict.GOOD, "") for name in Name]
+    assert answer(decided).word is Word.GOOD
+    assert answer([one for one in decided if one.name is not Name.DIRECTION]).unseen == (
+        "whether it ran the wrong way round",
+    )
+    assert answer([*decided[:-1], undecided(Name.REPEAT, "no earlier run")]).word is Word.GOOD
+
+
+@pytest.mark.parametrize(
+    ("spoiler", "sizes", "begins"),
+    [
+        (at_feed, (100.0,), "feed 1099 of 1000 mm/min: set the override on the control to 100 %"),
+        (elsewhere, (500.0,), "other direction "),
+        (bumpy, (60.0,), "bump +"),
+        (drifting, (400.0,), "closure "),
+        (mirrored, (1.0,), "direction "),
+    ],
+)
+def test_the_cause_that_explains_the_others_comes_first(whole, spoiler, sizes, begins):
+    found_ = answered(whole, "b cw 1", spoiler, *sizes)
+    assert found_.word is Word.REPEAT
+    assert found_.causes[0].startswith(begins), found_.causes
+
+
+def test_a_recording_without_a_circle_is_repeated():
+    assert answer((), "no feed-out seen").causes == ("no feed-out seen",)
+    assert answer((), "no feed-out seen").word is Word.REPEAT
+    assert answer(()).word is Word.CANNOT_TELL  # nothing was looked for
+    wrong = found(Name.LOST, 3.0, 0.5, "%", "", "lost")
+    assert answer([wrong]).causes == (f"lost samples 3.00 of 0.50 %: {DO[Name.LOST]}",)

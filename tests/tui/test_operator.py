@@ -1,0 +1,169 @@
+"""A job for an operator: four screens, one answer."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from dbbstation.errors import InputError
+from dbbstation.files.formats.settings import read_settings
+from dbbstation.files.shipped import shipped_folder
+from dbbstation.plan.circle import Direction
+from dbbstation.plan.tolerance import CircleFigure, Tolerance
+from dbbstation.quality.conformity import Conformity
+from dbbstation.quality.finding import Name, found
+from dbbstation.service.front import Front
+from dbbstation.service.memory import Memory
+from dbbstation.service.operated import Answered, JobAnswer, answer_of, read_operated
+from dbbstation.service.work import Progress
+from dbbstation.station.commands import Accept, Quit, Repeat
+from dbbstation.tui.app import StationApp
+from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
+from tests.cli.conftest import call
+from tests.tui.happenings import Happening
+from tests.tui.test_app import Waits
+from tests.tui.test_session_flow import below, now, rows
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FIXTURES = shipped_folder("fixtures")
+PLANS = shipped_folder("protocols") / "plans"
+
+
+@pytest.fixture
+def job_file(tmp_path: Path) -> Path:
+    text = (FIXTURES / "jobs" / "virtual.yaml").read_text(encoding="utf-8")
+    text = text.replace("../../protocols/plans", str(PLANS)).replace("../machines", str(FIXTURES / "machines"))
+    path = tmp_path / "monday.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+class Reported:
+    """A report that is made at once."""
+
+    progress, stage, passed_s = Progress.DONE, "", 1.0
+    kind = "within"
+
+    def __init__(self, arguments: Sequence[str], folder: Path) -> None:
+        assert arguments[0] == "--settings"
+        self.settings = read_settings([Path(arguments[1])])
+        (folder / "report.html").write_text("a report", encoding="utf-8")
+
+    def answer(self) -> dict[str, object]:
+        told = {"kind": self.kind, "headline": "Every circle is within.", "reasons": [], "to_do": ["Measure again."]}
+        return {"verdict": told}
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_job_is_checked_with_all_that_it_names(job_file: Path) -> None:
+    assert call("check", job_file).code == 0
+    text = job_file.read_text(encoding="utf-8")
+    for broken, says in (
+        (text.replace("unit: µm}", "unit: µm, tests: [hihg]}"), "the plan has no test `hihg`"),
+        (text.replace("ten-minute-check", "no-such-plan"), "no-such-plan.yaml"),
+        (text.replace("may_change: [operator]", "may_change: [plan]"), "may_change"),
+        (text + "bar: bar.yaml\n", "bar.yaml"),
+    ):
+        job_file.write_text(broken, encoding="utf-8")
+        outcome = call("check", job_file)
+        assert outcome.code == 1
+        assert says in outcome.out + outcome.err
+        with pytest.raises(InputError):
+            read_operated(job_file)
+
+
+def test_the_answer_is_one_word_and_a_missing_circle_is_no_within(job_file: Path) -> None:
+    session = shutil.copytree(FIXTURES / "sessions" / "virtual", job_file.parent / "monday-2026-11-20")
+    operated = read_operated(job_file)
+    tolerances = read_settings([operated.tolerances_file(session)]).tolerances
+    assert tolerances == (Tolerance(CircleFigure.CIRCULAR_DEVIATION, 400.0),)
+    answer = JobAnswer(operated, session, (), Reported).look()
+    assert answer == Answered(
+        Conformity.WITHIN,
+        ("Every circle is within.",),
+        ("Measure again.",),
+        job_file.parent / "monday-2026-11-20-results" / "report.html",
+    )
+    verdict = {"kind": "within", "headline": "All within.", "reasons": [], "to_do": []}
+    for kind, missing, word in (
+        ("within", (), Conformity.WITHIN),
+        ("within", ("high cw",), Conformity.UNDECIDED),
+        ("exceeded", ("high cw",), Conformity.EXCEEDED),
+        ("cannot tell", (), Conformity.UNDECIDED),
+        ("none", (), Conformity.UNDECIDED),
+    ):
+        told = answer_of(verdict | {"kind": kind}, missing, None)
+        assert told.word is word
+        assert ("Not measured: high cw." in told.reasons) is bool(missing)
+    # Another plan than the session has: a new session is begun.
+    assert operated.choice().folder != session
+    assert operated.choice().line.virtual
+
+
+def test_four_screens_and_nothing_that_is_wrong_is_accepted(job_file: Path) -> None:
+    front = Front(job_file.parent, Memory(job_file.parent / "state.json"))
+    operated = read_operated(job_file)
+    wrong = (found(Name.FEED, 100.0, 10.0, "mm/min", "", "the feed", "feed 1100 of 1000 mm/min"),)
+    runner = Waits(Happening(findings=wrong).circle("t0", Direction.CCW).events)
+
+    async def run() -> None:
+        app = StationApp(None, None, front=front, operated=operated)
+        async with app.run_test(size=(80, 24)) as pilot:
+            for _ in range(300):
+                app.look()
+                if "Enter begins" in now(app):
+                    break
+                await pilot.pause(0.02)
+            assert isinstance(app.screen, JobScreen)
+            assert [row.replace("▸", "").split()[0] for row in rows(app)] == ["Begin:", "operator"]
+            assert "at most 400 µm of circular deviation, all tests" in below(app)
+            await pilot.press("n", "e", "v", "down", "enter")  # no letter leads anywhere else
+            await pilot.press(*"ann", "enter")
+            assert "ann" in rows(app)[1]
+            # Beside the machine, as `open` does it.
+            app._runner, app._show = runner, Happening().shown()
+            app.push_screen(OperateScreen(app, app._show))
+            await pilot.pause()
+            app.look()
+            await pilot.pause()
+            await pilot.press("a", "x", "s", "o", "f", "e", "t")
+            assert isinstance(app.screen, OperateScreen)
+            assert runner.sent == []
+            await pilot.press("enter")
+            assert runner.sent == [Repeat()]
+            session = shutil.copytree(FIXTURES / "sessions" / "virtual", job_file.parent / "monday-1")
+            answer = AnswerScreen(JobAnswer(operated, session, (), Reported), lambda: app.leave(sure=True))
+            app.push_screen(answer)
+            await pilot.pause()
+            answer.look()
+            text = str(answer.query_one("#answer-word").visual)
+            assert "WITHIN" in text
+            assert "██" in text
+            assert "report.html" in str(answer.query_one("#answer-text").visual)
+            await pilot.press("enter")
+            assert runner.sent == [Repeat(), Quit()]
+
+    asyncio.run(run())
+
+
+def test_a_sound_circle_is_accepted_by_enter() -> None:
+    runner = Waits(Happening().circle("t0", Direction.CCW).events)
+    app = StationApp(Happening().shown(), runner, clock=lambda: 0.0)
+
+    async def run() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            app.push_screen(OperateScreen(app, Happening().shown()))
+            app.look()
+            await pilot.pause()
+            await pilot.press("enter")
+
+    asyncio.run(run())
+    assert runner.sent == [Accept()]

@@ -20,8 +20,24 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("data", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="DATA.csv...")
-@click.option("--measured", required=True, metavar="COLUMN", help="Column of the measured values.")
-@click.option("--simulated", required=True, metavar="COLUMN", help="Column of the simulated values.")
+@click.option("--measured", metavar="COLUMN", help="Column of the measured values.")
+@click.option("--simulated", metavar="COLUMN", help="Column of the simulated values.")
+@click.option(
+    "--simulator",
+    type=click.Path(path_type=Path),
+    metavar="model.yaml",
+    help="Simulator of your own, which is executed: it is refitted, and asked at its ports what it lacks.",
+)
+@click.option(
+    "--most-runs",
+    type=click.IntRange(min=1),
+    help="With --simulator: simulations that may be run [default: what ten minutes hold].",
+)
+@click.option(
+    "--corrected",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="With --simulator: write measured, simulated, refitted and corrected values here.",
+)
 @click.option(
     "--variables",
     metavar="A,B=UNIT,...",
@@ -53,7 +69,7 @@ if TYPE_CHECKING:
 @click.option(
     "--out",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Write the table here, with the corrected simulation as a further column.",
+    help="Write the table here, with the corrected simulation as a further column; with --simulator, the missing terms as Python code.",
 )
 @number_options
 @figure_option("Draw what differs here")
@@ -62,8 +78,11 @@ if TYPE_CHECKING:
 def mismatch(
     data: tuple[Path, ...],
     *,
-    measured: str,
-    simulated: str,
+    measured: str | None,
+    simulated: str | None,
+    simulator: Path | None,
+    most_runs: int | None,
+    corrected: Path | None,
     variables: str | None,
     run: str | None,
     time: str | None,
@@ -85,12 +104,16 @@ def mismatch(
     positions, loads, temperatures, the time. Units stand at the end of names (x_mm, q1_deg, t_s, oil_temp_c) or in --variables.
     Columns d_NAME are derivatives of the simulated value by a parameter NAME, which is then fitted anew.
 
+    With --simulator the recordings have inputs and measured outputs, and the program runs your simulator itself: it says at which
+    of its ports which term is missing.
+
     \b
     Examples:
       dbbstation mismatch run.csv --measured measured_mm --simulated model_mm
       dbbstation mismatch day1.csv day2.csv --measured y_um --simulated y_sim_um --figure where.svg
       dbbstation mismatch excel.csv --measured y_um --simulated y_sim_um --decimal ,
       dbbstation mismatch arm.csv --measured z_mm --simulated fk_mm --variables q1=deg,q2=deg,temperature --json
+      dbbstation mismatch run.csv --simulator model.yaml --out missing.py --figure before_after.svg
       dbbstation mismatch tank.csv --measured level_m --simulated level_sim_m --known valve=0.02 --free level_at_start
     """
     from dbbstation.cli.output import print_json, say
@@ -102,11 +125,36 @@ def mismatch(
     from dbbstation.files.provenance import refuse_existing_table, write_table
     from dbbstation.tasks.tables import Asked, load_sources, load_tables, stated_uncertainties, stated_variables
 
+    numbers = number_language(decimal, separator) if decimal or separator else None
+    _refuse_mixed(
+        simulator,
+        {"--measured": measured, "--simulated": simulated, "--variables": variables, "--run": run, "--time": time}
+        | {"--known": known, "--free": free, "--no-offset": no_offset or None},
+        {"--most-runs": most_runs, "--corrected": corrected},
+    )
+    if simulator is not None:
+        from dbbstation.cli.mismatch_simulator import mismatch_with_simulator
+
+        mismatch_with_simulator(
+            data,
+            simulator,
+            source_files,
+            numbers,
+            most_runs=most_runs,
+            hold_out=not no_held_out,
+            out=out,
+            corrected=corrected,
+            figure=figure,
+            force=force,
+            as_json=as_json,
+        )
+        return
+    if measured is None or simulated is None:
+        raise click.UsageError("give --measured and --simulated, columns of the table, or --simulator")
     if out is not None:
         refuse_existing_table(out, force=force)
     if figure is not None:
         refuse_existing(figure, force=force)
-    numbers = number_language(decimal, separator) if decimal or separator else None
     asked = Asked(
         measured,
         simulated,
@@ -139,6 +187,16 @@ def mismatch(
         print_json(summary)
     else:
         _print(summary)
+
+
+def _refuse_mixed(simulator: Path | None, of_tables: Mapping[str, object], of_simulators: Mapping[str, object]) -> None:
+    """Refuse options that belong to the other of both kinds of recordings."""
+    given = [name for name, value in (of_simulators if simulator is None else of_tables).items() if value is not None]
+    if given:
+        what = (
+            "belongs to --simulator" if simulator is None else "belongs to a table: model.yaml says it for a simulator"
+        )
+        raise click.UsageError(f"{given[0]} {what}")
 
 
 STAGES = {"look": 0, "sets of causes": 8, "held-out part": 15}

@@ -18,6 +18,7 @@ from dbbstation.files.formats.model import parse_model
 from dbbstation.files.formats.plan import parse_plan
 from dbbstation.files.formats.session import BAR_LENGTH
 from dbbstation.files.formats.settings import read_settings
+from dbbstation.files.formats.simulator import parse_simulator
 from dbbstation.files.recordings.anchors import SHORTEST, anchor_of
 from dbbstation.files.recordings.drive_csv import looks_like_drive, read_drive
 from dbbstation.files.recordings.entries import RunState
@@ -104,6 +105,7 @@ def _yaml(checked: Checked, known_sources: Mapping[str, ErrorSource]) -> None:
         "dbb-bar": lambda: _bar(checked),
         "dbb-job": lambda: _job(checked),
         "dbb-mapping": lambda: _mapping(checked),
+        "dbb-simulator": lambda: _simulator(checked),
     }
     name = str(given).partition("/")[0]
     if name in by_name:
@@ -169,6 +171,13 @@ def _mapping(checked: Checked) -> None:
     mapping = parse_mapping(checked.path, checked.problems)
     if mapping is not None:
         checked.summary = f"mapping of {_count(len(mapping.columns), 'column')}"
+
+
+def _simulator(checked: Checked) -> None:
+    found = parse_simulator(checked.path, checked.problems)
+    if found is not None:
+        ports, parameters = _count(len(found.ports), "port"), _count(len(found.parameters), "parameter")
+        checked.summary = f"simulator {found.name}: {parameters}, {ports}, {_count(len(found.outputs), 'output')}"
 
 
 def _run(checked: Checked) -> None:

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from dbbstation.inference.triangle import triangle_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -84,40 +84,108 @@ def arrow_of(blocks: Sequence[Block], known: Columns, noise: float) -> Arrow:
         known: priors of all columns.
         noise: standard deviation of one measurement, where a block does not state its own.
     """
-    fitted = np.flatnonzero(~known.random)
+    members, border = _split(blocks, known)
+    groups = tuple(_group([blocks[k] for k in places], columns, known, noise) for places, columns in members)
+    triangle = triangle_of(np.vstack([border.priors(known), *(border.rows(group) for group in groups)]))
+    total = len(border.order)
+    return Arrow(
+        groups=tuple(group for group in groups if len(group.columns)),
+        alone=border.alone,
+        random=border.order[: border.random],
+        fitted=border.order[border.random :],
+        root=triangle[:total, :total],
+        target=triangle[:total, -1],
+        floor=float(triangle[total, total] ** 2),
+    )
+
+
+def triangles_without(
+    blocks: Sequence[Block], known: Columns, noise: float, parts: Sequence[Sequence[int]]
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], float]]:
+    """What all blocks but those of a part say of the fitted columns, for one part after the other.
+
+    Only the groups that a part belongs to are made anew. Of the others, as many as the square root of their number have been put
+    together beforehand.
+
+    Args:
+        blocks: compressed runs.
+        known: priors of all columns.
+        noise: standard deviation of one measurement, where a block does not state its own.
+        parts: places of the blocks that are left out.
+
+    Yields:
+        Triangle over the fitted columns, shape (f, f), its target, shape (f,), and the sum of squares that no values take away.
+    """
+    members, border = _split(blocks, known)
+    group_of = {place: number for number, (places, _) in enumerate(members) for place in places}
+
+    def left_by(number: int, without: Collection[int]) -> NDArray[np.float64]:
+        places, columns = members[number]
+        kept = [blocks[k] for k in places if k not in without]
+        return border.rows(_group(kept, columns, known, noise))
+
+    every = [left_by(number, ()) for number in range(len(members))]
+    size = max(int(np.sqrt(len(every))), 1)
+    bundles = [triangle_of(np.vstack(every[first : first + size])) for first in range(0, len(every), size)]
+    priors, total, first_fitted = border.priors(known), len(border.order), border.random
+    for part in parts:
+        touched = {group_of[place] for place in part}
+        opened = {number // size for number in touched}
+        rows = [priors, *(bundle for number, bundle in enumerate(bundles) if number not in opened)]
+        beside = [k for number in opened for k in range(number * size, min((number + 1) * size, len(every)))]
+        rows += [left_by(k, set(part)) if k in touched else every[k] for k in beside]
+        triangle = triangle_of(np.vstack(rows))
+        root, target = triangle[first_fitted:total, first_fitted:total], triangle[first_fitted:total, -1]
+        yield root, target, float(triangle[total, total] ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Border:
+    """Columns that are not taken out: random effects, then fitted ones.
+
+    Attributes:
+        order: columns, shape (m + f,).
+        random: number of random effects among them, m.
+        place: of each column in that order, shape (k,); -1 for the others.
+        alone: random effects that no block touches.
+    """
+
+    order: NDArray[np.int64]
+    random: int
+    place: NDArray[np.int64]
+    alone: NDArray[np.int64]
+
+    def priors(self, known: Columns) -> NDArray[np.float64]:
+        """Rows of what is known beforehand, and of zeros, so that a triangle has all its rows."""
+        total = len(self.order)
+        bounded = self.order[np.isfinite(known.prior[self.order])]
+        rows = np.zeros((len(bounded) + total + 1, total + 1))
+        rows[np.arange(len(bounded)), self.place[bounded]] = 1.0 / known.prior[bounded]
+        return rows
+
+    def rows(self, group: Group) -> NDArray[np.float64]:
+        """What a group says of these columns, target last."""
+        wide = np.zeros((len(group.left), len(self.order) + 1))
+        wide[:, self.place[group.border]] = group.left[:, :-1]
+        wide[:, -1] = group.left[:, -1]
+        return wide
+
+
+def _split(blocks: Sequence[Block], known: Columns) -> tuple[list[tuple[list[int], NDArray[np.int64]]], _Border]:
+    """Groups, as `_groups` has them, and the columns that stay."""
     touched = np.zeros(len(known.prior), dtype=np.bool_)
     for block in blocks:
         touched[block.columns] = True
     stated = known.random & np.isfinite(known.prior)
     members = _groups(blocks, stated & touched)
-    groups = tuple(_group([blocks[k] for k in places], columns, known, noise) for places, columns in members)
     kept = known.random & (touched | ~stated)
     for _, columns in members:
         kept[columns] = False
-    random = np.flatnonzero(kept)
+    random, fitted = np.flatnonzero(kept), np.flatnonzero(~known.random)
     order = np.concatenate([random, fitted])
     place = np.full(len(known.prior), -1)
     place[order] = np.arange(len(order))
-    total = len(order)
-    bounded = order[np.isfinite(known.prior[order])]
-    priors = np.zeros((len(bounded), total + 1))
-    priors[np.arange(len(bounded)), place[bounded]] = 1.0 / known.prior[bounded]
-    rows = [priors, np.zeros((total + 1, total + 1))]
-    for group in groups:
-        wide = np.zeros((len(group.left), total + 1))
-        wide[:, place[group.border]] = group.left[:, :-1]
-        wide[:, -1] = group.left[:, -1]
-        rows.append(wide)
-    triangle = triangle_of(np.vstack(rows))
-    return Arrow(
-        groups=tuple(group for group in groups if len(group.columns)),
-        alone=np.flatnonzero(stated & ~touched),
-        random=random,
-        fitted=fitted,
-        root=triangle[:total, :total],
-        target=triangle[:total, -1],
-        floor=float(triangle[total, total] ** 2),
-    )
+    return members, _Border(order, len(random), place, np.flatnonzero(stated & ~touched))
 
 
 def _group(blocks: Sequence[Block], columns: NDArray[np.int64], known: Columns, noise: float) -> Group:

@@ -116,7 +116,7 @@ def held_out_error(
     parts = parts_of(channel)
     for done, (name, rows) in enumerate(parts):
         progress("held-out part", done, len(parts))
-        out = rows | _beside(channel, rows, alike)
+        out = rows | beside(channel, rows, alike)
         settled = choose_without(channel, out)
         plain = float(np.mean(channel.residual[~rows])) if reference is None else reference(~rows)
         refitted = channel.residual - channel.base.samples @ channel.without(rows).refitted()
@@ -143,7 +143,7 @@ def _gains(settled: Settled, rows: NDArray[np.bool_]) -> dict[Kind, float]:
     return found
 
 
-def _beside(channel: Channel, rows: NDArray[np.bool_], alike: float) -> NDArray[np.bool_]:
+def beside(channel: Channel, rows: NDArray[np.bool_], alike: float) -> NDArray[np.bool_]:
     """Rows of the same block within a correlation time of a part; none where rows have no order or resemble no neighbour, shape (n,)."""
     found = np.zeros(len(rows), dtype=bool)
     gap = min(int(np.ceil(alike)), int(WIDEST_GAP * rows.sum())) if channel.time is not None and alike > 1.0 else 0

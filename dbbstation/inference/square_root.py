@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from dbbstation.inference.arrow import arrow_of
+from dbbstation.inference.arrow import arrow_of, triangles_without
 from dbbstation.inference.triangle import triangle_of
 
 if TYPE_CHECKING:
@@ -293,6 +293,31 @@ def solve(
         stated_chi2=stated_chi2,
         freedom_used=used,
     )
+
+
+def chi2_without(
+    blocks: Sequence[Block],
+    known: Columns,
+    noise: float,
+    held: NDArray[np.float64],
+    parts: Sequence[Sequence[int]],
+) -> list[float]:
+    """Weighted sum of squares that a fit without the blocks of a part leaves, priors included, for each part.
+
+    Args:
+        blocks: compressed runs.
+        known: priors and scales.
+        noise: standard deviation of one measurement, where a block does not state its own.
+        held: orthonormal rows of fitted directions, in units of the scales, to keep at zero, shape (h, f).
+        parts: places of the blocks that are left out.
+    """
+    towards = known.scale[~known.random][:, None] * complement(held).T
+    found = []
+    for root, target, floor in triangles_without(blocks, known, noise, parts):
+        seen, _ = np.linalg.qr(root @ towards)
+        rest = target - seen @ (seen.T @ target)
+        found.append(floor + float(rest @ rest))
+    return found
 
 
 def lost_directions(blocks: Sequence[Block], known: Columns, noise: float) -> NDArray[np.float64]:

@@ -31,6 +31,7 @@ STORED = {
     "dbb-settings/1": FIXTURES / "settings" / "version-1.yaml",
     "dbb-settings/2": FIXTURES / "settings" / "every-key.yaml",
     "dbb-bar/1": FIXTURES / "bars" / "zerodur.yaml",
+    "dbb-simulator/1": FIXTURES / "simulators" / "pendulum.yaml",
     "dbb-mapping/1": FIXTURES / "mappings" / "every-key.yaml",
     "dbb-session/1": FIXTURES / "sessions" / "under-spindle",
     "dbb-session/2": FIXTURES / "sessions" / "small",

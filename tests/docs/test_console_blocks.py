@@ -55,6 +55,7 @@ SLOW = {
     ("docs/compare.md", "dbbstation compare before after"),
     ("docs/diagnosis.md", "dbbstation study concealed-gravity"),
     ("docs/mismatch.md", "dbbstation mismatch fixtures/tables/axis.csv"),
+    ("docs/mismatch-simulator.md", "dbbstation mismatch fixtures/simulators/pendulum.csv"),
 }
 """Those that take about ten seconds."""
 

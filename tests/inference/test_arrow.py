@@ -7,7 +7,15 @@ import pytest
 
 from dbbstation.inference import arrow
 from dbbstation.inference.arrow import arrow_of
-from dbbstation.inference.square_root import Columns, compress, lost_directions, solve, spread, spread_over
+from dbbstation.inference.square_root import (
+    Columns,
+    chi2_without,
+    compress,
+    lost_directions,
+    solve,
+    spread,
+    spread_over,
+)
 
 FITTED, MOUNTINGS, OF_EACH = 5, 24, 3
 BARS = 2
@@ -108,6 +116,17 @@ def test_directions_are_those_of_all_rows_at_once(rng, known, monkeypatch):
     expected = np.zeros(FITTED)
     expected[3:] = 1.0 / known.scale[3], -1.0 / known.scale[4]
     np.testing.assert_allclose(np.abs(by_groups[0] @ expected / np.linalg.norm(expected)), 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("directions", [0, 1])
+def test_what_is_left_without_some_runs_is_what_a_fit_without_them_leaves(rng, known, directions):
+    runs, noises = measured(rng)
+    held = np.linalg.qr(rng.standard_normal((FITTED, 1)))[0].T[:directions]
+    parts = [[], [0], [0, 1], [7, 30], [46, 47]]
+    found = chi2_without(blocks_of(runs, noises), known, NOISE, held, parts)
+    for part, chi2 in zip(parts, found, strict=True):
+        kept = [k for k in range(len(runs)) if k not in part]
+        assert chi2 == pytest.approx(dense([runs[k] for k in kept], [NOISE] * len(kept), known, held)[2], rel=1e-9)
 
 
 def test_rows_over_some_columns_are_those_over_all(rng, known):

@@ -38,7 +38,8 @@ def test_every_finding_has_its_place_and_what_to_do():
 def test_a_first_circle_is_good_only_as_far_as_can_be_seen(whole):
     first = answered(whole, "b ccw 1")
     assert (first.word, first.causes) == (Word.CANNOT_TELL, ())
-    assert first.unseen == ("whether it ran the wrong way round",)  # the other direction will tell
+    # The other direction will tell both.
+    assert first.unseen == ("whether it ran the wrong way round", "whether the ball stands where it stood")
     assert answered(whole, "b cw 1").word is Word.GOOD
     decided = [Finding(name, 0.0, 1.0, "µm", Verdict.GOOD, "") for name in Name]
     assert answer(decided).word is Word.GOOD

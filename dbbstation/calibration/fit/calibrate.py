@@ -275,7 +275,9 @@ def _share(layout: Layout, step: NDArray[np.float64], before: NDArray[np.float64
     shaped = np.array([bool(p.shape) for term in layout.terms for p in term.parameters])
     now, last = step / layout.known.scale, before / layout.known.scale
     along = float(now @ last) / max(float(last @ last), 1e-300)
-    ratios = [along, *(now[shaped] / np.where(last[shaped] == 0.0, np.inf, last[shaped])).tolist()]
+    # Of a step that is settled, such as that of a shape while its amplitude is zero, the ratio is one of roundings.
+    told = np.where(np.abs(last[shaped]) <= CONVERGED, np.inf, last[shaped])
+    ratios = [along, *(now[shaped] / told).tolist()]
     ratio = min(ratios)
     if ratio >= 0.0:
         return min(1.0, 1.5 * share)

@@ -46,6 +46,9 @@ _PLACES = -np.cos(_ANGLES)
 _WEIGHTS = (-1.0) ** np.arange(PER_SECTOR) * np.sin(_ANGLES)
 """Of the barycentric formula [Berrut and Trefethen, SIAM Review 46 (2004) 501, eq 5.3]."""
 
+_TO_POWERS = np.linalg.inv(np.vander(_PLACES, increasing=True))
+"""Values at the nodes to coefficients of powers of the place, lowest first; the condition is that of six nodes, a hundred."""
+
 _LAST = 2.0 / PER_SECTOR * np.cos((PER_SECTOR - 1) * np.arccos(_PLACES))
 """Values at the nodes times this: the last Chebyshev coefficient."""
 
@@ -57,8 +60,6 @@ class Nodes:
     Attributes:
         run: with all its samples.
         coarse: the same run with the nodes in place of the samples; its lengths say nothing.
-        weights: W by sectors, shape (sectors, most samples, nodes); rows of zeros where a sector has fewer.
-        place: where each sample stands in those rows, counted through, shape (n,).
         roots: R of each sector, shape (sectors, nodes, nodes).
         seen: Q^T of measured less nominal length, shape (sectors, nodes) [mm].
         unseen: length of what is left of it, which no smooth reading can explain [mm].
@@ -66,16 +67,22 @@ class Nodes:
 
     run: Observation
     coarse: Observation
-    weights: NDArray[np.float64]
-    place: NDArray[np.int64]
     roots: NDArray[np.float64]
     seen: NDArray[np.float64]
     unseen: float
 
     def samples_of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at all samples, shape (n,), from those at the nodes, shape (m,)."""
-        by_sector = values.reshape(SECTORS, PER_SECTOR, 1)
-        found: NDArray[np.float64] = (self.weights @ by_sector).ravel()[self.place]
+        """Values at all samples, shape (n,), from those at the nodes, shape (m,).
+
+        By powers of the place within a sector: weights of all nodes at all samples would take 48 bytes a sample, three times what
+        a recording takes.
+        """
+        sector, place = _in_sectors(self.run.raw.phi_deg)
+        powers = values.reshape(SECTORS, PER_SECTOR) @ _TO_POWERS.T
+        found = powers[sector, -1]
+        for power in powers.T[-2::-1]:
+            found *= place
+            found += power[sector]
         return found
 
     def compressed(
@@ -107,8 +114,7 @@ def nodes_of(run: Observation) -> Nodes | None:
     raw = run.raw
     if len(raw) < LONG * SECTORS * PER_SECTOR or run.commanded is not None:
         return None
-    in_sectors = raw.phi_deg * (SECTORS / FULL_TURN_DEG)
-    sector = np.clip(in_sectors.astype(np.int64), 0, SECTORS - 1)
+    sector, within = _in_sectors(raw.phi_deg)
     phi = (np.arange(SECTORS)[:, None] + (1.0 + _PLACES) / 2.0).ravel() * (FULL_TURN_DEG / SECTORS)
     order = np.argsort(raw.phi_deg, kind="stable")
     nodes = replace(
@@ -124,19 +130,24 @@ def nodes_of(run: Observation) -> Nodes | None:
     ordered = sector[order]
     place[order] = ordered * most + np.arange(len(raw)) - (np.cumsum(count) - count)[ordered]
     system = np.zeros((SECTORS * most, PER_SECTOR + 1))
-    system[place, :-1] = _interpolation(2.0 * (in_sectors - sector) - 1.0)
+    system[place, :-1] = _interpolation(within)
     system[place, -1] = raw.length_mm - raw.circle.bar_mm
     by_sector = system.reshape(SECTORS, most, PER_SECTOR + 1)
     triangle = np.asarray(np.linalg.qr(by_sector, mode="r"), dtype=np.float64)
     return Nodes(
         run=run,
         coarse=replace(run, raw=nodes),
-        weights=np.ascontiguousarray(by_sector[:, :, :-1]),
-        place=place,
         roots=np.ascontiguousarray(triangle[:, :-1, :-1]),
         seen=np.ascontiguousarray(triangle[:, :-1, -1]),
         unseen=float(np.linalg.norm(triangle[:, -1, -1])),
     )
+
+
+def _in_sectors(phi_deg: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Sector of each sample, and its place in it from -1 to 1, shapes (n,)."""
+    place = phi_deg * (SECTORS / FULL_TURN_DEG)
+    sector = np.clip(place.astype(np.int64), 0, SECTORS - 1)
+    return sector, 2.0 * (place - sector) - 1.0
 
 
 def smooth(values: NDArray[np.float64]) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from dbbstation.calibration.checks.noise_level import fine_noise_mm
 from dbbstation.calibration.outliers.outlier import LEAST_UM, STANDS_OUT, Outlier, OutlierKind
 from dbbstation.calibration.outliers.run_remainder import left_of, rms_um, without_shift
-from dbbstation.inference.square_root import solve
+from dbbstation.inference.square_root import chi2_without
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,17 +47,21 @@ def _strange_test(calibration: Calibration) -> list[int]:
     for k, run in enumerate(calibration.observations):
         tests.setdefault((run.setup.session, run.test), []).append(k)
 
-    def misfit(left_out: Sequence[int]) -> float:
-        blocks = [block for k, block in enumerate(calibration.blocks) if k not in left_out]
-        return solve(blocks, known, noise, held).chi2 / sum(block.count for block in blocks)
+    counts = np.array([block.count for block in calibration.blocks])
 
-    without = {name: misfit(own) for name, own in tests.items()}
+    def misfits(parts: Sequence[Sequence[int]]) -> list[float]:
+        chi2 = chi2_without(calibration.blocks, known, noise, held, parts)
+        return [one / float(counts.sum() - counts[list(part)].sum()) for one, part in zip(chi2, parts, strict=True)]
+
+    of_all, *each = misfits([[], *tests.values()])
+    without = dict(zip(tests, each, strict=True))
     best = min(without, key=without.__getitem__)
-    falls = misfit([]) / without[best]
+    falls = of_all / without[best]
     in_place = falls > FALLS and without[best] < AT_NOISE
     if not (in_place or falls > STANDS_OUT**2):
         return []
-    alone = [k for k in tests[best] if misfit([k]) < ALONE * without[best]]
+    by_run = misfits([[k] for k in tests[best]])
+    alone = [k for k, left in zip(tests[best], by_run, strict=True) if left < ALONE * without[best]]
     return alone[:1] or tests[best]
 
 

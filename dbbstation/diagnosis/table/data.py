@@ -116,7 +116,7 @@ class Table:
             time=time,
             time_unit=time_unit,
             simulated=simulated,
-            least_noise=_rounding(self.measured),
+            least_noise=rounding_of(self.measured),
             noise_follows=tuple(_sizes_of_noise(follows, time, self.blocks)),
         )
 
@@ -158,7 +158,7 @@ def _sizes_of_noise(
             yield f"speed of {variable.name}", np.abs(variable.rates(time, blocks))
 
 
-def _rounding(values: NDArray[np.float64]) -> float:
+def rounding_of(values: NDArray[np.float64]) -> float:
     """Standard deviation of what was rounded off values that are multiples of a step [JCGM 100:2008, sec. F.2.2.1]."""
     steps = np.diff(np.unique(values))
     steps = steps[steps > EQUAL * np.ptp(values)]

@@ -13,12 +13,24 @@ from dbbstation.files.formats.model_schema import ModelFile
 from dbbstation.files.formats.plan import PlanFile
 from dbbstation.files.formats.session import SessionFile
 from dbbstation.files.formats.settings_schema import SettingsFile
+from dbbstation.files.formats.simulator import SimulatorFile
 from dbbstation.files.yaml.schema import format_of, versions_of
 
 if TYPE_CHECKING:
     from dbbstation.files.yaml.schema import Schema
 
-_NEWEST = (BarFile, JigFile, JobFile, MachineFile, MappingFile, ModelFile, PlanFile, SessionFile, SettingsFile)
+_NEWEST = (
+    BarFile,
+    JigFile,
+    JobFile,
+    MachineFile,
+    MappingFile,
+    ModelFile,
+    PlanFile,
+    SessionFile,
+    SettingsFile,
+    SimulatorFile,
+)
 
 SCHEMAS: dict[str, type[Schema]] = {format_of(schema): schema for schema in _NEWEST}
 """Schema of each format by its name with its newest version, which has all keys of those before."""

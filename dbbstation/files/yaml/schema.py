@@ -22,6 +22,7 @@ FORMATS = {
     "dbb-bar": "the calibration of a bar",
     "dbb-job": "a job",
     "dbb-mapping": "the mapping of recordings made elsewhere",
+    "dbb-simulator": "a simulator of one's own",
 }
 """Every format by the name before its version, with what it is called in messages."""
 

@@ -22,6 +22,7 @@ EXAMPLES = {
     "dbb-plan/2": [FIXTURES / "plans" / "every-key.yaml"],
     "dbb-settings/2": [FIXTURES / "settings" / "every-key.yaml"],
     "dbb-mapping/1": [FIXTURES / "mappings" / "every-key.yaml"],
+    "dbb-simulator/1": [FIXTURES / "simulators" / "pendulum.yaml"],
     "dbb-bar/1": [FIXTURES / "bars" / "zerodur.yaml"],
     "dbb-model/4": [FIXTURES / "models" / name for name in ("null-space.yaml", "acceleration.yaml")],
     "dbb-session/6": [SESSIONS / name / "session.yaml" for name in ("virtual", "logged", "begun", "under-spindle")],

@@ -1,0 +1,243 @@
+"""`dbbstation mismatch --simulator`: a simulator that the program runs itself, asked at its ports."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from dbbstation.cli.output import echo
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from dbbstation.diagnosis.simulator.answer import Answer
+    from dbbstation.files.formats.number_language import NumberLanguage
+
+
+def mismatch_with_simulator(
+    recordings: Sequence[Path],
+    simulator: Path,
+    own_files: Sequence[Path],
+    numbers: NumberLanguage | None,
+    *,
+    most_runs: int | None,
+    hold_out: bool,
+    out: Path | None,
+    corrected: Path | None,
+    figure: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Compare a simulator with recordings, print what is said and write what is asked for."""
+    from dbbstation.cli.output import print_json, say
+    from dbbstation.cli.progress import stage_bar
+    from dbbstation.cli.provenance import provenance
+    from dbbstation.diagnosis.simulator.answer import find
+    from dbbstation.diagnosis.simulator.model import Ask
+    from dbbstation.diagnosis.simulator.summary import simulator_summary
+    from dbbstation.files.atomic import refuse_existing, write_bytes, write_text
+    from dbbstation.files.provenance import refuse_existing_table, write_table
+    from dbbstation.simulators.code import missing_code
+    from dbbstation.simulators.loading import load_simulator
+    from dbbstation.simulators.running import MOST_SECONDS, Runs
+
+    for path in (out, figure):
+        if path is not None:
+            refuse_existing(path, force=force)
+    if corrected is not None:
+        refuse_existing_table(corrected, force=force)
+    loaded = load_simulator(simulator, recordings, own_files, numbers)
+    model = loaded.model
+    with Runs(loaded, most=most_runs) as runs:
+        values = [parameter.value for parameter in model.parameters]
+        one_s = runs.allow([Ask(k, model.of_run(k, values)) for k in range(len(model.runs))])
+        limit = f"; that is what {MOST_SECONDS / 60.0:.0f} minutes hold" if most_runs is None else ""
+        say(f"note: a simulation takes {one_s:.2g} s, {runs.most} are allowed at the most{limit} (--most-runs)")
+        with stage_bar("comparison", STAGES if hold_out else STAGES_WHOLE) as progress:
+
+            def told(text: str, done: int = 0, of: int = 0) -> None:
+                left = runs.left_s
+                spent = (
+                    f"{text}, {runs.ran} of {runs.most} simulations, {left:.0f} s at the most left" if left else text
+                )
+                progress(spent, done, of)
+
+            answer = find(model, runs, own=loaded.own, hold_out=hold_out, progress=told)
+        summary = simulator_summary(answer) | {"simulations": {"run": runs.ran, "most": runs.most, "one_s": one_s}}
+    if out is not None:
+        write_text(out, missing_code(answer), force=force)
+        summary["out"] = str(out)
+    if corrected is not None:
+        write_table(corrected, _corrected(answer), provenance(), force=force)
+        summary["corrected"] = str(corrected)
+    if figure is not None:
+        from dbbstation.cli.figure_option import format_of
+        from dbbstation.report.simulator_figure import simulator_figure
+
+        write_bytes(figure, simulator_figure(answer, format_of(figure)), force=force)
+        summary["figure"] = str(figure)
+    if as_json:
+        print_json(summary)
+    else:
+        _print(summary)
+
+
+STAGES = {"refit": 0, "look": 5, "sets of causes": 10, "held-out part": 40}
+STAGES_WHOLE = {"refit": 0, "look": 5, "sets of causes": 20}
+"""Stages of a comparison with the held-out test and without it, and the share of its time that has passed by then [%]."""
+
+
+def _corrected(answer: Answer) -> str:
+    """Text of a table of all rows: run, time, and of each output measured, simulated, refitted and corrected values."""
+    from dbbstation.files.recordings.table_csv import table_csv
+
+    work, model = answer.work, answer.model
+    names, columns = ["run", "t_s"], [[], []]  # type: ignore[var-annotated]  # texts and numbers
+    for k, run in enumerate(model.runs):
+        columns[0] += [str(k + 1)] * len(run)
+        columns[1] += run.inputs["t"].tolist()
+    outputs = len(model.outputs)
+    left = {
+        "simulated": answer.as_simulated,
+        "refitted": answer.base.fitted.residual,
+        "corrected": answer.found.residual,
+    }
+    for o, output in enumerate(model.outputs):
+        own = [rows for b, rows in enumerate(work.blocks) if b % outputs == o]
+        names.append(f"{output.name}_measured")
+        columns.append([value for rows in own for value in work.measured[rows].tolist()])
+        for name, rows_left in left.items():
+            values = work.measured - rows_left * work.scale
+            names.append(f"{output.name}_{name}")
+            columns.append([value for rows in own for value in values[rows].tolist()])
+    return table_csv(names, columns)
+
+
+def _print(summary: Mapping[str, Any]) -> None:
+    unit, held_out = summary["unit"], summary["held_out_rms"]
+    _print_whether(summary)
+    findings = summary["findings"]
+    there = [f for f in findings if f["verdict"] in SHOWN]
+    likely = [f for f in findings if f["verdict"] == "ambiguous" and (f["put_in"] or f["probability"] >= LIKELY)]
+    if there or likely:
+        echo()
+        _print_findings([*there, *likely])
+    _print_parameters(summary["parameters"])
+    if held_out:
+        echo(
+            f"\nheld-out error: {held_out['as_simulated']:.3g} as simulated, {held_out['refitted']:.3g} refitted, "
+            f"{held_out['corrected']:.3g} {unit} rms corrected; over {len(held_out['parts'])} parts, each chosen anew and simulated"
+        )
+    elif there:
+        echo("\nheld-out parts were not asked for, or not reached: whether what is found predicts was not tested.")
+    echo()
+    _print_left(summary)
+    if summary["next"]:
+        echo("\nmeasure next:")
+        for step in summary["next"]:
+            echo(f"  {step['text']}")
+
+
+def _print_whether(summary: Mapping[str, Any]) -> None:
+    """Is there a mismatch, how large, beside which noise."""
+    unit, rms, held_out = summary["unit"], summary["rms"], summary["held_out_rms"]
+    if held_out and held_out["worse"]:
+        echo(
+            f"Held-out parts are predicted worse than as simulated: {held_out['corrected']:.3g} corrected, "
+            f"{held_out['as_simulated']:.3g} {unit} rms as simulated. Nothing is identified.\n".replace("  ", " ")
+        )
+    if summary["stopped"]:
+        echo(f"Ended early: {summary['stopped']}. Allow more with --most-runs.\n")
+    if summary["mismatch"]:
+        echo(
+            f"There is a mismatch: {rms['as_simulated']:.3g} {unit} rms as simulated, {rms['refitted']:.3g} refitted, "
+            f"{rms['corrected']:.3g} corrected."
+        )
+    else:
+        echo(
+            f"No mismatch: what the refitted simulator leaves, {rms['refitted']:.3g} {unit} rms, is noise.".replace(
+                "  ", " "
+            )
+        )
+    echo(f"noise of one row: {summary['noise']['sigma']:.3g} {unit}".rstrip())
+    if not summary["settled"] and not summary["stopped"]:
+        echo("The search did not settle: what it ended at is not the only set of terms that it came by.")
+
+
+def _print_left(summary: Mapping[str, Any]) -> None:
+    left = summary["left"]
+    if left["is_noise"]:
+        echo("Nothing is left beyond noise.")
+    else:
+        worst = min(left["looks"], key=lambda look: look["probability"])
+        echo(
+            f"Something is left beyond noise: {worst['name']}, {worst['rms']:.2g} {summary['unit']}. No term at a port says it."
+        )
+    for verdict in ("not-testable", "ruled-out"):
+        names = [f["name"] for f in summary["findings"] if f["verdict"] == verdict]
+        if names:
+            shown = ", ".join(names[:MOST_NAMES])
+            echo(f"{verdict}: {shown}" + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""))
+
+
+SHOWN = ("identified", "happened", "does-not-predict")
+LIKELY = 0.5
+"""Probability from which on a term that is not put in is printed; all of them are in the JSON."""
+
+MOST_NAMES = 6
+MOST_VALUES = 4
+
+
+def _print_findings(there: Sequence[Mapping[str, Any]]) -> None:
+    from dbbstation.cli.output import print_table
+
+    rows = [
+        [
+            f["name"],
+            f["verdict"],
+            f"{f['probability']:.3f}",
+            f"{f['log_bayes_factor']:.0f}",
+            f"{100.0 * f['confounded']:.0f} %",
+            f"{f['gains']['with_gain']} of {len(f['gains']['parts'])}" if f["gains"] else "",
+        ]
+        for f in there
+    ]
+    print_table(["term", "verdict", "probability", "log Bayes factor", "concealed", "parts with a gain"], rows)
+    for f in there:
+        echo(f"\n{f['name']}" + (f" ({f['about']})" if f["about"] else ""))
+        values = ", ".join(f"{name} {_number(value)}" for name, value in f["values"].items())
+        if values and len(f["values"]) <= MOST_VALUES:
+            echo(f"  {values}")
+        if f["text"]:
+            echo(f"  {f['text']}")
+
+
+def _print_parameters(parameters: Sequence[Mapping[str, Any]]) -> None:
+    from dbbstation.cli.output import print_table
+
+    if not parameters:
+        return
+    echo("\nparameters of the simulator:")
+    rows = [
+        [
+            p["name"],
+            f"{p['stated']:.4g}",
+            _number(p["refitted"] | {"unit": ""}),
+            _number(p["corrected"] | {"unit": ""}),
+            p["unit"],
+            f"{100.0 * p['confounded']:.0f} %",
+        ]
+        for p in parameters
+    ]
+    print_table(["parameter", "stated", "refitted", "corrected", "unit", "concealed it"], rows)
+    for p in parameters:
+        alike = p["not_told_apart_from"]
+        if alike is not None:
+            what = f"from {', '.join(alike)}" if alike else "from anything: no output answers to it"
+            echo(f"  The recordings cannot tell {p['name']} {what}.")
+
+
+def _number(number: Mapping[str, Any]) -> str:
+    u = number["uncertainty"]
+    known = f"{number['value']:.4g} ± {u:.2g}" if u is not None else f"{number['value']:.4g}"
+    return f"{known} {number['unit']}".rstrip()

@@ -1,0 +1,264 @@
+"""What a simulator in the loop says: which port, which form, how large, what had hidden it, and whether it predicts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.fit import not_told_apart
+from dbbstation.diagnosis.simulator.held import held_out_error, parts
+from dbbstation.diagnosis.simulator.nodes import Nodes, noise_of
+from dbbstation.diagnosis.simulator.search import compared, search
+from dbbstation.diagnosis.simulator.work import AGREE, BudgetSpentError, State, Work
+from dbbstation.inference.jackknife import refits_without
+from dbbstation.inference.left_over import left_over
+from dbbstation.inference.read_off import Trial, read_off
+from dbbstation.inference.verdict import Value, Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.model import Model
+    from dbbstation.diagnosis.simulator.nodes import Node
+    from dbbstation.diagnosis.simulator.own import PortSource
+    from dbbstation.diagnosis.simulator.search import Found
+    from dbbstation.diagnosis.simulator.terms import Term
+    from dbbstation.diagnosis.simulator.work import Run
+    from dbbstation.inference.folds import HeldOutError
+    from dbbstation.inference.left_over import LeftOver
+    from dbbstation.inference.read_off import Finding
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A parameter of the simulator.
+
+    Attributes:
+        name: of it.
+        stated: as the model states it.
+        before: refitted without any term.
+        after: with what was found put in.
+        confounded: share of what it does that what was found can do as well, R²; zero where nothing was.
+        alike: parameters that the recordings cannot tell from it.
+    """
+
+    name: str
+    stated: float
+    before: Value
+    after: Value
+    confounded: float
+    alike: tuple[str, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What is said of a simulator and its recordings.
+
+    Attributes:
+        model: that was compared.
+        base: as it is, refitted.
+        found: what the search ended at.
+        findings: of terms that are there or that the recordings cannot exclude, those that are there first.
+        parameters: of the simulator.
+        left: tests of what is left.
+        held_out: error of parts that took no part; None where it was not asked for.
+        as_simulated: measured less simulated values with the parameters as stated, shape (n,).
+        nonlinear: by how much true and linear answer to a move of one standard uncertainty differ, by name of the term.
+        not_asked: candidates that could not be asked, and why.
+        stopped: why it ended early; empty where it did not.
+    """
+
+    model: Model
+    base: Node
+    found: Found
+    findings: tuple[Finding, ...]
+    parameters: tuple[Moved, ...]
+    left: LeftOver
+    held_out: HeldOutError | None
+    as_simulated: NDArray[np.float64]
+    nonlinear: Mapping[str, float]
+    not_asked: Mapping[str, str]
+    stopped: str = ""
+
+    @property
+    def work(self) -> Work:
+        """Simulations."""
+        return self.base.work
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """That were put in, with their numbers."""
+        return self.found.state.terms
+
+    @property
+    def identified(self) -> tuple[Finding, ...]:
+        """Findings of what is there and predicts, where that was asked."""
+        return tuple(one for one in self.findings if one.verdict is Verdict.IDENTIFIED)
+
+    @property
+    def rms(self) -> tuple[float, float, float]:
+        """Of measured less simulated values: as simulated, refitted, corrected."""
+        every = (self.as_simulated, self.base.fitted.residual, self.found.residual)
+        return tuple(float(np.sqrt(np.mean(rows**2))) for rows in every)  # type: ignore[return-value]  # three of them
+
+
+def find(
+    model: Model,
+    run: Run,
+    *,
+    own: Sequence[PortSource] = (),
+    hold_out: bool = True,
+    progress: Callable[..., None] = lambda *_: None,
+) -> Answer:
+    """Find what a simulator lacks, and at which of its ports.
+
+    Args:
+        model: simulator with its recordings.
+        run: simulates.
+        own: physics of the user's own.
+        hold_out: choose everything anew without each part; takes most of the time.
+        progress: called with what is being done, and how much of how much where that can be counted.
+
+    Raises:
+        CalibrationError: a simulation that failed, with its input.
+    """
+    stated = State(tuple(p.value for p in model.parameters))
+    work = Work(model, run, np.ones(len(model.outputs)))
+    as_simulated = work.residuals([stated])[0]
+    if len(model.outputs) > 1:
+        work = Work(model, run, _scales(work, stated))
+        as_simulated = work.residuals([stated])[0]
+    nodes = Nodes(work, own, progress)
+    base = nodes.base(stated)
+    found = search(nodes, base, lambda node: compared(node.channel, progress))
+    stopped, held_out = found.stopped, None
+    if hold_out and not stopped:
+        try:
+            held_out = held_out_error(nodes, base, found, stated, progress)
+        except BudgetSpentError as error:
+            stopped = error.what
+    return _said(nodes, base, found, held_out, as_simulated, stopped)
+
+
+def _scales(work: Work, stated: State) -> NDArray[np.float64]:
+    """What outputs are divided by, so that all have the noise of the first: from what differs between neighbouring residuals."""
+    residual, outputs = work.residuals([stated])[0], len(work.model.outputs)
+    noise = []
+    for k in range(outputs):
+        # Second differences: what is smooth falls out [variance of white noise is a sixth of theirs].
+        rows = [np.diff(residual[block], 2) for block in work.blocks[k::outputs]]
+        noise.append(float(np.sqrt(np.mean(np.square(np.concatenate(rows))) / 6.0)))
+    if min(noise) <= 0.0:
+        noise = [max(float(np.std(residual[work.blocks[k]])), 1e-300) for k in range(outputs)]
+    return np.array(noise) / noise[0]
+
+
+def _said(
+    nodes: Nodes,
+    base: Node,
+    found: Found,
+    held_out: HeldOutError | None,
+    as_simulated: NDArray[np.float64],
+    stopped: str,
+) -> Answer:
+    node, settled = found.node, found.settled
+    refits = refits_without(settled, [rows for _, rows in parts(nodes.work)])
+    try:
+        nonlinear = _nonlinear(nodes.work, found)
+    except BudgetSpentError:
+        nonlinear = {term.name: np.inf for term in found.state.terms}
+    findings = tuple(_judged(one, found, nonlinear) for one in read_off(settled, Trial(held_out, refits)))
+    return Answer(
+        model=nodes.work.model,
+        base=base,
+        found=found,
+        findings=tuple(sorted(findings, key=lambda one: (one.verdict.rank, -one.log_factor))),
+        parameters=_parameters(base, found),
+        left=left_over(settled),
+        held_out=held_out,
+        as_simulated=as_simulated,
+        nonlinear=nonlinear,
+        not_asked=node.asked[1],
+        stopped=stopped,
+    )
+
+
+def _judged(one: Finding, found: Found, nonlinear: Mapping[str, float]) -> Finding:
+    """A finding whose values are those of the term, and without a claim where linear and true answer differ."""
+    inside = {c.name: (c, term) for c, term in zip(found.node.inside, found.state.terms, strict=True)}
+    if one.name not in inside:
+        if one.verdict.rank < Verdict.AMBIGUOUS.rank:
+            return replace(
+                one, verdict=Verdict.AMBIGUOUS, text="It was not put in: the search came back to where it had been."
+            )
+        return one
+    candidate, term = inside[one.name]
+    values = dict(one.values)
+    for name, number in zip(candidate.names, term.numbers, strict=True):
+        if name in values:
+            values[name] = replace(values[name], value=number)
+    one = replace(one, values=values)
+    if nonlinear[one.name] > AGREE and one.verdict.rank < Verdict.AMBIGUOUS.rank:
+        what = f"True and linear answer to it differ by {100.0 * nonlinear[one.name]:.0f} %: no verdict."
+        return replace(one, verdict=Verdict.AMBIGUOUS, text=what)
+    return one
+
+
+def _nonlinear(work: Work, found: Found) -> dict[str, float]:
+    """By how much the true answer to a move of one standard uncertainty of an amplitude departs from the linear one, by term."""
+    weigh, sigma = noise_of(found.settled)
+    fitted, first, apart = found.node.fitted, len(work.model.parameters), {}
+    known = np.array([1.0 / p.uncertainty**2 if p.uncertainty else 0.0 for p in work.model.parameters])
+    rows = weigh(fitted.columns) / sigma
+    u = _uncertainties(rows, np.concatenate([known, np.zeros(rows.shape[1] - first)]))
+    for term in fitted.state.terms:
+        worst = 0.0
+        for k in range(first, first + len(term.amplitudes)):
+            true = fitted.residual - work.residuals([fitted.state.moved(k, float(u[k]))], strict=False)[0]
+            linear = fitted.columns[:, k] * u[k]
+            worst = max(worst, float(np.linalg.norm(true - linear)) / max(float(np.linalg.norm(linear)), 1e-300))
+        apart[term.name] = worst if np.isfinite(worst) else np.inf
+        first += len(term.numbers)
+    return apart
+
+
+def _parameters(base: Node, found: Found) -> tuple[Moved, ...]:
+    """Parameters as stated, refitted, and beside what was found."""
+    weigh, sigma = noise_of(found.settled)
+    model, fitted = base.work.model, found.node.fitted
+    count = len(model.parameters)
+    rows = weigh(fitted.columns) / sigma
+    known = np.array([1.0 / p.uncertainty**2 if p.uncertainty else 0.0 for p in model.parameters])
+    alone = _uncertainties(rows[:, :count], known)
+    both = _uncertainties(rows, np.concatenate([known, np.zeros(rows.shape[1] - count)]))[:count]
+    white = weigh(base.fitted.columns) / sigma
+    before = _uncertainties(white, known) * max(_rms(weigh(base.fitted.residual)) / sigma, 1.0)
+    names = [p.name for p in model.parameters]
+    alike = dict(not_told_apart(names, white))
+    return tuple(
+        Moved(
+            p.name,
+            p.value,
+            Value(float(base.fitted.state.values[k]), float(before[k]), p.unit),
+            Value(float(found.state.values[k]), float(both[k]), p.unit),
+            float(np.clip(1.0 - (alone[k] / both[k]) ** 2, 0.0, 1.0)) if both[k] > 0.0 else 0.0,
+            alike.get(p.name),
+        )
+        for k, p in enumerate(model.parameters)
+    )
+
+
+def _uncertainties(rows: NDArray[np.float64], known: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard uncertainties of a fit of white rows of unit size, shape (m,)."""
+    normal = rows.T @ rows + np.diag(known)
+    norm = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    inverse = np.linalg.pinv(normal / np.outer(norm, norm), rcond=1e-14, hermitian=True)
+    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0)) / norm)
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

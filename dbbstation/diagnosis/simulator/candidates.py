@@ -1,0 +1,207 @@
+"""Candidates at the ports of a simulator: every form over every signal that is known there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from dbbstation.diagnosis.simulator.terms import DEGREE, IN_PLACE, Form, Term, bends
+from dbbstation.diagnosis.simulator.work import sizes
+from dbbstation.inference.channel import NAMED_ODDS
+from dbbstation.inference.patterns import log_odds
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.model import Port
+    from dbbstation.diagnosis.simulator.own import PortSource
+
+ROUNDINGS = (0.01, 0.1)
+"""Shares of a signal's greatest value within which a sign turns: an integrator steps over anything sharper, and what turns less sharply
+is a curve."""
+
+LENGTHS = 5
+"""Time constants, widths and places that answers are taken at, at the most; between them they are interpolated."""
+
+INNER = 2
+"""Knots of a smooth curve inside the range of its signal, which then is a cubic spline of four functions beside a straight line."""
+
+PERIODS = {"rad": 2.0 * np.pi, "deg": 360.0, "turn": 1.0}
+"""One turn of an angle, by its unit."""
+
+DISTINCT = 3
+"""Different values that a signal needs for more than a constant at its port."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A term that may be missing.
+
+    Attributes:
+        term: with no amplitude, and the middle of its grid.
+        names: of its amplitudes, then of its shape.
+        units: of these.
+        grids: of its shape.
+        log_odds: log prior odds.
+        positive: which amplitudes cannot be negative.
+        tried: sizes at which the answer is taken, of a form that puts something in the place of a signal; empty for the others.
+    """
+
+    term: Term
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    grids: tuple[tuple[float, ...], ...]
+    log_odds: float
+    positive: tuple[bool, ...]
+    tried: tuple[float, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Of the term."""
+        return self.term.name
+
+
+def candidates(
+    ports: Sequence[Port],
+    signals: Mapping[str, Mapping[str, NDArray[np.float64]]],
+    own: Sequence[PortSource] = (),
+    times: NDArray[np.float64] | None = None,
+) -> tuple[Candidate, ...]:
+    """Every form at every port.
+
+    Args:
+        ports: of the model.
+        signals: at each port by name, `t` among them, of all calls, shape (calls,).
+        own: physics of the user's own.
+        times: of the rows of the longest run, rising, shape (n,): from these come time constants.
+    """
+    found: list[Candidate] = []
+    for port in ports:
+        at = signals[port.name]
+        if len(at["t"]):
+            span = _span(at["t"] if times is None else times)
+            found += _at(port, {s: at[s] for s in port.signals if len(np.unique(at[s])) >= DISTINCT}, span)
+    for source in own:
+        parameters = source.parameters()
+        amplitudes = [p for p in parameters if not p.shape]
+        shaped = [p for p in parameters if p.shape]
+        middle = tuple(p.shape[len(p.shape) // 2] for p in shaped)
+        found.append(
+            Candidate(
+                Term(source.port, Form.OWN, (), (0.0,) * len(amplitudes), middle, own=source),
+                tuple(p.name for p in (*amplitudes, *shaped)),
+                tuple(p.unit for p in (*amplitudes, *shaped)),
+                tuple(p.shape for p in shaped),
+                NAMED_ODDS,
+                tuple(p.positive for p in amplitudes),
+            )
+        )
+    count = {form: sum(one.term.form is form for one in found) for form in Form}
+    return tuple(one if one.term.own else replace(one, log_odds=log_odds(count[one.term.form])) for one in found)
+
+
+def _span(times: NDArray[np.float64]) -> tuple[float, float]:
+    """Middle step and whole length of a time axis."""
+    steps = np.diff(np.unique(times))
+    return float(np.median(steps)), float(times.max() - times.min())
+
+
+def _at(port: Port, signals: Mapping[str, NDArray[np.float64]], span: tuple[float, float]) -> list[Candidate]:
+    """Forms at one port over signals that change there, shape (calls,)."""
+    found = [_candidate(port, Form.CONSTANT, (), ("value",), (port.unit,))]
+    greatest = sizes(signals)
+    for name, values in signals.items():
+        unit, size = port.signals[name], greatest[name]
+        if unit in PERIODS and np.ptp(values) >= PERIODS[unit]:
+            for order in (1.0, 2.0):
+                fixed = (PERIODS[unit], order)
+                found.append(
+                    _candidate(port, Form.PERIODIC, (name,), ("cosine", "sine"), (port.unit,) * 2, fixed=fixed)
+                )
+        for form, power in ((Form.LINEAR, ""), (Form.SQUARE, "²"), (Form.DRAG, "²"), (Form.CUBIC, "³")):
+            if form is not Form.DRAG or values.min() < 0.0 < values.max():
+                found.append(_candidate(port, form, (name,), ("coefficient",), (_per(port.unit, unit, power),)))
+        places, longest = np.quantile(values, np.linspace(0.0, 1.0, LENGTHS + 2)[1:-1]), span[1] / 3.0
+        found.append(_candidate(port, Form.CURVE, (name,), *_curve(port, values)))
+        found.append(
+            _candidate(port, Form.HINGE, (name,), ("slope", "place"), (_per(port.unit, unit), unit), grid=tuple(places))
+        )
+        constants = tuple(np.geomspace(2.0 * span[0], max(longest, 4.0 * span[0]), LENGTHS).tolist())
+        found.append(
+            _candidate(
+                port, Form.MEMORY, (name,), ("gain", "time constant"), (_per(port.unit, unit), "s"), grid=constants
+            )
+        )
+        if values.min() < 0.0 < values.max():
+            turns = tuple(share * size for share in ROUNDINGS)
+            found.append(_candidate(port, Form.SIGN, (name,), ("size", "rounding"), (port.unit, unit), grid=turns))
+            widths = tuple((size * np.geomspace(0.03, 0.6, LENGTHS)).tolist())
+            found.append(
+                _candidate(
+                    port, Form.LIMIT, (name,), ("slope", "half width"), (_per(port.unit, unit), unit), grid=widths
+                )
+            )
+        widths = tuple((0.5 * float(np.ptp(values)) * np.geomspace(0.01, 0.5, LENGTHS)).tolist())
+        found.append(_candidate(port, Form.SLIP, (name,), ("size", "half width"), (port.unit, unit), grid=widths))
+        if unit == port.unit:
+            whiles = tuple(np.geomspace(span[0], max(0.1 * span[1], 2.0 * span[0]), LENGTHS + 1).tolist())
+            tried = {Form.DELAY: whiles, Form.LAG: whiles, Form.PLAY: widths}
+            for form, what, of in (
+                (Form.DELAY, "dead time", "s"),
+                (Form.LAG, "time constant", "s"),
+                (Form.PLAY, "half width", unit),
+            ):
+                found.append(replace(_candidate(port, form, (name,), (what,), (of,)), tried=tried[form]))
+    for one, other in combinations(signals, 2):
+        units = _per(_per(port.unit, port.signals[one]), port.signals[other])
+        found.append(_candidate(port, Form.PRODUCT, (one, other), ("coefficient",), (units,)))
+    return found
+
+
+def _candidate(
+    port: Port,
+    form: Form,
+    signals: tuple[str, ...],
+    names: tuple[str, ...],
+    units: tuple[str, ...],
+    fixed: tuple[float, ...] = (),
+    grid: tuple[float, ...] = (),
+) -> Candidate:
+    count = len(names) - bool(grid)
+    middle = (grid[len(grid) // 2],) if grid else ()
+    return Candidate(
+        Term(port.name, form, signals, (0.0,) * count, middle, fixed),
+        names,
+        units,
+        (grid,) if grid else (),
+        0.0,
+        (form in IN_PLACE,) * count,
+    )
+
+
+def _curve(port: Port, values: NDArray[np.float64]) -> tuple[tuple[str, ...], tuple[str, ...], tuple[float, ...]]:
+    """Names, units and knots of a cubic spline over the range of a signal, its inner knots where as many values lie below as between."""
+    low, high = float(values.min()), float(values.max())
+    room = 0.05 * (high - low)
+    inner = np.quantile(values, np.linspace(0.0, 1.0, INNER + 2)[1:-1])
+    knots = np.concatenate([[low - room] * 4, inner, [high + room] * 4])
+    count = len(knots) - DEGREE - 3
+    return tuple(f"bend {k + 1}" for k in range(count)), (port.unit,) * count, tuple(knots.tolist())
+
+
+def _per(unit: str, other: str, power: str = "") -> str:
+    """Quotient of units."""
+    return f"{unit or '1'}/{f'({other})' if ' ' in other or '/' in other else other}{power}" if other else unit
+
+
+def basis(term: Term, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What each amplitude of a curve does at values of its signal, shape (n, p)."""
+    inside = np.clip(values, term.fixed[0], term.fixed[-1])
+    splines = BSpline.design_matrix(inside, np.array(term.fixed), DEGREE).toarray()
+    return np.asarray(splines @ bends(term.fixed))

@@ -1,0 +1,288 @@
+"""Refit of a simulator: bounded trust-region least squares, from several starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import qmc
+
+from dbbstation.diagnosis.simulator.terms import IN_PLACE
+from dbbstation.diagnosis.simulator.work import Direction, State
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.model import Parameter
+    from dbbstation.diagnosis.simulator.work import Work
+
+    Weigh = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+STARTS = 12
+"""Places that a fit from several starts looks at, spread evenly over what the parameters may be [Sobol]; the best are gone on from."""
+
+GONE_ON = 3
+"""Starts that are gone on from; that which the model states is one of them."""
+
+SPREAD = 0.3
+"""Share of its value by which a parameter is started elsewhere, where neither uncertainty nor bounds are stated."""
+
+MOST_STEPS = 40
+"""Steps of a fit at the most."""
+
+CLOSE = 1e-5
+"""Relative change of the sum of squares from which on a fit has ended: for a thousand rows, a tenth of a standard uncertainty."""
+
+ALIKE = 0.999
+"""Share of what one parameter does that the others can do as well, R², from which on the recordings cannot tell it from them: its
+uncertainty is more than thirty times what it would be alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A refit.
+
+    Attributes:
+        state: best values.
+        residual: measured less simulated there, shape (n,).
+        columns: what one more of each number does to the simulated values, shape (n, m).
+        curved: by how much the answers to two doses differ, shape (m,).
+        squares: of weighed residuals and of what was known before, in sum.
+        starts: sums of squares that other starts ended at.
+    """
+
+    state: State
+    residual: NDArray[np.float64]
+    columns: NDArray[np.float64]
+    curved: NDArray[np.float64]
+    squares: float
+    starts: tuple[float, ...] = ()
+
+
+def plain(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows as they are."""
+    return rows
+
+
+def directions_of(work: Work, state: State) -> list[Direction]:
+    """All numbers of a state, each with a first dose inside its bounds."""
+    low, high = bounds_of(work, state)
+    numbers = state.numbers
+    keys: list[tuple[str, ...]] = [(p.name,) for p in work.model.parameters]
+    sizes = [p.size for p in work.model.parameters]
+    for term in state.terms:
+        keys += [(term.name, str(k)) for k in range(len(term.numbers))]
+        sizes += [abs(number) or 1.0 for number in term.numbers]
+    found = []
+    for k, (key, size) in enumerate(zip(keys, sizes, strict=True)):
+        dose = abs(work.doses.get(key, 1e-3 * size))
+        up, down = high[k] - numbers[k], numbers[k] - low[k]
+        sign = 1.0 if up >= 2.0 * dose or up >= down else -1.0
+        work.doses[key] = sign * dose
+        found.append(Direction(key, sign * dose, k))
+    return found
+
+
+def bounds_of(work: Work, state: State) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and greatest value of each number of a state, shape (m,)."""
+    low = [p.low for p in work.model.parameters]
+    high = [p.high for p in work.model.parameters]
+    for term in state.terms:
+        count, positive = len(term.amplitudes), term.form in IN_PLACE
+        shapes = [
+            sorted((number / REACH, number * REACH))
+            if term.own is None and number and term.form.value != "hinge"
+            else (-np.inf, np.inf)
+            for number in term.shape
+        ]
+        low += [0.0 if positive else -np.inf] * count + [bound[0] for bound in shapes]
+        high += [np.inf] * count + [bound[1] for bound in shapes]
+    return np.array(low), np.array(high)
+
+
+REACH = 10.0
+"""Factor by which a time constant or a width may move in one fit: from any point of its grid beyond the next ones."""
+
+
+def fit(
+    work: Work,
+    start: State,
+    weigh: Weigh = plain,
+    *,
+    sigma: float = 0.0,
+    several: bool = False,
+    most_steps: int = MOST_STEPS,
+) -> Fitted:
+    """Fit all numbers of a state to the recordings [Branch, Coleman and Li, SIAM J. Sci. Comput. 21 (1999) 1].
+
+    Args:
+        work: simulations.
+        start: to begin with.
+        weigh: what makes rows comparable, such as whitening; its rows have the standard deviation `sigma`.
+        sigma: of a weighed row; 0: what was known of parameters is weighed against what the start leaves.
+        several: begin elsewhere, too.
+        most_steps: at the most.
+    """
+    begun = work.residuals([start])[0]
+    sigma = sigma or _rms(weigh(begun)) or 1.0
+    starts = [start, *(_elsewhere(work, start, partial(_squares, work, weigh, sigma)) if several else ())]
+    ended = [_from(work, one, weigh, sigma, most_steps) for one in starts]
+    squares = [float(np.sum(_weighed(work, state, residual, weigh, sigma) ** 2)) for state, residual in ended]
+    best = int(np.argmin(squares))
+    state, residual = ended[best]
+    answers = work.answers(state, directions_of(work, state), _rms(residual))
+    return Fitted(
+        state, residual, answers.columns, answers.curved, squares[best], tuple(np.delete(squares, best).tolist())
+    )
+
+
+def _from(work: Work, start: State, weigh: Weigh, sigma: float, most_steps: int) -> tuple[State, NDArray[np.float64]]:
+    low, high = bounds_of(work, start)
+    if not len(low):
+        return start, work.residuals([start])[0]
+    seen: dict[bytes, NDArray[np.float64]] = {}
+
+    def residual(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        if numbers.tobytes() not in seen:
+            seen.clear()
+            seen[numbers.tobytes()] = work.residuals([start.with_numbers(numbers)], strict=False)[0]
+        return seen[numbers.tobytes()]
+
+    def weighed(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        state = start.with_numbers(numbers)
+        return _weighed(work, state, residual(numbers), weigh, sigma)
+
+    def columns(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        state = start.with_numbers(numbers)
+        found = work.answers(state, directions_of(work, state), _rms(residual(numbers)))
+        return np.vstack([-weigh(found.columns) / sigma, _known(work.model.parameters, len(numbers))[0]])
+
+    inside = np.clip(start.numbers, low, high)
+    ended = least_squares(
+        weighed,
+        inside,
+        columns,
+        bounds=(low, high),
+        x_scale="jac",
+        ftol=CLOSE,
+        xtol=1e-10,
+        gtol=1e-12,
+        max_nfev=most_steps,
+    )
+    numbers = np.asarray(ended.x, dtype=np.float64)
+    return start.with_numbers(numbers), residual(numbers)
+
+
+def _weighed(
+    work: Work, state: State, residual: NDArray[np.float64], weigh: Weigh, sigma: float
+) -> NDArray[np.float64]:
+    """Weighed rows, and parameters less what was known of them, in standard uncertainties."""
+    if not np.isfinite(residual).all():
+        return np.full(len(weigh(np.zeros(len(residual)))) + len(_known(work.model.parameters, 0)[1]), np.inf)
+    rows, stated = _known(work.model.parameters, len(state.numbers))
+    return np.concatenate([weigh(residual) / sigma, rows @ state.numbers - stated])
+
+
+def _known(parameters: Sequence[Parameter], count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What was known of parameters as rows of a fit, shape (p, m), and their right side, shape (p,)."""
+    known = [(k, p) for k, p in enumerate(parameters) if p.uncertainty is not None]
+    rows = np.zeros((len(known), max(count, len(parameters))))
+    for row, (k, p) in enumerate(known):
+        rows[row, k] = 1.0 / p.uncertainty  # type: ignore[operator]  # those without are left out
+    return rows, np.array([p.value / p.uncertainty for _, p in known])  # type: ignore[operator]  # the same
+
+
+def _squares(work: Work, weigh: Weigh, sigma: float, states: Sequence[State]) -> list[float]:
+    left = work.residuals(states, strict=False)
+    return [
+        float(np.sum(_weighed(work, state, rows, weigh, sigma) ** 2)) for state, rows in zip(states, left, strict=True)
+    ]
+
+
+def _elsewhere(work: Work, start: State, squares: Callable[[Sequence[State]], list[float]]) -> list[State]:
+    """The best of several states spread over what the parameters may be."""
+    parameters = work.model.parameters
+    if not parameters:
+        return []
+    spread = np.array([2.0 * p.uncertainty if p.uncertainty else SPREAD * p.size for p in parameters])
+    low = np.maximum(np.array([p.low for p in parameters]), np.array(start.values) - spread)
+    high = np.minimum(np.array([p.high for p in parameters]), np.array(start.values) + spread)
+    draws = qmc.Sobol(len(parameters), scramble=True, rng=1).random(16)[:STARTS]
+    states = [State(tuple((low + (high - low) * draw).tolist()), start.terms) for draw in draws]
+    found = squares(states)
+    order = np.argsort(found)[: GONE_ON - 1]
+    return [states[int(k)] for k in order if np.isfinite(found[int(k)])]
+
+
+def near(work: Work, fitted: Fitted, weigh: Weigh, sigma: float, rounds: int = 6) -> tuple[State, NDArray[np.float64]]:
+    """Refit to some of the rows, from a fit to all of them: Gauss-Newton steps by the answers there, each simulated anew.
+
+    Args:
+        work: simulations.
+        fitted: to all rows.
+        weigh: takes all rows to those that are fitted, whitened.
+        sigma: of a weighed row.
+        rounds: steps at the most.
+    """
+    low, high = bounds_of(work, fitted.state)
+    state, residual = fitted.state, fitted.residual
+    rows = np.vstack([weigh(fitted.columns) / sigma, -_known(work.model.parameters, len(low))[0]])
+    before = _weighed(work, state, residual, weigh, sigma)
+    if not rows.shape[1]:
+        return state, residual
+    scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    for _ in range(rounds):
+        step = np.linalg.lstsq(rows / scale, before, rcond=1e-10)[0] / scale
+        share = 1.0
+        while share > SMALLEST:
+            trial = state.with_numbers(np.clip(state.numbers + share * step, low, high))
+            left = work.residuals([trial], strict=False)[0]
+            after = _weighed(work, trial, left, weigh, sigma)
+            if float(after @ after) < float(before @ before):
+                break
+            share *= 0.5
+        else:
+            break
+        gain = float(before @ before - after @ after)
+        state, residual, before = trial, left, after
+        if gain < CLOSE * float(before @ before):
+            break
+    return state, residual
+
+
+SMALLEST = 0.1
+"""Share of a step below which none is tried: the answers of all rows no longer hold there, or nothing is left to gain."""
+
+
+def not_told_apart(names: Sequence[str], columns: NDArray[np.float64]) -> list[tuple[str, tuple[str, ...]]]:
+    """Parameters whose doing others can do as well, with those that do so, most of it first.
+
+    Args:
+        names: of the parameters, shape (k,).
+        columns: weighed, what one more of each does, shape (n, k).
+    """
+    norm = np.linalg.norm(columns, axis=0)
+    found: list[tuple[str, tuple[str, ...]]] = []
+    for k, name in enumerate(names):
+        others = [j for j in range(len(names)) if j != k and norm[j] > 0.0]
+        if norm[k] == 0.0:
+            found.append((name, ()))
+        elif others:
+            scaled = columns[:, others] / norm[others]
+            values = np.linalg.lstsq(scaled, columns[:, k], rcond=1e-12)[0]
+            rest = columns[:, k] - scaled @ values
+            if 1.0 - float(rest @ rest) / norm[k] ** 2 > ALIKE:
+                doing = np.abs(values)
+                found.append(
+                    (name, tuple(names[others[j]] for j in np.argsort(-doing) if doing[j] > 0.1 * doing.max()))
+                )
+    return found
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

@@ -1,0 +1,98 @@
+"""Held-out error of a simulator: parts are left out, terms are chosen anew, and the whole is simulated again.
+
+A part is predicted by a simulation that runs through it: the state at its beginning is simulated, too. Linear answers are those about
+refits to all rows; values that predict come from the other rows alone.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.fit import near
+from dbbstation.diagnosis.simulator.nodes import noise_of
+from dbbstation.diagnosis.simulator.search import compared_quickly, search
+from dbbstation.diagnosis.table.mismatch import FOLD_ROWS
+from dbbstation.inference.folds import ENOUGH_BLOCKS, FOLDS, Fold, HeldOutError, beside
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.nodes import Node, Nodes
+    from dbbstation.diagnosis.simulator.search import Found
+    from dbbstation.diagnosis.simulator.work import State, Work
+    from dbbstation.inference.settled import Settled
+
+
+def parts(work: Work) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Parts that are held back: whole runs where there are five or more, else ten stretches of time, all outputs together."""
+    runs, outputs = work.model.runs, len(work.model.outputs)
+    blocks = [work.blocks[k * outputs : (k + 1) * outputs] for k in range(len(runs))]
+    found = []
+    if len(runs) >= ENOUGH_BLOCKS:
+        number = [k * min(FOLDS, len(runs)) // len(runs) for k in range(len(runs))]
+        for part in range(max(number) + 1):
+            rows = np.zeros(work.size, dtype=bool)
+            inside = [k for k in range(len(runs)) if number[k] == part]
+            for block in (block for k in inside for block in blocks[k]):
+                rows[block] = True
+            found.append((", ".join(runs[k].name for k in inside), rows))
+        return found
+    ends = np.cumsum([0, *(len(run) for run in runs)])
+    for part in range(FOLDS):
+        first, last = (round(share * ends[-1] / FOLDS) for share in (part, part + 1))
+        rows, said = np.zeros(work.size, dtype=bool), []
+        for k, run in enumerate(runs):
+            a, b = np.clip([first - ends[k], last - ends[k]], 0, len(run)).tolist()
+            if b > a:
+                said.append(f"{run.name} from {run.inputs['t'][a]:.4g} to {run.inputs['t'][b - 1]:.4g} s")
+            for block in blocks[k]:
+                rows[block.start + a : block.start + b] = True
+        found.append((", ".join(said), rows))
+    return found
+
+
+def held_out_error(
+    nodes: Nodes, base: Node, found: Found, stated: State, progress: Callable[[str, int, int], None]
+) -> HeldOutError:
+    """Hold parts back in turn; choose terms anew, refit, simulate.
+
+    Args:
+        nodes: that were visited.
+        base: the simulator as it is, refitted.
+        found: what all rows came to.
+        stated: parameters as the model states them, which are the reference.
+        progress: called with what is being done, and how much of how much.
+    """
+    work, channel = nodes.work, found.node.channel
+    as_simulated = work.residuals([stated])[0]
+    every, folds = parts(work), []
+    for done, (name, rows) in enumerate(every):
+        progress("held-out part", done, len(every))
+        out = rows | beside(channel, rows, found.settled.noise.correlation_samples)
+
+        one = search(nodes, base, partial(_without, out=out, found=found), refits=False)
+        weigh, sigma = noise_of(one.settled)
+        _, refitted = near(work, base.fitted, lambda r, out=out: r[~out], max(base.size, 1e-300))  # type: ignore[misc]  # bound now
+        with_all = float(np.sum(np.square(one.residual[rows])))
+        gains: dict[tuple[str, ...], float] = {}
+        for term in one.node.names:
+            less = nodes.without(one.node, term, weigh, sigma)
+            _, left = near(work, less.fitted, weigh, sigma)
+            gains[(term,)] = float(np.sum(np.square(left[rows]))) - with_all
+        before, middle, after = (_rms(values[rows]) for values in (as_simulated, refitted, one.residual))
+        folds.append(Fold(name, int(rows.sum()), before, middle, after, gains))
+    return HeldOutError(tuple(folds))
+
+
+def _without(node: Node, out: NDArray[np.bool_], found: Found) -> Settled:
+    """Comparison about a node without some rows, shape (n,)."""
+    return compared_quickly(node.channel.without(out).thinned(FOLD_ROWS), found.settled.beginning)
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

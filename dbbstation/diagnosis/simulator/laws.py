@@ -1,0 +1,201 @@
+"""Candidates as laws of a channel: their columns are the simulator's own answers.
+
+A column is the answer to a small dose. Between the points of a grid (a time constant, a width, a place) answers are interpolated; the
+refit that follows moves such a number by simulations of its own. What comes in the place of a signal (a delay, a lag, a play) is
+answered at several sizes, since small ones say little about large ones; the law then says which size fits, and by which share of it.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.terms import Form
+from dbbstation.diagnosis.simulator.work import Direction
+from dbbstation.inference.channel import Law
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.candidates import Candidate
+    from dbbstation.diagnosis.simulator.work import State, Work
+    from dbbstation.inference.channel import Discrepancy
+
+    Curves = Mapping[tuple[str, str], NDArray[np.float64]]
+
+FORM_UNCERTAINTY = 0.02
+"""Share of its effect by which real objects depart from a form over their state, one standard deviation, as springs and geometry do in
+[`TableSource`]."""
+
+LOOSE_FORM_UNCERTAINTY = 0.1
+"""The same of friction, plays and memories."""
+
+LOOSE = frozenset({Form.SIGN, Form.SLIP, Form.PLAY, Form.MEMORY})
+
+
+def laws(
+    work: Work,
+    state: State,
+    found: Sequence[Candidate],
+    size: float,
+    curved_most: float,
+) -> tuple[list[Law], dict[str, str]]:
+    """Candidates as laws about a state, and those that cannot be asked, with the reason.
+
+    Args:
+        work: simulations.
+        state: about which.
+        found: candidates that are not in the state.
+        size: of the residual, root mean square.
+        curved_most: difference between the answers to two doses, over the answer, from which on a candidate cannot be asked.
+    """
+    dosed = [one for one in found if not one.tried]
+    points = [(one, point) for one in dosed for point in product(*one.grids)]
+    answers = work.answers(state, [d for one, point in points for d in _directions(one, point)], size)
+    first, by_point = 0, {}
+    for one, point in points:
+        by_point[(one.name, point)] = slice(first, first + len(one.term.amplitudes))
+        first += len(one.term.amplitudes)
+    columns, refused = {}, {}
+    for one in dosed:
+        parts = [by_point[(one.name, point)] for point in product(*one.grids)]
+        if not all(answers.seen[part].all() for part in parts):
+            refused[one.name] = "the outputs do not answer to it"
+        elif max(float(answers.curved[part].max()) for part in parts) > curved_most:
+            refused[one.name] = "the answers to two small doses of it do not agree"
+        else:
+            columns[one.name] = np.stack([answers.columns[:, part] for part in parts])
+    curves = {
+        (one.term.port, one.term.signals[0]): columns[one.name][0]
+        for one in dosed
+        if one.term.form is Form.CURVE and one.name in columns
+    }
+    laid_out = [_law(one, columns[one.name], size, curves) for one in dosed if one.name in columns]
+    for one in found:
+        if one.tried:
+            law = _in_place(work, state, one, size)
+            if law is None:
+                refused[one.name] = "the outputs do not answer to it, or the simulation runs away"
+            else:
+                laid_out.append(law)
+    return laid_out, refused
+
+
+def curve_answers(work: Work, state: State, curves: Sequence[Candidate], size: float) -> Curves:
+    """Answers to curves about a state, by port and signal; those that nothing answers to are left out."""
+    answers = work.answers(state, [d for one in curves for d in _directions(one, ())], size)
+    found, first = {}, 0
+    for one in curves:
+        own = slice(first, first + len(one.term.amplitudes))
+        first = own.stop
+        if answers.seen[own].all():
+            found[(one.term.port, one.term.signals[0])] = answers.columns[:, own]
+    return found
+
+
+def form_uncertainty(one: Candidate) -> float:
+    """Share of its effect by which real objects depart from a candidate's form."""
+    if one.term.form in {Form.CONSTANT, Form.OWN}:
+        return 0.0
+    return LOOSE_FORM_UNCERTAINTY if one.term.form in LOOSE else FORM_UNCERTAINTY
+
+
+def discrepancy(one: Candidate, curves: Curves) -> Discrepancy | None:
+    """Columns of what a form may be off by: smooth curves over the signals of its port, each as large as the effect."""
+    taken = one.term.signals if one.term.form is Form.CURVE else ()
+    own = [columns for (port, signal), columns in curves.items() if port == one.term.port and signal not in taken]
+    if not own or not form_uncertainty(one):
+        return None
+    columns = np.hstack(own)
+    columns = columns / np.maximum(np.sqrt(np.mean(np.square(columns), axis=0)), 1e-300)
+
+    def beside(
+        effect: NDArray[np.float64], _nonlinear: tuple[float, ...], _amplitudes: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return np.asarray(columns * float(np.sqrt(np.mean(np.square(effect)))))
+
+    return beside
+
+
+def _directions(one: Candidate, point: tuple[float, ...]) -> list[Direction]:
+    amplitudes = len(one.term.amplitudes)
+    term = one.term.with_numbers([0.0] * amplitudes + list(point))
+    keys = [(one.name, str(k), *(f"{value:.12g}" for value in point)) for k in range(amplitudes)]
+    return [Direction(key, 1e-3, k, term) for k, key in enumerate(keys)]
+
+
+def _law(one: Candidate, columns: NDArray[np.float64], size: float, curves: Curves) -> Law:
+    """Law of a candidate from its columns at all points of its grid, shape (points, n, p)."""
+    rms = np.sqrt(np.mean(np.square(columns), axis=(0, 1)))
+    return Law(
+        name=one.name,
+        columns=_between(one.grids, columns),
+        plausible=size / np.maximum(rms, 1e-300),
+        parameters=one.names,
+        units=one.units,
+        grids=one.grids,
+        positive=one.positive,
+        log_odds=one.log_odds,
+        reach=size if one.grids else None,
+        form_uncertainty=form_uncertainty(one),
+        discrepancy=discrepancy(one, curves),
+    )
+
+
+def _in_place(work: Work, state: State, one: Candidate, size: float) -> Law | None:
+    """Law of what comes in the place of a signal: its share, at sizes between those that were tried; None where nothing answers."""
+    before = work.residuals([state])[0]
+    states = [Direction((one.name,), 0.0, 0, one.term).at(state, value) for value in one.tried]
+    answers = [before - after for after in work.residuals(states, strict=False)]
+    usable = [k for k, answer in enumerate(answers) if answer.any() and np.abs(answer).max() < MOST_ANSWER * size]
+    if len(usable) < FEWEST_SIZES:
+        return None
+    grid = tuple(one.tried[k] for k in usable)
+    columns = np.stack([answers[k][:, None] for k in usable])
+    return Law(
+        name=one.name,
+        columns=_between((grid,), columns),
+        plausible=np.ones(1),
+        parameters=(SHARE, one.names[0]),
+        units=("", one.units[0]),
+        grids=(grid,),
+        positive=(True,),
+        log_odds=one.log_odds,
+        form_uncertainty=form_uncertainty(one),
+    )
+
+
+SHARE = "share"
+"""What a law of something in the place of a signal calls its amplitude."""
+
+FEWEST_SIZES = 2
+
+MOST_ANSWER = 100.0
+"""Largest answer to something in the place of a signal, over the residual: beyond, the simulation runs away, or it would have shown."""
+
+
+def _between(
+    grids: tuple[tuple[float, ...], ...], columns: NDArray[np.float64]
+) -> Callable[[tuple[float, ...]], NDArray[np.float64]]:
+    """Columns between the points of a grid, by straight lines, from those at all points, shape (points, n, p)."""
+    table = columns.reshape(*(len(grid) for grid in grids), *columns.shape[1:])
+
+    def at(point: tuple[float, ...]) -> NDArray[np.float64]:
+        found = table
+        for grid, value in zip(grids, point, strict=True):
+            if len(grid) == 1:
+                found = found[0]
+                continue
+            k = int(np.clip(np.searchsorted(grid, value) - 1, 0, len(grid) - 2))
+            share = float(np.clip((value - grid[k]) / (grid[k + 1] - grid[k]), 0.0, 1.0))
+            found = (1.0 - share) * found[k] + share * found[k + 1]
+        return np.asarray(found)
+
+    if not grids:
+        alone = columns[0]
+        return lambda _point: alone
+    return at

@@ -1,0 +1,115 @@
+"""Ports as a simulator sees them, and one simulation with terms at them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.model import Answer
+from dbbstation.diagnosis.simulator.terms import evaluator
+from dbbstation.inference.memory import lagging
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.contract import Simulator
+    from dbbstation.diagnosis.simulator.model import Ask, Model, Port
+    from dbbstation.diagnosis.simulator.terms import Evaluate
+
+
+class SimulationFault(Exception):  # noqa: N818 - a fault of the user's simulator, told as a refusal
+    """What a simulator returned is not what its model says."""
+
+
+class Ports:
+    """Ports of one simulation: `ports.NAME(t, signals)` returns what acts there.
+
+    Time and signals are numbers, or arrays of all rows where a port acts on what has been simulated, such as a sensor.
+
+    Args:
+        ports: that there are.
+        acting: evaluated terms, by port.
+        records: whether signals are kept.
+    """
+
+    def __init__(self, ports: Sequence[Port], acting: Mapping[str, Sequence[Evaluate]], *, records: bool) -> None:
+        self._names = tuple(port.name for port in ports)
+        self._kept: dict[str, list[tuple[float, ...]]] = {port.name: [] for port in ports}
+        self._signals = {port.name: tuple(port.signals) for port in ports}
+        for port in ports:
+            setattr(self, port.name, self._port(port.name, list(acting.get(port.name, ())), records=records))
+
+    def __getattr__(self, name: str) -> Callable[..., float]:
+        """Refuse a port that is not there."""
+        there = ", ".join(self.__dict__.get("_names", ()))
+        raise SimulationFault(f"`ports.{name}` is no port of the model; there are {there or 'none'}")
+
+    def recorded(self) -> dict[str, dict[str, NDArray[np.float64]]]:
+        """Times and signals of all calls, by port, shape (calls,)."""
+        found = {}
+        for name, rows in self._kept.items():
+            signals = ("t", *self._signals[name])
+            table = np.array(rows, dtype=np.float64).reshape(-1, len(signals))
+            found[name] = {signal: table[:, k] for k, signal in enumerate(signals)}
+        return found
+
+    def _port(
+        self, name: str, acting: Sequence[Evaluate], *, records: bool
+    ) -> Callable[..., float | NDArray[np.float64]]:
+        signals_of, kept = self._signals[name], self._kept[name]
+
+        def at(t: float, signals: Mapping[str, float]) -> float:
+            if records:
+                try:
+                    kept.append((t, *(signals[signal] for signal in signals_of)))
+                except KeyError as error:
+                    raise SimulationFault(f"`ports.{name}` is called without the signal {error}") from error
+            return sum(act(t, signals) for act in acting) if acting else 0.0
+
+        if acting or records:
+
+            def called(t: float, signals: Mapping[str, float]) -> float | NDArray[np.float64]:
+                if isinstance(t, np.ndarray):
+                    columns = {s: np.broadcast_to(signals[s], t.shape).tolist() for s in signals_of}
+                    rows = zip(*columns.values(), strict=True) if columns else ((),) * len(t)
+                    pairs = zip(t.tolist(), rows, strict=True)
+                    return np.array([at(one, dict(zip(columns, row, strict=True))) for one, row in pairs])
+                return at(t, signals)
+
+            return called
+        return lambda _t, _signals: 0.0
+
+
+def simulated(simulator: Simulator, model: Model, ask: Ask) -> Answer:
+    """Run a simulator once.
+
+    Raises:
+        SimulationFault: its outputs are not those of the model.
+        Exception: whatever the simulator raises.
+    """
+    acting: dict[str, list[Evaluate]] = {}
+    for term in ask.terms:
+        acting.setdefault(term.port, []).append(evaluator(term))
+    ports = Ports(model.ports, acting, records=ask.records)
+    run = model.runs[ask.run]
+    with np.errstate(all="ignore"):
+        try:
+            outputs = simulator.simulate(dict(run.inputs), dict(ask.parameters), ports)
+        except (ArithmeticError, ValueError) as error:
+            if isinstance(error, ValueError) and "math" not in str(error):
+                raise
+            # Numbers beyond what arithmetic has, or functions of infinity: it ran away.
+            return Answer(np.full((len(model.outputs), len(run)), np.nan))
+    found = np.empty((len(model.outputs), len(run)))
+    for k, output in enumerate(model.outputs):
+        if output.name not in outputs:
+            raise SimulationFault(f"`simulate` returns no output `{output.name}`")
+        values = np.asarray(outputs[output.name], dtype=np.float64)
+        if values.shape != (len(run),):
+            raise SimulationFault(f"output `{output.name}` has the shape {values.shape}, {len(run)} rows are expected")
+        finite = output.filter_s > 0.0 and bool(np.isfinite(values).all())
+        found[k] = values + lagging(values, run.inputs["t"], output.filter_s) if finite else values
+    return Answer(found, ports.recorded() if ask.records else {})

@@ -1,0 +1,248 @@
+"""Terms that may act at a port of a simulator: forms over the signals that are known there.
+
+A term with a memory follows the time that it is given: a time that is asked for again, or an earlier one, is answered from what was
+known before it, so that every integrator gets the same answer for the same step.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from math import cos, exp, expm1, pi, sin, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.linalg import null_space
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.own import PortSource
+
+    Evaluate = Callable[[float, Mapping[str, float]], float]
+
+
+class Form(StrEnum):
+    """How a term follows its signals x (and z); a is its amplitude."""
+
+    CONSTANT = "constant"  # a
+    LINEAR = "linear"  # a x
+    SQUARE = "square"  # a x²
+    DRAG = "quadratic drag"  # a x |x|
+    CUBIC = "cubic"  # a x³
+    SIGN = "sign"  # a x / sqrt(x² + rounding²)
+    HINGE = "hinge"  # a max(x - place, 0)
+    LIMIT = "limited"  # a x within half width, a half width beyond
+    PRODUCT = "product"  # a x z
+    CURVE = "curve"  # a_k B_k(x), splines without a straight line
+    MEMORY = "memory"  # a times x through a first-order lag
+    SLIP = "stick-slip"  # a times a spring of x that slides beyond a half width, 1 where it slides
+    PERIODIC = "periodic"  # a cos x + b sin x, x in turns
+    DELAY = "delay"  # x a while ago, less x; a is that while
+    LAG = "lag"  # x through a first-order lag, less x; a is its time constant
+    PLAY = "play"  # x through a play, less x; a is its half width
+    OWN = "own"  # physics of the user's own
+
+
+IN_PLACE = frozenset({Form.DELAY, Form.LAG, Form.PLAY})
+"""Forms that put something else in the place of a signal. Their amplitude cannot be negative and is not a factor."""
+
+MEMORIES = frozenset({Form.MEMORY, Form.SLIP, *IN_PLACE})
+
+
+@dataclass(frozen=True)
+class Term:
+    """What acts at a port.
+
+    Attributes:
+        port: name.
+        form: how it follows the signals.
+        signals: names.
+        amplitudes: shape (p,).
+        shape: numbers that the term is not proportional to, such as a time constant, shape (s,).
+        fixed: numbers that are not fitted: knots of a curve, period of an angle and order.
+        own: physics of the user's own.
+    """
+
+    port: str
+    form: Form
+    signals: tuple[str, ...]
+    amplitudes: tuple[float, ...] = (0.0,)
+    shape: tuple[float, ...] = ()
+    fixed: tuple[float, ...] = ()
+    own: PortSource | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is called in results."""
+        if self.own is not None:
+            return f"{self.own.name} at {self.port}"
+        of = f" of {' and '.join(self.signals)}" if self.signals else ""
+        twice = " twice" if self.form is Form.PERIODIC and self.fixed[1] > 1.0 else ""
+        return f"{self.form}{twice}{of} at {self.port}"
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Amplitudes, then shape."""
+        return (*self.amplitudes, *self.shape)
+
+    def with_numbers(self, numbers: Sequence[float]) -> Term:
+        """The same with other amplitudes and shape, shape (p + s,)."""
+        values, count = tuple(float(number) for number in numbers), len(self.amplitudes)
+        return replace(self, amplitudes=values[:count], shape=values[count:])
+
+
+def evaluator(term: Term) -> Evaluate:
+    """What a term does at a time and signals, by name."""
+    if term.own is not None:
+        return _own(term)
+    if term.form in MEMORIES:
+        return _remembering(term)
+    return _curve(term) if term.form is Form.CURVE else _momentary(term)
+
+
+def _momentary(term: Term) -> Evaluate:
+    """Evaluate a term that follows its signals at once."""
+    a = term.amplitudes[0]
+    if term.form is Form.CONSTANT:
+        return lambda _t, _signals: a
+    x = term.signals[0]
+    if term.form is Form.PRODUCT:
+        z = term.signals[1]
+        return lambda _t, signals: a * signals[x] * signals[z]
+    if term.form is Form.PERIODIC:
+        b, turns = term.amplitudes[1], 2.0 * pi * term.fixed[1] / term.fixed[0]
+        return lambda _t, signals: a * cos(turns * signals[x]) + b * sin(turns * signals[x])
+    of = _plain(term)
+    return lambda _t, signals: a * of(signals[x])
+
+
+def _plain(term: Term) -> Callable[[float], float]:
+    """Function of one signal that the amplitude is a factor of."""
+    place = term.shape[0] if term.shape else 0.0
+    rounding = place * place
+    return {
+        Form.LINEAR: lambda x: x,
+        Form.SQUARE: lambda x: x * x,
+        Form.DRAG: lambda x: x * abs(x),
+        Form.CUBIC: lambda x: x * x * x,
+        Form.SIGN: lambda x: x / sqrt(x * x + rounding),
+        Form.HINGE: lambda x: max(x - place, 0.0),
+        Form.LIMIT: lambda x: min(max(x, -place), place),
+    }[term.form]
+
+
+def _own(term: Term) -> Evaluate:
+    own = term.own
+    assert own is not None  # noqa: S101 - asked for by the caller
+    names = [parameter.name for parameter in own.parameters()]
+    values = dict(zip(names, term.numbers, strict=True))
+    return lambda t, signals: float(own.value(t, signals, values))
+
+
+def _curve(term: Term) -> Evaluate:
+    knots, x = np.array(term.fixed), term.signals[0]
+    # A table is read forty times faster than a spline; its error is (step/range)² times the curvature.
+    places = np.linspace(knots[0], knots[-1], TABLE)
+    values = BSpline(knots, bends(term.fixed) @ np.array(term.amplitudes), DEGREE)(places).tolist()
+    low, per = float(knots[0]), (TABLE - 1) / float(knots[-1] - knots[0])
+
+    def value(_t: float, signals: Mapping[str, float]) -> float:
+        at = (signals[x] - low) * per
+        k = min(max(int(at), 0), TABLE - 2)
+        share = min(max(at - k, 0.0), 1.0)
+        return float(values[k] + share * (values[k + 1] - values[k]))
+
+    return value
+
+
+TABLE = 1001
+"""Places at which a curve is worked out."""
+
+DEGREE = 3
+"""Of the splines of a curve."""
+
+
+def bends(knots: Sequence[float]) -> NDArray[np.float64]:
+    """Coefficients of splines in which there is no straight line, orthonormal, shape (k, k - 2): lines are terms of their own.
+
+    A line has the coefficients of a constant and of the means of the knots inside each spline [Greville abscissae; de Boor, A Practical
+    Guide to Splines, ch. IX].
+    """
+    count = len(knots) - DEGREE - 1
+    means = np.array([np.mean(knots[k + 1 : k + 1 + DEGREE]) for k in range(count)])
+    return np.asarray(null_space(np.vstack([np.ones(count), means - means.mean()])))
+
+
+def _remembering(term: Term) -> Evaluate:
+    """Evaluate a term with a memory: times and states so far, those at or behind the time asked for dropped first."""
+    x, a = term.signals[0], term.amplitudes[0]
+    step, out = _delayed(a) if term.form is Form.DELAY else _STEPS[term.form](a, term.shape)
+    times: list[float] = []
+    past: list[tuple[float, float]] = []  # signal and state
+
+    def value(t: float, signals: Mapping[str, float]) -> float:
+        while times and times[-1] >= t:
+            times.pop()
+            past.pop()
+        now = float(signals[x])
+        state = step(times, past, t, now)
+        times.append(t)
+        past.append((now, state))
+        return out(now, state)
+
+    return value
+
+
+def _lagging(constant: float) -> Callable[[list[float], list[tuple[float, float]], float, float], float]:
+    """How far a first-order lag is behind [triangle-hold equivalent, as `inference.memory.lagging`]; it begins settled."""
+
+    def step(times: list[float], past: list[tuple[float, float]], t: float, now: float) -> float:
+        if not times or constant <= 0.0:
+            return 0.0
+        before, behind = past[-1]
+        rate = (t - times[-1]) / constant
+        return behind * exp(-rate) + (now - before) * expm1(-rate) / rate
+
+    return step
+
+
+def _playing(half: float) -> Callable[[list[float], list[tuple[float, float]], float, float], float]:
+    """Output of a play less its input; it begins in the middle."""
+
+    def step(times: list[float], past: list[tuple[float, float]], _t: float, now: float) -> float:
+        if not times:
+            return 0.0
+        before, apart = past[-1]
+        return min(max(apart + before - now, -half), half)
+
+    return step
+
+
+def _delayed(dead: float) -> tuple[Callable[..., float], Callable[[float, float], float]]:
+    def step(times: list[float], past: list[tuple[float, float]], t: float, now: float) -> float:
+        ago = t - dead
+        if not times or dead <= 0.0:
+            return now
+        if ago <= times[0]:
+            return past[0][0]
+        k = bisect_left(times, ago)
+        t1, x1 = (t, now) if k == len(times) else (times[k], past[k][0])
+        t0, x0 = times[k - 1], past[k - 1][0]
+        return x0 + (x1 - x0) * (ago - t0) / (t1 - t0)
+
+    return step, lambda now, late: late - now
+
+
+_STEPS: Mapping[
+    Form, Callable[[float, tuple[float, ...]], tuple[Callable[..., float], Callable[[float, float], float]]]
+] = {
+    Form.MEMORY: lambda a, shape: (_lagging(shape[0]), lambda now, behind: a * (now + behind)),
+    Form.LAG: lambda a, _: (_lagging(a), lambda _now, behind: behind),
+    Form.PLAY: lambda a, _: (_playing(a), lambda _now, apart: apart),
+    Form.SLIP: lambda a, shape: (_playing(shape[0]), lambda _now, apart: -a * apart / shape[0]),
+}

@@ -1,0 +1,251 @@
+"""Simulations that a comparison asks for: residuals, and what one more of each number does to them.
+
+A derivative is taken from two doses, h and 2 h: (4 f(h) - f(2h) - 3 f(0)) / 2h, of second order [Abramowitz and Stegun, eq. 25.3.4 for
+one side]. The doses are as large as answers that are a hundredth of the residual, and less where the two do not agree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.model import Ask
+from dbbstation.errors import CalibrationError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from dbbstation.diagnosis.simulator.model import Answer, Model
+    from dbbstation.diagnosis.simulator.terms import Term
+
+    Run = Callable[[Sequence[Ask]], list[Answer]]
+
+
+class BudgetSpentError(CalibrationError):
+    """All simulations that were allowed have been run."""
+
+
+ANSWER = 0.01
+"""Answer to a dose, over the residual, both root mean squares: small enough to be linear, large beside what an integrator rounds."""
+
+ROOM = 30.0
+"""Factor by which an answer may be off that and is still taken."""
+
+AGREE = 0.1
+"""Share by which answers per dose of two sizes may differ: of second order, their difference then leaves a hundredth or so."""
+
+ROUNDS = 8
+"""Times that a dose may be changed until its answer has the right size."""
+
+UNSEEN = 1e-9
+"""Answer over the spread of the output below which there is none: digits run out there."""
+
+
+@dataclass(frozen=True)
+class State:
+    """Values of all numbers that are fitted.
+
+    Attributes:
+        values: of the parameters of the model, shape (k,).
+        terms: that are in the model, with their numbers.
+    """
+
+    values: tuple[float, ...]
+    terms: tuple[Term, ...] = ()
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """Values, then the numbers of the terms, shape (m,)."""
+        return np.array([*self.values, *(number for term in self.terms for number in term.numbers)])
+
+    def with_numbers(self, numbers: NDArray[np.float64]) -> State:
+        """The same terms with other numbers, shape (m,)."""
+        own, first, terms = numbers.tolist(), len(self.values), []
+        for term in self.terms:
+            terms.append(term.with_numbers(own[first : first + len(term.numbers)]))
+            first += len(term.numbers)
+        return State(tuple(own[: len(self.values)]), tuple(terms))
+
+    def moved(self, place: int, by: float) -> State:
+        """The same with one number moved."""
+        numbers = self.numbers
+        numbers[place] += by
+        return self.with_numbers(numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """What one more of some numbers does.
+
+    Attributes:
+        columns: to the simulated values, scaled as residuals are, shape (n, m).
+        curved: by how much the answers to two doses differ, over the answer, shape (m,).
+        seen: which have an answer at all, shape (m,).
+    """
+
+    columns: NDArray[np.float64]
+    curved: NDArray[np.float64]
+    seen: NDArray[np.bool_]
+
+
+@dataclass(eq=False)
+class Work:
+    """Simulations of a model.
+
+    Attributes:
+        model: that is simulated.
+        run: simulates; what was simulated before is not simulated again.
+        scales: unit of the residual of each output, in that of the output, shape (o,).
+        doses: that gave answers of the right size, by number.
+    """
+
+    model: Model
+    run: Run
+    scales: NDArray[np.float64]
+    doses: dict[tuple[str, ...], float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        ends = np.cumsum([0, *(len(run) for run in self.model.runs for _ in self.model.outputs)])
+        self.blocks = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        self.time = np.concatenate([run.inputs["t"] for run in self.model.runs for _ in self.model.outputs])
+        outputs = [o.name for o in self.model.outputs]
+        self.measured = np.concatenate([run.measured[name] for run in self.model.runs for name in outputs])
+        self.scale = np.concatenate([np.full(len(run), s) for run in self.model.runs for s in self.scales])
+
+    @property
+    def size(self) -> int:
+        """Rows of all runs and outputs."""
+        return len(self.time)
+
+    def simulated(self, states: Sequence[State], *, strict: bool = True) -> list[NDArray[np.float64]]:
+        """Simulated values of all rows at each state, in units of the outputs, shape (n,).
+
+        Raises:
+            CalibrationError: one ran away, if `strict`.
+        """
+        runs = range(len(self.model.runs))
+        asks = [Ask(run, self.model.of_run(run, state.values), state.terms) for state in states for run in runs]
+        answers, found = self.run(asks), []
+        for k in range(len(states)):
+            own = answers[k * len(runs) : (k + 1) * len(runs)]
+            found.append(np.concatenate([answer.outputs.ravel() for answer in own]))
+            if strict and not np.isfinite(found[-1]).all():
+                where = next(
+                    ask for ask, a in zip(asks[k * len(runs) :], own, strict=False) if not np.isfinite(a.outputs).all()
+                )
+                raise CalibrationError(
+                    "the simulation ran away: its outputs are not finite", where=told(self.model, where), remedy=MEND
+                )
+        return found
+
+    def residuals(self, states: Sequence[State], *, strict: bool = True) -> list[NDArray[np.float64]]:
+        """Measured less simulated values, scaled, shape (n,)."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return [(self.measured - values) / self.scale for values in self.simulated(states, strict=strict)]
+
+    def signals(self, state: State) -> dict[str, dict[str, NDArray[np.float64]]]:
+        """Signals at all ports, by port and name, of all calls in all runs."""
+        runs = range(len(self.model.runs))
+        answers = self.run([Ask(k, self.model.of_run(k, state.values), state.terms, records=True) for k in runs])
+        return {
+            port.name: {
+                name: np.concatenate([answer.signals[port.name][name] for answer in answers])
+                for name in ("t", *port.signals)
+            }
+            for port in self.model.ports
+        }
+
+    def answers(self, state: State, directions: Sequence[Direction], size: float) -> Answers:
+        """Answers to small doses.
+
+        Args:
+            state: about which.
+            directions: what is dosed.
+            size: of the residual, root mean square.
+        """
+        before = self.residuals([state])[0]
+        floor = UNSEEN * float(np.std(self.measured / self.scale))
+        wanted = max(ANSWER * size, 100.0 * floor)
+        columns, curved = np.zeros((len(before), len(directions))), np.full(len(directions), np.inf)
+        seen = np.zeros(len(directions), dtype=bool)
+        doses = np.array([self.doses.get(one.key, one.dose) for one in directions])
+        open_ = list(range(len(directions)))
+        for _ in range(ROUNDS):
+            if not open_:
+                break
+            once = self.residuals([directions[k].at(state, doses[k]) for k in open_], strict=False)
+            again, good = [], []
+            for k, after in zip(open_, once, strict=True):
+                moved = _rms(before - after) if np.isfinite(after).all() else np.inf
+                if wanted / ROOM <= moved <= wanted * ROOM:
+                    good.append((k, before - after))
+                else:
+                    with np.errstate(divide="ignore"):
+                        doses[k] *= float(np.clip(wanted / moved, 1e-4, 1e4)) if moved > 0.0 else 1e4
+                    again.append(k)
+            twice = self.residuals([directions[k].at(state, 2.0 * doses[k]) for k, _ in good], strict=False)
+            for (k, first), after in zip(good, twice, strict=True):
+                second = before - after
+                column = (4.0 * first - second) / (2.0 * doses[k])
+                if not np.isfinite(column).all():
+                    doses[k] *= 0.1
+                    again.append(k)
+                    continue
+                apart = _rms(second / 2.0 - first) / max(abs(doses[k]) * _rms(column), 1e-300)
+                if apart < curved[k]:
+                    columns[:, k], curved[k], seen[k] = column, apart, True
+                    self.doses[directions[k].key] = float(doses[k])
+                if apart > AGREE:
+                    doses[k] *= 0.2
+                    again.append(k)
+            open_ = again
+        return Answers(columns, np.where(seen, curved, 0.0), seen)
+
+
+@dataclass(frozen=True)
+class Direction:
+    """One number that is dosed: one of the state, or one of a term that is not in it.
+
+    Attributes:
+        key: by which its dose is remembered.
+        dose: to begin with; its sign is the side.
+        place: among the numbers of the state; of the term where there is one.
+        term: that is not in the state yet; None where the number is one of the state.
+    """
+
+    key: tuple[str, ...]
+    dose: float
+    place: int
+    term: Term | None = None
+
+    def at(self, state: State, dose: float) -> State:
+        """State with the dose."""
+        if self.term is None:
+            return state.moved(self.place, dose)
+        numbers = list(self.term.numbers)
+        numbers[self.place] += dose
+        return replace(state, terms=(*state.terms, self.term.with_numbers(numbers)))
+
+
+def told(model: Model, ask: Ask) -> str:
+    """A simulation in words: its run, parameters and terms."""
+    values = ", ".join(f"{key} = {value:.6g}" for key, value in ask.parameters)
+    terms = "".join(f"; {term.name}: {', '.join(f'{n:.4g}' for n in term.numbers)}" for term in ask.terms)
+    return f"{model.runs[ask.run].name} with {values}{terms}"
+
+
+MEND = "narrow the bounds of the parameters, or mend `simulate` for these values"
+
+
+def sizes(columns: Mapping[str, NDArray[np.float64]]) -> dict[str, float]:
+    """Greatest absolute value of each signal; one where it is zero throughout."""
+    return {name: float(np.abs(values).max(initial=0.0)) or 1.0 for name, values in columns.items()}
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

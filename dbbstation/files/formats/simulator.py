@@ -1,0 +1,221 @@
+"""`dbb-simulator/1`: a simulator of one's own, its parameters, outputs, and ports at which something may act."""
+
+from __future__ import annotations
+
+import ast
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
+from dbbstation.files.yaml.schema import Schema, read_document, validate
+
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Self
+
+    from dbbstation.files.yaml.text import Location, YamlDocument
+
+
+def _name(text: str) -> str:
+    if not text.isidentifier() or text.startswith("_"):
+        raise PydanticCustomError("name", "`{text}` is no name that a Python program can use", {"text": text})
+    return text
+
+
+Name = Annotated[str, AfterValidator(_name)]
+"""What a Python program can call something."""
+
+BASE = "Simulator"
+"""Class that a simulator derives from."""
+
+CONTRACT = "see `A simulator in the loop` in docs/mismatch-simulator.md"
+
+
+class ParameterSchema(Schema):
+    """One number of the simulator that is fitted anew."""
+
+    value: float
+    """What it is set to, in its unit."""
+    unit: str = ""
+    """Its unit, as printed."""
+    uncertainty: Annotated[float, Field(gt=0.0)] | None = None
+    """Standard uncertainty to which it is known, in its unit; absent: nothing is known of it but the bounds."""
+    low: float | None = None
+    """Least value that it can have."""
+    high: float | None = None
+    """Greatest value that it can have."""
+
+    @model_validator(mode="after")
+    def _inside(self) -> Self:
+        low = -float("inf") if self.low is None else self.low
+        high = float("inf") if self.high is None else self.high
+        if not low < high:
+            raise PydanticCustomError("bounds", "`low` {low} is not below `high` {high}", {"low": low, "high": high})
+        if not low <= self.value <= high:
+            what = {"value": self.value, "low": low, "high": high}
+            raise PydanticCustomError("bounds", "the value {value} is outside the bounds {low} to {high}", what)
+        return self
+
+
+class OutputSchema(Schema):
+    """One quantity that is measured and simulated."""
+
+    column: Annotated[str, Field(min_length=1)]
+    """Column of the measured values in the recordings."""
+    unit: str = ""
+    """Unit of both."""
+    filter_s: Annotated[float, Field(gt=0.0)] | None = None
+    """Time constant of the sensor's filter, of first order, which simulated values pass [s]; absent: none."""
+
+
+class PortSchema(Schema):
+    """One place of the simulator where something may act."""
+
+    about: str = ""
+    """What it is, in words."""
+    unit: str = ""
+    """Unit of what acts there."""
+    signals: dict[Name, str] = Field(default_factory=dict)
+    """Quantities that are known there, with their units; angles in rad, deg or turn."""
+
+
+class SimulatorFile(Schema):
+    """A simulator in the loop."""
+
+    format: Literal["dbb-simulator/1"]
+    """Name and version of this format."""
+    name: Annotated[str, Field(min_length=1)]
+    """What people call it."""
+    python: Annotated[str, Field(min_length=1)]
+    """Python file with a class that derives from `Simulator`, beside this file. It is executed."""
+    time: Annotated[str, Field(min_length=1)]
+    """Column of the recordings that says when, rising [s]."""
+    inputs: dict[Name, str] = Field(default_factory=dict)
+    """Columns of the recordings that the simulator is given, by the name that it is given them by; `t` is the time."""
+    parameters: dict[Name, ParameterSchema] = Field(default_factory=dict)
+    """Numbers that are fitted anew with everything that is tried."""
+    states: dict[Name, ParameterSchema] = Field(default_factory=dict)
+    """Initial states: the same, but for each recording by itself."""
+    outputs: Annotated[dict[Name, OutputSchema], Field(min_length=1)]
+    """What is compared; several count by the noise of each."""
+    ports: Annotated[dict[Name, PortSchema], Field(min_length=1)]
+    """Where something may act."""
+    time_limit_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 60.0
+    """Longest time that one simulation may take [s]; one that takes longer is refused with its input."""
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        if twice := sorted(set(self.parameters) & set(self.states)):
+            raise PydanticCustomError("twice", "`{one}` is a parameter and a state", {"one": twice[0]})
+        if "t" in self.inputs:
+            raise PydanticCustomError("time", "the input `t` is the time already; give it another name", {})
+        for name, port in self.ports.items():
+            if "t" in port.signals:
+                raise PydanticCustomError("time", "the signal `t` of port `{port}` is the time already", {"port": name})
+        return self
+
+
+def parse_simulator(path: Path, faults: list[Problem]) -> SimulatorFile | None:
+    """Read a simulator's file and look through its Python file, which is not executed; None with every fault added to `faults`."""
+    document = read_document(path, SimulatorFile, faults)
+    found = None if document is None else validate(document, SimulatorFile, faults)
+    if document is None or found is None:
+        return None
+    before = len(faults)
+    _look_through(path, document, found, faults)
+    return found if len(faults) == before else None
+
+
+def read_simulator(path: Path) -> SimulatorFile:
+    """Read a simulator's file.
+
+    Raises:
+        InputError: every fault of the file and of its Python file, with its place.
+    """
+    faults: list[Problem] = []
+    found = parse_simulator(path, faults)
+    if found is None or faults:
+        raise InputError(faults)
+    return found
+
+
+def _look_through(path: Path, document: YamlDocument, found: SimulatorFile, faults: list[Problem]) -> None:
+    """Whether the Python file has one simulator, and calls the ports that there are."""
+    source = path.parent / found.python
+    own: list[Problem] = []
+    data = read_bytes(source, own, LARGEST_PROGRAM)
+    text = None if data is None else decode(data, str(source), own)
+    if text is None:
+        what = f"`{found.python}` cannot be read: {own[0].what if own else 'it is no text'}"
+        faults.append(document.problem(("python",), what, "name a Python file beside this one"))
+        return
+    try:
+        tree = ast.parse(text)
+    except (SyntaxError, ValueError) as error:
+        line = getattr(error, "lineno", 0) or 0
+        faults.append(Problem(str(source), line, 0, f"is not Python: {error}", "mend the line"))
+        return
+    arguments = _arguments(tree, str(source), faults)
+    if not arguments:
+        return
+    ports, called = arguments[-1], _called(tree, arguments[-1])
+    for name, line in called.items():
+        if name not in found.ports:
+            what = f"`{ports}.{name}` is no port of {path.name}"
+            faults.append(Problem(str(source), line, 0, what, f"there are {', '.join(found.ports)}"))
+    for name in found.ports:
+        if name not in called and not _computed(tree, ports):
+            at: Location = ("ports", name)
+            what = f"port `{name}` is never called in {found.python}"
+            remedy = f"call `{ports}.{name}(t, signals)` where it acts"
+            faults.append(document.problem(at, what, remedy, at_key=True))
+
+
+def _arguments(tree: ast.AST, source: str, faults: list[Problem]) -> list[str]:
+    """Names of the arguments of `simulate` in the only simulator of a file; none with the fault added."""
+    classes = [
+        n for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and any(_last(base) == BASE for base in n.bases)
+    ]
+    if len(classes) != 1:
+        many = f"{len(classes)} classes derive" if classes else "no class derives"
+        line = classes[1].lineno if classes else 0
+        faults.append(Problem(source, line, 0, f"{many} from {BASE}, one is expected", CONTRACT))
+        return []
+    method = next((n for n in ast.walk(classes[0]) if isinstance(n, ast.FunctionDef) and n.name == "simulate"), None)
+    arguments = [argument.arg for argument in method.args.args] if method else []
+    if len(arguments) == ARGUMENTS:
+        return arguments
+    what = f"`simulate` takes {', '.join(arguments)}; self, inputs, parameters and ports are expected"
+    if method is None:
+        what = "`simulate(self, inputs, parameters, ports)` is not there"
+    faults.append(Problem(source, (method or classes[0]).lineno, 0, what, CONTRACT))
+    return []
+
+
+def _called(tree: ast.AST, ports: str) -> dict[str, int]:
+    """Attributes of an argument, each with the line where it first stands."""
+    found: dict[str, int] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == ports:
+            found.setdefault(node.attr, node.lineno)
+    return found
+
+
+def _computed(tree: ast.AST, ports: str) -> bool:
+    """Whether ports are handed on or looked up by a name that is worked out: then nobody can say which are called."""
+    plain = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)}
+    return any(isinstance(n, ast.Name) and n.id == ports and id(n) not in plain for n in ast.walk(tree))
+
+
+def _last(node: ast.expr) -> str:
+    """Last part of a name such as `contract.Simulator`."""
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+ARGUMENTS = 4
+"""Of `simulate`, `self` among them."""

@@ -1,0 +1,84 @@
+"""Figure of a simulator in the loop: what it leaves before and after, over time and over the leading signal, and held-out errors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from dbbstation.report.drawing import AFTER, BEFORE, MEASURED, in_style
+from dbbstation.report.figure_format import FigureFormat, Stamped, in_format
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from dbbstation.diagnosis.simulator.answer import Answer
+
+MOST_POINTS = 2000
+"""Points of a cloud that are drawn: more make a large file and the same picture."""
+
+
+def simulator_figure(answer: Answer, wanted: FigureFormat | Stamped = FigureFormat.SVG) -> bytes:
+    """Draw measured less simulated values, refitted and corrected, and the held-out error of every part."""
+    with in_style():
+        figure = Figure(figsize=(7.2, 6.4), layout="constrained")
+        grid = figure.add_gridspec(2, 2)
+        _over_time(figure.add_subplot(grid[0, :]), answer)
+        _over_signal(figure.add_subplot(grid[1, 0]), answer)
+        _held_out(figure.add_subplot(grid[1, 1]), answer)
+        return in_format(figure, wanted)
+
+
+def _over_time(axes: Axes, answer: Answer) -> None:
+    rows, step = np.arange(answer.work.size), max(answer.work.size // MOST_POINTS, 1)
+    for left, colour, label in (
+        (answer.base.fitted.residual, BEFORE, "refitted"),
+        (answer.found.residual, AFTER, "corrected"),
+    ):
+        axes.plot(rows[::step], left[::step], color=colour, label=label, linewidth=0.8)
+    axes.set_xlabel("row")
+    axes.set_ylabel(_label(answer))
+    axes.legend()
+
+
+def _over_signal(axes: Axes, answer: Answer) -> None:
+    """Over the signal that leads the first term; over the simulated value where the port is not called at the rows."""
+    name, values = "simulated value", answer.work.measured - answer.as_simulated * answer.work.scale
+    if answer.terms and answer.terms[0].signals:
+        term = answer.terms[0]
+        signals = answer.work.signals(answer.found.state)[term.port]
+        if len(answer.model.runs) == 1 and len(answer.model.outputs) == 1:
+            times, first = np.unique(signals["t"], return_index=True)
+            values = np.interp(answer.work.time, times, signals[term.signals[0]][first])
+            name = f"{term.signals[0]} at {term.port}"
+    step = max(len(values) // MOST_POINTS, 1)
+    axes.plot(
+        values[::step], answer.base.fitted.residual[::step], ".", color=MEASURED, markersize=1.5, label="refitted"
+    )
+    axes.plot(values[::step], answer.found.residual[::step], ".", color=AFTER, markersize=1.5, label="corrected")
+    axes.set_xlabel(name)
+    axes.set_ylabel(_label(answer))
+    axes.legend()
+
+
+def _held_out(axes: Axes, answer: Answer) -> None:
+    if answer.held_out is None:
+        axes.set_axis_off()
+        axes.text(0.5, 0.5, "held-out parts were not asked for", ha="center", va="center")
+        return
+    places = np.arange(len(answer.held_out.folds)) + 1
+    for errors, colour, label in (
+        ([fold.before for fold in answer.held_out.folds], BEFORE, "refitted"),
+        ([fold.after for fold in answer.held_out.folds], AFTER, "corrected"),
+    ):
+        axes.plot(places, errors, "o-", color=colour, label=label, markersize=3)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("held-out part")
+    axes.set_ylabel(f"error, {answer.model.outputs[0].unit} rms".replace(",  rms", ", rms"))
+    axes.legend()
+
+
+def _label(answer: Answer) -> str:
+    unit = answer.model.outputs[0].unit
+    return f"measured less simulated{f', {unit}' if unit else ''}"

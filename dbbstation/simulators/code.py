@@ -1,0 +1,118 @@
+"""Terms that were found as Python code to paste into the simulator."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.candidates import basis
+from dbbstation.diagnosis.simulator.terms import Form
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from dbbstation.diagnosis.simulator.answer import Answer
+    from dbbstation.diagnosis.simulator.terms import Term
+
+_PLAIN = {
+    Form.CONSTANT: "{a}",
+    Form.LINEAR: "{a} * x",
+    Form.SQUARE: "{a} * x**2",
+    Form.DRAG: "{a} * x * abs(x)",
+    Form.CUBIC: "{a} * x**3",
+    Form.SIGN: "{a} * x / math.sqrt(x**2 + {s} ** 2)",
+    Form.HINGE: "{a} * max(x - {s}, 0.0)",
+    Form.LIMIT: "{a} * min(max(x, -{s}), {s})",
+    Form.PRODUCT: "{a} * x * z",
+    Form.PERIODIC: "{a} * math.cos({turns} * x) + {b} * math.sin({turns} * x)",
+}
+
+_BEHIND = """    if before is not None and {tau} > 0.0:
+        rate = (t - before[0]) / {tau}
+        behind = before[2] * math.exp(-rate) + (x - before[1]) * math.expm1(-rate) / rate
+    else:
+        behind = 0.0
+    return {out}, (t, x, behind)"""
+
+_APART = """    apart = 0.0 if before is None else min(max(before[2] + before[1] - x, -{half}), {half})
+    return {out}, (t, x, apart)"""
+
+_LATE = """    times, values = before or ([], [])
+    times, values = [*times, t], [*values, x]
+    return float(np.interp(t - {a}, times, values)) - x, (times, values)"""
+
+
+def missing_code(answer: Answer) -> str:
+    """Text of a Python module with a function for each term: `value(t, signals)`, or with a state for those with a memory."""
+    lines = [
+        f'"""What {answer.model.name} lacks, as found from its recordings. Add each term at its port."""',
+        "",
+        "import math",
+        "",
+        "import numpy as np",
+    ]
+    verdicts = {finding.name: finding for finding in answer.findings}
+    for term in answer.terms:
+        finding = verdicts.get(term.name)
+        lines += ["", "", *_function(term, str(finding.verdict) if finding else "", _values(finding))]
+    return "\n".join(lines) + "\n"
+
+
+def _values(finding: object) -> list[str]:
+    values = getattr(finding, "values", {})
+    return [f"{name}: {one.value:.6g} ± {one.uncertainty:.2g} {one.unit}".rstrip() for name, one in values.items()]
+
+
+def function_name(term: Term) -> str:
+    """Name of a term's function."""
+    return "_".join([term.port, *term.name.split(" at ")[0].replace("-", " ").split()]).lower()
+
+
+def _function(term: Term, verdict: str, values: Sequence[str]) -> list[str]:
+    a = repr(float(term.amplitudes[0]))
+    shape = repr(float(term.shape[0])) if term.shape else "0.0"
+    remembers = _body(term, a, shape)
+    arguments = "t, signals, before=None" if remembers else "t, signals"
+    said = [f'    """{term.name[0].upper()}{term.name[1:]}: {verdict}.', "", *(f"    {one}" for one in values)]
+    if remembers:
+        said += ["", "    Returns the value and the state; hand the state of the last accepted step back as `before`."]
+    signals = [f"    {name} = signals[{signal!r}]" for name, signal in zip("xz", term.signals, strict=False)]
+    head = [f"def {function_name(term)}({arguments}):", *said, '    """', *signals]
+    if remembers:
+        return [*head, remembers]
+    if term.form is Form.OWN:
+        numbers = ", ".join(repr(float(number)) for number in term.numbers)
+        return [*head, f"    return own_value(t, signals, ({numbers},))  # physics of your own"]
+    if term.form is Form.CURVE:
+        return [*head, *_curve(term)]
+    b = repr(float(term.amplitudes[1])) if len(term.amplitudes) > 1 else ""
+    turns = f"2.0 * math.pi * {term.fixed[1]} / {term.fixed[0]!r}" if term.form is Form.PERIODIC else ""
+    return [*head, "    return " + _PLAIN[term.form].format(a=a, s=shape, b=b, turns=turns)]
+
+
+def _curve(term: Term) -> list[str]:
+    places = np.linspace(term.fixed[0], term.fixed[-1], POINTS)
+    values = basis(term, places) @ np.array(term.amplitudes)
+    return [
+        f"    places = np.linspace({term.fixed[0]!r}, {term.fixed[-1]!r}, {POINTS})",
+        f"    values = {[float(f'{value:.6g}') for value in values]!r}",
+        "    return float(np.interp(x, places, values))",
+    ]
+
+
+POINTS = 41
+"""Places at which a curve is written out."""
+
+
+def _body(term: Term, a: str, shape: str) -> str:
+    """Body of a term with a memory; empty for the others."""
+    if term.form is Form.MEMORY:
+        return _BEHIND.format(tau=shape, out=f"{a} * (x + behind)")
+    if term.form is Form.LAG:
+        return _BEHIND.format(tau=a, out="behind")
+    if term.form is Form.PLAY:
+        return _APART.format(half=a, out="apart")
+    if term.form is Form.SLIP:
+        return _APART.format(half=shape, out=f"-{a} * apart / {shape}")
+    return _LATE.format(a=a) if term.form is Form.DELAY else ""

@@ -1,0 +1,193 @@
+"""A simulator and its recordings, from their files to what is compared."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import lru_cache
+from inspect import isabstract
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dbbstation.catalogue import in_words, line_in
+from dbbstation.diagnosis.simulator.contract import Simulator
+from dbbstation.diagnosis.simulator.model import Model, Output, Parameter, Port, Recorded
+from dbbstation.diagnosis.simulator.own import PortSource
+from dbbstation.errors import InputError, Problem
+from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
+from dbbstation.files.gateway import content_of
+from dbbstation.files.own_classes import classes_in_files
+from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from dbbstation.files.formats.number_language import NumberLanguage
+    from dbbstation.files.formats.simulator import ParameterSchema
+
+FEWEST_ROWS = 30
+"""Rows that all recordings need together at the least, as for tables."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """A simulator with its recordings.
+
+    Attributes:
+        path: of `model.yaml`.
+        python: of the simulator.
+        file: what `model.yaml` says.
+        model: what is compared.
+        tables: recordings as they were read.
+        own: physics of the user's own at ports.
+        own_files: that it came from.
+    """
+
+    path: Path
+    python: Path
+    file: SimulatorFile
+    model: Model
+    tables: tuple[TableFile, ...]
+    own: tuple[PortSource, ...]
+    own_files: tuple[Path, ...]
+
+    @property
+    def content(self) -> str:
+        """Hash of the simulator's files: simulations of other content are others."""
+        digest = hashlib.sha256()
+        for path in (self.path, self.python, *self.own_files):
+            digest.update(hashlib.sha256(content_of(path)).digest())
+        return digest.hexdigest()
+
+
+def load_simulator(
+    path: Path, recordings: Sequence[Path], own_files: Sequence[Path] = (), numbers: NumberLanguage | None = None
+) -> Loaded:
+    """Read a simulator, its recordings, and physics of the user's own. Python files are executed.
+
+    Raises:
+        InputError: every fault of every file with its line.
+    """
+    file = read_simulator(path)
+    faults: list[Problem] = []
+    tables = _tables(file, recordings, numbers, faults)
+    if faults:
+        raise InputError(faults[:MOST_FAULTS])
+    python = path.parent / file.python
+    simulator_of(python)
+    parameters = [_parameter(name, name, one) for name, one in file.parameters.items()]
+    several = len(tables) > 1
+    for run in range(len(tables)):
+        for name, one in file.states.items():
+            parameters.append(_parameter(f"{name} of run {run + 1}" if several else name, name, one, run))
+    model = Model(
+        file.name,
+        tuple(parameters),
+        tuple(Port(name, one.unit, dict(one.signals), one.about) for name, one in file.ports.items()),
+        tuple(Output(name, one.unit, one.filter_s or 0.0) for name, one in file.outputs.items()),
+        tuple(_recorded(file, table) for table in tables),
+    )
+    return Loaded(path, python, file, model, tables, tuple(_own(own_files, file)), tuple(own_files))
+
+
+def simulator_of(python: Path) -> Simulator:
+    """Simulator of a Python file, which is executed.
+
+    Raises:
+        InputError: it cannot be run, or has no simulator that can be made.
+    """
+    return _simulator_of(python, content_of(python))
+
+
+@lru_cache(maxsize=4)
+def _simulator_of(python: Path, _content: bytes) -> Simulator:
+    faults: list[Problem] = []
+    found = classes_in_files([python], Simulator, CONTRACT, faults)  # type: ignore[type-abstract]
+    if len(found) > 1 and not faults:
+        faults.append(Problem(str(python), found[1].place.line, 0, "there are two simulators in one file", CONTRACT))
+    if faults:
+        raise InputError(faults)
+    kind, place = found[0].kind, found[0].place
+    if isabstract(kind):
+        raise InputError([Problem(place.file, place.line, 0, f"{kind.__name__} lacks simulate", CONTRACT)])
+    try:
+        return kind()
+    except Exception as error:  # whatever the code of somebody else raises
+        line = line_in(error, place.file) or place.line
+        raise InputError([Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", CONTRACT)]) from error
+
+
+def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
+    """Physics of the user's own.
+
+    Raises:
+        InputError: faults of the files; a port that is not there.
+    """
+    faults: list[Problem] = []
+    found: dict[str, PortSource] = {}
+    for one_of in classes_in_files(files, PortSource, CONTRACT, faults) if files else ():  # type: ignore[type-abstract]
+        kind, place = one_of.kind, one_of.place
+        lacking = [name for name in ("name", "port") if not hasattr(kind, name)]
+        lacking += sorted(getattr(kind, "__abstractmethods__", ()))
+        if lacking:
+            faults.append(Problem(place.file, place.line, 0, f"{kind.__name__} lacks {', '.join(lacking)}", CONTRACT))
+            continue
+        one = kind()
+        if one.port not in file.ports:
+            what = f"`{one.port}` of {kind.__name__} is no port; there are {', '.join(file.ports)}"
+            faults.append(Problem(place.file, place.line, 0, what, "name one of them"))
+        elif one.name in found:
+            faults.append(Problem(place.file, place.line, 0, f"the name `{one.name}` is taken", "give it another name"))
+        found[one.name] = one
+    if faults:
+        raise InputError(faults)
+    return list(found.values())
+
+
+def _parameter(name: str, key: str, one: ParameterSchema, run: int | None = None) -> Parameter:
+    low = -np.inf if one.low is None else one.low
+    high = np.inf if one.high is None else one.high
+    return Parameter(name, key, one.value, one.unit, one.uncertainty, low, high, run)
+
+
+def _tables(
+    file: SimulatorFile, recordings: Sequence[Path], numbers: NumberLanguage | None, faults: list[Problem]
+) -> tuple[TableFile, ...]:
+    """Recordings that have every column as numbers, and times that rise."""
+    needed = list(dict.fromkeys([file.time, *file.inputs.values(), *(one.column for one in file.outputs.values())]))
+    found = []
+    for path in recordings:
+        try:
+            table = read_table(path, needed, numbers)
+        except InputError as error:
+            faults += error.problems
+            continue
+        found.append(table)
+        for name in needed:
+            faults += table.faults_of(name)
+            missing = np.flatnonzero(~np.isfinite(table.values[name]))
+            if len(missing) and not table.faults_of(name):
+                what = f"{name} has no number"
+                faults.append(
+                    Problem(table.file, int(table.lines[missing[0]]), 0, what, "leave out the row, or fill it")
+                )
+        back = np.flatnonzero(np.diff(table.values[file.time]) <= 0.0)
+        if len(back):
+            what = f"{file.time} does not rise"
+            faults.append(
+                Problem(table.file, int(table.lines[back[0] + 1]), 0, what, "order the rows by time; one run a file")
+            )
+    if not faults and sum(map(len, found)) < FEWEST_ROWS:
+        what = f"{sum(map(len, found))} rows are too few to compare, {FEWEST_ROWS} are needed"
+        faults.append(Problem(found[0].file, found[0].header, 0, what, "record more"))
+    return tuple(found)
+
+
+def _recorded(file: SimulatorFile, table: TableFile) -> Recorded:
+    inputs: dict[str, NDArray[np.float64]] = {"t": table.values[file.time]}
+    inputs |= {name: table.values[column] for name, column in file.inputs.items()}
+    return Recorded(table.file, inputs, {name: table.values[one.column] for name, one in file.outputs.items()})

@@ -1,0 +1,160 @@
+"""Simulations in processes of their own: on all cores, each once, limited in time and number."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import TimeoutError as TooLongError
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack
+from time import monotonic
+from typing import TYPE_CHECKING
+
+from dbbstation.catalogue import in_words, line_in
+from dbbstation.diagnosis.simulator.ports import simulated
+from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
+from dbbstation.errors import CalibrationError
+from dbbstation.processes import deaf, processes
+from dbbstation.simulators.loading import simulator_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from concurrent.futures import Future, ProcessPoolExecutor
+    from pathlib import Path
+    from types import TracebackType
+    from typing import Self
+
+    from dbbstation.diagnosis.simulator.model import Answer, Ask, Model
+    from dbbstation.simulators.loading import Loaded
+
+MOST_SECONDS = 600.0
+"""Time that simulations may take in all, where no number of them is given: a coffee."""
+
+SHORTEST_S = 1e-4
+"""Time of a simulation at the least, for what fits into that: handing one to another process takes about as much."""
+
+TOGETHER = 8
+"""Simulations that are handed to a process at once, where there are many: handing over takes a millisecond."""
+
+
+class Runs:
+    """Simulations of one simulator. Use it as a context: its processes end with it.
+
+    Args:
+        loaded: simulator with its recordings.
+        count: of processes; None: one for each core; 0: this one does it all, and nothing limits its time.
+        most: simulations that may be run; None: what ten minutes hold.
+    """
+
+    def __init__(self, loaded: Loaded, count: int | None = None, most: int | None = None) -> None:
+        self._loaded, self._model = loaded, loaded.model
+        self._count = (os.cpu_count() or 1) if count is None else count
+        self._known: dict[Ask, Answer] = {}
+        self._pool: ProcessPoolExecutor | None = None
+        self._stack = ExitStack()
+        self.ran, self.most, self.seconds = 0, most, 0.0
+
+    def __enter__(self) -> Self:
+        """Start the processes."""
+        if self._count:
+            self._pool = self._stack.enter_context(processes(self._count))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End them; those that still simulate are ended at once."""
+        self._stack.__exit__(kind, error, trace)
+
+    def __call__(self, asks: Sequence[Ask]) -> list[Answer]:
+        """Answers to all, from those that are known where they are.
+
+        Raises:
+            BudgetSpentError: more simulations than allowed would be run.
+            CalibrationError: one raised, returned what it should not, or took too long; with its input.
+        """
+        fresh = [ask for ask in dict.fromkeys(asks) if ask not in self._known]
+        if self.most is not None and self.ran + len(fresh) > self.most:
+            what = f"{self.ran} of {self.most} simulations are spent"
+            raise BudgetSpentError(what, where=str(self._loaded.path), remedy="allow more with --most-runs")
+        before = monotonic()
+        for ask, answer in zip(fresh, self._simulated(fresh), strict=True):
+            self._known[ask] = answer
+        self.seconds += monotonic() - before
+        self.ran += len(fresh)
+        return [self._known[ask] for ask in asks]
+
+    @property
+    def left_s(self) -> float | None:
+        """Time that the simulations that are left will take about; None where nothing limits their number."""
+        if self.most is None or not self.ran:
+            return None
+        return (self.most - self.ran) * self.seconds / self.ran
+
+    def allow(self, first: Sequence[Ask]) -> float:
+        """Run a first simulation, set the number that may be run where none was given, and return its time [s]."""
+        self(first)  # whatever a process does once only is no part of a simulation's time
+        again = list(dict.fromkeys(first))
+        before = monotonic()
+        self._simulated(again)
+        one = max((monotonic() - before) / max(len(again), 1), SHORTEST_S)
+        if self.most is None:
+            self.most = int(MOST_SECONDS / one) * max(self._count, 1)
+        self(first)
+        self.seconds = one * self.ran
+        return one
+
+    def _simulated(self, asks: Sequence[Ask]) -> list[Answer]:
+        if self._pool is None:
+            return [_one(self._loaded.python, self._model, ask) for ask in asks]
+        together = max(min(TOGETHER, len(asks) // (2 * self._count)), 1)
+        parts = [asks[k : k + together] for k in range(0, len(asks), together)]
+        try:
+            with deaf():
+                futures = [self._pool.submit(_several, self._loaded.python, self._model, part) for part in parts]
+            return [
+                answer for part, future in zip(parts, futures, strict=True) for answer in self._result(part, future)
+            ]
+        except BrokenProcessPool as error:
+            what = "a process that simulates was ended"
+            raise CalibrationError(
+                what, where=told(self._model, asks[0]), remedy="it may lack memory, or crash there"
+            ) from error
+
+    def _result(self, part: Sequence[Ask], future: Future[list[Answer]]) -> list[Answer]:
+        limit = self._loaded.file.time_limit_s
+        # Those before it in the queue take their time, too, and a process is started first.
+        allowed = STARTING_S + limit * len(part) * 2.0
+        try:
+            return future.result(allowed)
+        except TooLongError:
+            for process in getattr(self._pool, "_processes", {}).values():
+                process.terminate()
+            what = f"a simulation takes longer than {limit:g} s"
+            remedy = "raise `time_limit_s`, or narrow the bounds of the parameters"
+            raise CalibrationError(what, where=told(self._model, part[0]), remedy=remedy) from None
+
+
+STARTING_S = 20.0
+"""Time that a process may take until it simulates."""
+
+
+def _several(python: Path, model: Model, asks: Sequence[Ask]) -> list[Answer]:
+    return [_one(python, model, ask) for ask in asks]
+
+
+def _one(python: Path, model: Model, ask: Ask) -> Answer:
+    """One simulation.
+
+    Raises:
+        CalibrationError: it failed; says with which input, and in which line.
+    """
+    simulator = simulator_of(python)
+    try:
+        return simulated(simulator, model, ask)
+    except Exception as error:
+        line = line_in(error, str(python))
+        where = f"{python}:{line}" if line else str(python)
+        what = f"the simulation failed: {in_words(error)}"
+        raise CalibrationError(
+            what, where=f"{where}, {told(model, ask)}", remedy="mend `simulate` for this input"
+        ) from error

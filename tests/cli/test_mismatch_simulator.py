@@ -1,0 +1,150 @@
+"""`mismatch --simulator`: what is printed and written, and what is refused with its reason."""
+
+import json
+import math
+import runpy
+
+import numpy as np
+import pytest
+
+from dbbstation.files.shipped import shipped_folder
+
+FOLDER = shipped_folder("fixtures") / "simulators"
+ASKED = ("mismatch", FOLDER / "pendulum.csv", "--simulator", FOLDER / "pendulum.yaml")
+
+YAML = """format: dbb-simulator/1
+name: decay
+python: decay.py
+time: t_s
+parameters:
+  rate: {value: 0.4, unit: 1/s, low: 0.1, high: 2}
+states:
+  level: {value: 1.0, unit: m}
+outputs:
+  level: {column: level_m, unit: m}
+ports:
+  flow: {unit: m/s, signals: {level: m}}
+time_limit_s: 0.5
+"""
+PYTHON = """import time
+import numpy as np
+from dbbstation.diagnosis.simulator.contract import Simulator
+
+
+class Decay(Simulator):
+    def simulate(self, inputs, parameters, ports):
+        t, level, found = inputs["t"], parameters["level"], []
+        FAULT
+        for k in range(len(t)):
+            found.append(level)
+            step = t[min(k + 1, len(t) - 1)] - t[k]
+            level += step * (ports.flow(t[k], {"level": level}) - parameters["rate"] * level)
+        return {"level": np.array(found)}
+"""
+
+
+@pytest.fixture
+def decay(tmp_path):
+    def make(fault="pass"):
+        (tmp_path / "model.yaml").write_text(YAML)
+        (tmp_path / "decay.py").write_text(PYTHON.replace("FAULT", fault))
+        t = np.arange(100) * 0.05
+        levels = 2.0 * np.exp(-0.5 * t) + 0.001 * np.random.default_rng(1).standard_normal(100)
+        rows = "\n".join(f"{a:.3f},{b:.6f}" for a, b in zip(t, levels, strict=True))
+        (tmp_path / "run.csv").write_text(f"t_s,level_m\n{rows}\n")
+        return ("mismatch", tmp_path / "run.csv", "--simulator", tmp_path / "model.yaml", "--no-held-out")
+
+    return make
+
+
+@pytest.mark.slow
+def test_the_drag_of_the_example_is_found_and_written(run, tmp_path):
+    out, corrected, figure = (tmp_path / name for name in ("missing.py", "corrected.csv", "figure.svg"))
+    outcome = run(*ASKED, "--no-held-out", "--json", "--out", out, "--corrected", corrected, "--figure", figure)
+    assert outcome.code == 0, outcome.err
+    (found,) = [f for f in outcome.data["findings"] if f["verdict"] == "identified"]
+    assert found["name"] == "quadratic drag of speed at shaft"
+    value = found["values"]["coefficient"]
+    assert value["value"] == pytest.approx(-0.0012, abs=3.0 * value["uncertainty"])
+    assert outcome.data["held_out"] == "not-tested"
+    damping = next(p for p in outcome.data["parameters"] if p["name"] == "damping")
+    assert damping["corrected"]["value"] == pytest.approx(0.008, abs=0.0005)
+    assert damping["refitted"]["value"] > 0.012
+
+    # The term as code does what was found.
+    term = runpy.run_path(str(out))["shaft_quadratic_drag_of_speed"]
+    assert term(0.0, {"speed": -3.0}) == pytest.approx(-9.0 * value["value"], rel=1e-6)
+
+    table = np.genfromtxt(corrected, delimiter=",", names=True)
+    left = table["angle_measured"] - table["angle_corrected"]
+    assert math.sqrt(np.mean(left**2)) == pytest.approx(outcome.data["rms"]["corrected"], rel=1e-3)
+    assert figure.read_text(encoding="utf-8").startswith("<?xml")
+
+
+def test_how_many_simulations_are_allowed_is_said_beforehand_and_where_it_ended(run, decay):
+    outcome = run(*decay(), "--most-runs", "60")
+    assert "60 are allowed at the most" in outcome.err
+    assert outcome.code != 0 or "Ended early" in outcome.out
+    assert "60" in outcome.out + outcome.err
+
+
+def test_a_simulator_that_lacks_nothing_is_told_so(run, decay):
+    outcome = run(*decay())
+    assert outcome.code == 0, outcome.err
+    assert "No mismatch" in outcome.out
+    assert "identified" not in outcome.out
+
+
+def test_a_simulation_that_fails_is_refused_with_its_line_and_input(run, decay):
+    outcome = run(*decay("if parameters['rate'] != 0.4: raise RuntimeError('no water')"))
+    assert outcome.code == 1
+    assert "decay.py:9" in outcome.err
+    assert "no water" in outcome.err
+    assert "rate = " in outcome.err
+
+
+def test_a_simulation_that_takes_too_long_is_refused_with_its_input(run, decay, monkeypatch):
+    monkeypatch.setattr("dbbstation.simulators.running.STARTING_S", 5.0)
+    outcome = run(*decay("time.sleep(30)"))
+    assert outcome.code == 1
+    assert "takes longer than 0.5 s" in outcome.err
+    assert "rate = 0.4" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--measured", "level_m"), "--measured belongs to a table"),
+        (("--most-runs", "0"), "most-runs"),
+    ],
+)
+def test_options_of_tables_are_refused(run, decay, more, said):
+    outcome = run(*decay(), *more)
+    assert outcome.code == 2
+    assert said in outcome.err
+
+
+def test_tables_need_their_columns(run, decay):
+    asked = decay()
+    outcome = run(*asked[:2])
+    assert outcome.code == 2
+    assert "--measured and --simulated" in outcome.err
+
+
+def test_a_time_that_goes_back_is_refused_with_its_line(run, decay, tmp_path):
+    asked = decay()
+    lines = (tmp_path / "run.csv").read_text().splitlines()
+    lines[5], lines[6] = lines[6], lines[5]
+    (tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
+    outcome = run(*asked)
+    assert outcome.code == 1
+    assert "run.csv:7" in outcome.err
+    assert "does not rise" in outcome.err
+
+
+def test_the_help_names_the_simulator(run):
+    assert "--simulator" in run("mismatch", "--help").out
+
+
+def test_json_is_json(run, decay):
+    assert json.loads(run(*decay(), "--json").out)["simulator"] == "decay"

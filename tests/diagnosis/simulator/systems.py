@@ -1,0 +1,228 @@
+"""Simulators with concealed effects: each lacks one thing that its recording has, and has parameters that can hide part of it.
+
+The recordings come from the same integrator with the truth at a port, in steps ten times as fine, with noise.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dbbstation.diagnosis.simulator.answer import find
+from dbbstation.diagnosis.simulator.contract import Simulator
+from dbbstation.diagnosis.simulator.model import Model, Output, Parameter, Port, Recorded
+from dbbstation.diagnosis.simulator.ports import simulated
+
+SUBSTEPS = 2
+
+
+class Stepped(Simulator):
+    """Heun's method over `rate(t, state, u, parameters, ports)`; the input is held for a row."""
+
+    def __init__(self, rate, seen, states, substeps=SUBSTEPS):
+        self.rate, self.seen, self.states, self.substeps = rate, seen, states, substeps
+
+    def simulate(self, inputs, parameters, ports):
+        times = inputs["t"].tolist()
+        names = [name for name in inputs if name != "t"]
+        rows = list(zip(*(inputs[name].tolist() for name in names), strict=True))
+        state, p = [parameters[name] for name in self.states], parameters
+        found = []
+        for k, t in enumerate(times):
+            u = dict(zip(names, rows[k], strict=True))
+            found.append(self.seen(t, state, u, p, ports))
+            if k + 1 == len(times):
+                break
+            h = (times[k + 1] - t) / self.substeps
+            for n in range(self.substeps):
+                a = self.rate(t + n * h, state, u, p, ports)
+                b = self.rate(t + (n + 1) * h, [x + h * dx for x, dx in zip(state, a, strict=True)], u, p, ports)
+                state = [x + 0.5 * h * (dx + dy) for x, dx, dy in zip(state, a, b, strict=True)]
+        return {"out": np.array(found)}
+
+
+@dataclass(frozen=True)
+class System:
+    """A simulator, its truth, and what may be said of it.
+
+    Attributes:
+        make: a simulator with so many substeps.
+        parameters: name to true value and value to begin with.
+        states: initial states, true values.
+        ports: of the model.
+        truth: what acts at a port in truth, made anew for each recording: a function of time and signals.
+        right: beginnings of names of which each found term must have one, and one must be found.
+        inputs: of the recording.
+        noise: of one row.
+    """
+
+    make: object
+    parameters: dict
+    states: dict
+    ports: tuple
+    truth: dict
+    right: tuple
+    inputs: dict
+    noise: float
+    unit: str = "m"
+    values: dict = field(default_factory=dict)
+
+
+def held(rng, rows, each, size):
+    return np.repeat(rng.uniform(-size, size, rows // each + 1), each)[:rows]
+
+
+class _Truth:
+    """Ports with the truth at one of them."""
+
+    def __init__(self, truth):
+        for name, make in truth.items():
+            setattr(self, name, make())
+
+
+def model_of(system, seed, *, clean=False):
+    """The model with a recording of the truth, or of a twin that has nothing that the simulator lacks."""
+    rng = np.random.default_rng(seed)
+    inputs = system.inputs(rng)
+    truth = {name: (lambda: lambda _t, _s: 0.0) if clean else make for name, make in system.truth.items()}
+    nothing = {port.name: (lambda: lambda _t, _s: 0.0) for port in system.ports}
+    true = {name: one[0] for name, one in system.parameters.items()} | system.states
+    out = system.make(10 * SUBSTEPS).simulate(inputs, true, _Truth(nothing | truth))["out"]
+    measured = out + system.noise * rng.standard_normal(len(out))
+    parameters = [Parameter(name, name, begin, low=1e-6) for name, (_, begin) in system.parameters.items()]
+    parameters += [Parameter(name, name, value) for name, value in system.states.items()]
+    recorded = Recorded("run 1", inputs, {"out": measured})
+    return Model("test", tuple(parameters), system.ports, (Output("out", system.unit),), (recorded,))
+
+
+def asked(system, seed, *, clean=False, hold_out=True):
+    """What is said of a system."""
+    model, simulator, known = model_of(system, seed, clean=clean), system.make(SUBSTEPS), {}
+
+    def run(asks):
+        for ask in asks:
+            if ask not in known:
+                known[ask] = simulated(simulator, model, ask)
+        return [known[ask] for ask in asks]
+
+    return find(model, run, hold_out=hold_out)
+
+
+def verdict_of(system, answer):
+    """`right`, `ambiguous`, `missed` or `wrong`: what was said of a system with an effect."""
+    named = [one.name for one in answer.findings if one.verdict in {"identified", "happened"}]
+    if any(not name.startswith(system.right) for name in named):
+        return "wrong"
+    if named:
+        return "right"
+    open_ = [one.name for one in answer.findings if one.verdict == "ambiguous"]
+    return "ambiguous" if any(name.startswith(system.right) for name in open_) else "missed"
+
+
+def _mass(noise, truth, right, values=None):
+    """A mass on a spring and a damper, pushed."""
+    ports = (Port("force", "N", {"place": "m", "speed": "m/s"}),)
+
+    def rate(t, x, u, p, ports):
+        push = ports.force(t, {"place": x[0], "speed": x[1]})
+        return [x[1], (u["push"] - p["stiffness"] * x[0] - p["damping"] * x[1] + push) / p["mass"]]
+
+    return System(
+        make=lambda n: Stepped(rate, lambda _t, x, _u, _p, _ports: x[0], ("place", "speed"), n),
+        parameters={"mass": (1.0, 1.2), "stiffness": (4.0, 5.0), "damping": (0.3, 0.5)},
+        states={"place": 0.0, "speed": 0.0},
+        ports=ports,
+        truth={"force": truth},
+        right=right,
+        inputs=lambda rng: {"t": 0.1 * np.arange(400), "push": held(rng, 400, 8, 4.0)},
+        noise=noise,
+        values=values or {},
+    )
+
+
+def _tank(truth, right, port="flow", values=None):
+    """A tank that empties by itself in proportion to its level, filled by a pump."""
+    ports = (
+        Port("flow", "m/s", {"level": "m"}),
+        Port("pump", "m/s", {"rate": "m/s"}),
+    )
+
+    def rate(t, x, u, p, ports):
+        late = u["pump"] + ports.pump(t, {"rate": u["pump"]})
+        return [p["gain"] * late - p["outflow"] * x[0] + ports.flow(t, {"level": x[0]})]
+
+    return System(
+        make=lambda n: Stepped(rate, lambda _t, x, _u, _p, _ports: x[0], ("level",), n),
+        parameters={"gain": (1.0, 0.8), "outflow": (0.05, 0.08)},
+        states={"level": 2.0},
+        ports=ports,
+        truth={port: truth},
+        right=right,
+        inputs=lambda rng: {"t": 0.5 * np.arange(400), "pump": 0.15 + held(rng, 400, 12, 0.12)},
+        noise=0.004,
+        values=values or {},
+    )
+
+
+def _late(dead):
+    def make():
+        times, values = [], []
+
+        def value(t, signals):
+            times.append(t)
+            values.append(signals["rate"])
+            # The input is held for a row of half a second: what it was is looked up by its row.
+            return values[max(int(np.searchsorted(times, t - dead + 1e-9)) - 1, 0)] - signals["rate"]
+
+        return value
+
+    return make
+
+
+def _plain(function):
+    return lambda: lambda _t, signals: function(signals)
+
+
+def _creeping(size, tau):
+    def make():
+        state = [0.0, 0.0]
+
+        def value(t, signals):
+            step = max(t - state[0], 0.0)
+            state[1] += (signals["place"] - state[1]) * -np.expm1(-step / tau)
+            state[0] = max(t, state[0])
+            return -size * state[1]
+
+        return value
+
+    return make
+
+
+SYSTEMS = {
+    "pendulum drag": _mass(
+        0.004, _plain(lambda s: -0.25 * s["speed"] * abs(s["speed"])), ("quadratic drag of speed", "curve of speed")
+    ),
+    "saturation": _mass(
+        0.004,
+        _plain(lambda s: 2.0 * (s["place"] - np.clip(s["place"], -0.8, 0.8))),
+        ("limited of place", "curve of place", "cubic of place"),
+    ),
+    "stiction": _mass(
+        0.004,
+        _plain(lambda s: -0.5 * np.tanh(s["speed"] / 0.05)),
+        ("sign of speed", "limited of speed", "stick-slip of place"),
+    ),
+    "hardening spring": _mass(
+        0.004, _plain(lambda s: -0.8 * s["place"] ** 3), ("cubic of place",), {"coefficient": -0.8}
+    ),
+    "creep": _mass(0.002, _creeping(1.5, 3.0), ("memory of place", "stick-slip of place", "memory of speed")),
+    "dead time": _tank(_late(2.0), ("delay of rate",), port="pump"),
+    "leaking tank": _tank(
+        _plain(lambda s: -0.06 * np.sqrt(max(s["level"], 0.0))),
+        ("curve of level", "square of level", "constant", "hinge of level", "limited of level", "quadratic drag"),
+    ),
+    "winding temperature": _tank(
+        _plain(lambda s: -0.008 * s["level"] ** 2),
+        ("square of level", "quadratic drag of level", "curve of level", "cubic of level"),
+    ),
+}
+"""Eight of the twelve concealed effects; those of two masses, of fouling, of a coupling and of two at once have files of their own."""

@@ -33,6 +33,9 @@ M2
 TOKENS = frozenset({"conformity", "dialect", "direction", "finding", "format", "held_out", "quantity", "state", "unit"})
 """Keys whose values are words of a list that other programs compare with."""
 
+NAMED_BY_WHAT_WAS_FOUND = ("parameters", "findings[].values")
+"""Objects whose keys are names of what this recording had: their own keys are none of the format."""
+
 
 def lines_of(folder):
     """Arguments of every command that has a result and needs nobody and no instrument, by the name of its golden file.
@@ -100,7 +103,8 @@ def _gather(value, path, types, words):
     types[path].add(_kind(value))
     if isinstance(value, dict):
         for key, each in value.items():
-            _gather(each, f"{path}.{key}".removeprefix("."), types, words)
+            shown = "*" if path.endswith(NAMED_BY_WHAT_WAS_FOUND) else key
+            _gather(each, f"{path}.{shown}".removeprefix("."), types, words)
     elif isinstance(value, list):
         for each in value:
             _gather(each, f"{path}[]", types, words)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from dataclasses import dataclass
 from functools import lru_cache
 from inspect import isabstract
@@ -17,11 +18,11 @@ from dbbstation.diagnosis.simulator.own import PortSource
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
 from dbbstation.files.gateway import content_of
-from dbbstation.files.own_classes import classes_in_files
+from dbbstation.files.own_classes import classes_in_files, module_name
 from dbbstation.files.recordings.table_csv import MOST_FAULTS, TableFile, read_table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -136,7 +137,14 @@ def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
         if lacking:
             faults.append(Problem(place.file, place.line, 0, f"{kind.__name__} lacks {', '.join(lacking)}", CONTRACT))
             continue
-        one = kind()
+        try:
+            one = kind()
+            if one.port in file.ports:
+                _try_once(one, file.ports[one.port].signals)
+        except Exception as error:  # noqa: BLE001 - whatever the code of somebody else raises
+            line = line_in(error, place.file) or place.line
+            faults.append(Problem(place.file, line, 0, f"{kind.__name__}: {in_words(error)}", CONTRACT))
+            continue
         if one.port not in file.ports:
             what = f"`{one.port}` of {kind.__name__} is no port; there are {', '.join(file.ports)}"
             faults.append(Problem(place.file, place.line, 0, what, "name one of them"))
@@ -146,6 +154,19 @@ def _own(files: Sequence[Path], file: SimulatorFile) -> list[PortSource]:
     if faults:
         raise InputError(faults)
     return list(found.values())
+
+
+def know(files: Sequence[Path]) -> None:
+    """Run files of physics of the user's own in this process, each once, so that terms that hold it can be read here."""
+    for path in files:
+        if module_name(path) not in sys.modules:
+            classes_in_files([path], PortSource, CONTRACT, [])  # type: ignore[type-abstract]  # faults were told where it was loaded
+
+
+def _try_once(one: PortSource, signals: Iterable[str]) -> None:
+    """Ask physics of the user's own for its numbers, and once for what it does, so that a fault is found before anything is simulated."""
+    values = {p.name: p.shape[len(p.shape) // 2] if p.shape else p.plausible for p in one.parameters()}
+    float(one.value(0.0, dict.fromkeys(signals, 1.0), values))
 
 
 def _parameter(name: str, key: str, one: ParameterSchema, run: int | None = None) -> Parameter:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 from concurrent.futures import TimeoutError as TooLongError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
@@ -14,7 +15,7 @@ from dbbstation.diagnosis.simulator.ports import simulated
 from dbbstation.diagnosis.simulator.work import BudgetSpentError, told
 from dbbstation.errors import CalibrationError
 from dbbstation.processes import deaf, processes
-from dbbstation.simulators.loading import simulator_of
+from dbbstation.simulators.loading import know, simulator_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -108,9 +109,13 @@ class Runs:
             return [_one(self._loaded.python, self._model, ask) for ask in asks]
         together = max(min(TOGETHER, len(asks) // (2 * self._count)), 1)
         parts = [asks[k : k + together] for k in range(0, len(asks), together)]
+        loaded = self._loaded
         try:
             with deaf():
-                futures = [self._pool.submit(_several, self._loaded.python, self._model, part) for part in parts]
+                futures = [
+                    self._pool.submit(_several, loaded.python, loaded.own_files, self._model, pickle.dumps(part))
+                    for part in parts
+                ]
             return [
                 answer for part, future in zip(parts, futures, strict=True) for answer in self._result(part, future)
             ]
@@ -138,8 +143,10 @@ STARTING_S = 20.0
 """Time that a process may take until it simulates."""
 
 
-def _several(python: Path, model: Model, asks: Sequence[Ask]) -> list[Answer]:
-    return [_one(python, model, ask) for ask in asks]
+def _several(python: Path, own_files: tuple[Path, ...], model: Model, asks: bytes) -> list[Answer]:
+    """Simulations in a process of their own, which must know classes of the user's before it can read what is asked of them."""
+    know(own_files)
+    return [_one(python, model, ask) for ask in pickle.loads(asks)]  # noqa: S301 - what the process above made
 
 
 def _one(python: Path, model: Model, ask: Ask) -> Answer:

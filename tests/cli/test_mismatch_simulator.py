@@ -148,3 +148,52 @@ def test_the_help_names_the_simulator(run):
 
 def test_json_is_json(run, decay):
     assert json.loads(run(*decay(), "--json").out)["simulator"] == "decay"
+
+
+OUTLET = """from dbbstation.diagnosis.simulator.own import Parameter, PortSource
+
+
+class Outlet(PortSource):
+    name = "outlet"
+    port = "flow"
+
+    def parameters(self):
+        return (Parameter("size", "m^0.5/s", 0.3, "outflow by the root of the level"),)
+
+    def value(self, t, signals, parameters):
+        return -parameters["size"] * max(signals["level"], 0.0) ** 0.5
+"""
+
+
+def test_physics_of_ones_own_competes_at_its_port(run, decay, tmp_path):
+    """Level of a tank with a hole: closed form of dl/dt = -r l - c √l [by √l], rate 0.4 and 0.3."""
+    asked = decay()
+    t = np.arange(200) * 0.02
+    root = (np.sqrt(2.0) + 0.75) * np.exp(-0.2 * t) - 0.75  # d√l/dt = -(r √l + c) / 2
+    levels = np.square(root) + 0.001 * np.random.default_rng(2).standard_normal(len(t))
+    rows = "\n".join(f"{a:.3f},{b:.6f}" for a, b in zip(t, levels, strict=True))
+    (tmp_path / "run.csv").write_text(f"t_s,level_m\n{rows}\n")
+    (tmp_path / "outlet.py").write_text(OUTLET)
+    outcome = run(*asked, "--source-file", tmp_path / "outlet.py", "--json")
+    assert outcome.code == 0, outcome.err
+    (found,) = [f for f in outcome.data["findings"] if f["name"].startswith("outlet")]
+    assert found["verdict"] == "identified"
+    # The simulator's Euler steps of 20 ms are off by about a hundredth.
+    assert found["values"]["size"]["value"] == pytest.approx(0.3, rel=0.015)
+
+
+@pytest.mark.parametrize(
+    ("fault", "line", "said"),
+    [
+        (('"m^0.5/s", 0.3, "outflow by the root of the level"', '"m^0.5/s"'), 9, "TypeError"),
+        (('signals["level"]', 'signals["height"]'), 12, "height"),
+        (('port = "flow"', 'port = "tap"'), 4, "no port"),
+    ],
+)
+def test_a_fault_of_ones_own_physics_is_told_with_its_line(run, decay, tmp_path, fault, line, said):
+    asked = decay()
+    (tmp_path / "outlet.py").write_text(OUTLET.replace(*fault))
+    outcome = run(*asked, "--source-file", tmp_path / "outlet.py")
+    assert outcome.code == 1
+    assert f"outlet.py:{line}" in outcome.err
+    assert said in outcome.err

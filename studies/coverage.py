@@ -104,7 +104,7 @@ def wilson(share: float, count: int, sigmas: float = 1.96) -> tuple[float, float
     """Interval of a share seen in `count` trials [Wilson, J. Am. Stat. Assoc. 22 (1927) 209]."""
     centre = (share + sigmas**2 / (2 * count)) / (1 + sigmas**2 / count)
     half = sigmas * float(np.sqrt(share * (1 - share) / count + sigmas**2 / (4 * count**2))) / (1 + sigmas**2 / count)
-    return centre - half, centre + half
+    return max(centre - half, 0.0), min(centre + half, 1.0)  # of none and of all, rounding goes beyond
 
 
 def _machine(

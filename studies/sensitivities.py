@@ -21,7 +21,7 @@ from dbbstation.processes import each
 from dbbstation.sources.registry import known_sources, sources_named
 from dbbstation.tasks.diagnose import default_candidates
 from dbbstation.tasks.load import load_sessions
-from dbbstation.tasks.tables import Asked, load_tables
+from dbbstation.tasks.tables import TableOptions, load_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -260,7 +260,7 @@ def _pair_answer(a: Path, b: Path) -> Answer:
 
 
 def _table_answer(path: Path, measured: str, simulated: str) -> Answer:
-    table = load_tables([path], Asked(measured, simulated)).table
+    table = load_tables([path], TableOptions(measured, simulated)).table
     summary = mismatch_summary(find_mismatch(table))
     answer = _answer(summary["findings"], _values({one["name"]: one["after"] for one in summary["parameters"]}))
     for one in summary["parameters"]:

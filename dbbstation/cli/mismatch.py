@@ -123,7 +123,7 @@ def mismatch(
     from dbbstation.diagnosis.table.summary import mismatch_summary
     from dbbstation.files.atomic import refuse_existing, write_bytes
     from dbbstation.files.provenance import refuse_existing_table, write_table
-    from dbbstation.tasks.tables import Asked, load_sources, load_tables, stated_uncertainties, stated_variables
+    from dbbstation.tasks.tables import TableOptions, load_sources, load_tables, stated_uncertainties, stated_variables
 
     numbers = number_language(decimal, separator) if decimal or separator else None
     _refuse_mixed(
@@ -155,7 +155,7 @@ def mismatch(
         refuse_existing_table(out, force=force)
     if figure is not None:
         refuse_existing(figure, force=force)
-    asked = Asked(
+    asked = TableOptions(
         measured,
         simulated,
         stated_variables(variables) if variables else None,

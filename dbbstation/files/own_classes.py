@@ -13,7 +13,7 @@ from inspect import isabstract
 from types import ModuleType
 from typing import TYPE_CHECKING, TypeVar
 
-from dbbstation.catalogue import Found, classes_of, in_words, line_in
+from dbbstation.catalogue import FoundClass, classes_of, in_words, line_in
 from dbbstation.errors import Problem
 from dbbstation.files.places import real_path
 from dbbstation.files.source_text import LARGEST_PROGRAM, decode, read_bytes
@@ -27,7 +27,7 @@ Base = TypeVar("Base")
 
 def classes_in_files(
     files: Iterable[Path], base: type[Base], contract: str, faults: list[Problem]
-) -> list[Found[Base]]:
+) -> list[FoundClass[Base]]:
     """Classes that derive from `base`, each with its place.
 
     Args:
@@ -51,7 +51,7 @@ def classes_in_files(
             others = any(issubclass(other, kind) for other in kinds if other is not kind)
             if not (isabstract(kind) and others):  # what others derive from may leave things to them
                 place = Problem(str(path), lines.get(kind.__name__, 0), 0, "")
-                found.append(Found(kind, place, contract))
+                found.append(FoundClass(kind, place, contract))
     return found
 
 

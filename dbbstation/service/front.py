@@ -14,18 +14,18 @@ from dbbstation.instrument.library import known_instruments, load_instrument, lo
 from dbbstation.service.after import JOINT, KINEMATIC, After
 from dbbstation.service.bar_calibration import BarCalibration, Stated
 from dbbstation.service.bar_stated import fault_of
-from dbbstation.service.candidates import Kind, candidates
-from dbbstation.service.choice import Choice, Limits, Part, Prepared, prepare
+from dbbstation.service.candidates import CandidateFormat, candidates
+from dbbstation.service.choice import Choice, Limits, Prepared, SetUpPart, prepare
 from dbbstation.service.held_line import HeldLine, HeldOpen
 from dbbstation.service.memory import VIRTUAL, Line, Memory
 from dbbstation.service.opening import opener
-from dbbstation.service.port_probe import Answer, ports, probe
+from dbbstation.service.port_probe import ProbeOutcome, ports, probe
 from dbbstation.service.runner import Runner
 from dbbstation.service.session_line import line_to_go_on
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.shop_temperature import note_temperature
 from dbbstation.service.virtual_place import virtual_place
-from dbbstation.service.work import Progress, Work
+from dbbstation.service.work import BackgroundWork, WorkProgress
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -103,8 +103,10 @@ class Front:
 
     def virtual_choice(self) -> Choice:
         """Return a choice with which anybody can try everything: nothing is missing, and no hardware is needed."""
-        machine = candidates(Kind.MACHINE, self.under)[-1]
-        plan = next(path for path in candidates(Kind.PLAN, self.under) if path.name == "ten-minute-check.yaml")
+        machine = candidates(CandidateFormat.MACHINE, self.under)[-1]
+        plan = next(
+            path for path in candidates(CandidateFormat.PLAN, self.under) if path.name == "ten-minute-check.yaml"
+        )
         line = Line(instrument=USUAL_VIRTUAL, port=list(VIRTUAL)[-1])
         said = {name: getattr(self.given, name) for name in ("operator", "serial_number", "job", "order", "gate")}
         return Choice(self.new_folder("virtual"), machine, plan, line, **said)
@@ -118,9 +120,13 @@ class Front:
         """Return a folder for a new session that is not there yet."""
         return _not_there(self.under, name)
 
-    def files(self, part: Part) -> tuple[Path, ...]:
+    def files(self, part: SetUpPart) -> tuple[Path, ...]:
         """Return the files that can be chosen for a part."""
-        kinds = {Part.MACHINE: Kind.MACHINE, Part.PLAN: Kind.PLAN, Part.BAR: Kind.BAR}
+        kinds = {
+            SetUpPart.MACHINE: CandidateFormat.MACHINE,
+            SetUpPart.PLAN: CandidateFormat.PLAN,
+            SetUpPart.BAR: CandidateFormat.BAR,
+        }
         return candidates(kinds[part], self.under)
 
     def instruments(self) -> list[tuple[str, str]]:
@@ -131,20 +137,20 @@ class Front:
         """Return name and description of what can be chosen as port: those of the computer, and virtual machines."""
         return [*ports(), *((name, "no hardware, to try it") for name in VIRTUAL)]
 
-    def probe(self, line: Line) -> Answer:
+    def probe(self, line: Line) -> ProbeOutcome:
         """Return what answers at a port; takes some seconds.
 
         Args:
             line: instrument and port.
         """
         if line.virtual:
-            return Answer(line.port, answers=True, text="is switched on when it is needed")
+            return ProbeOutcome(line.port, answers=True, text="is switched on when it is needed")
         try:
             protocol = load_instrument(line.instrument, line.profile or None)
             # What a relative instrument calls zero does not matter for whether it answers.
             protocol = with_zero(protocol, (line.zero_mm or 0.0) if protocol.length.relative else None)
         except StationError as error:
-            return Answer(line.port, answers=False, text=str(error))
+            return ProbeOutcome(line.port, answers=False, text=str(error))
         self.release()  # only one can open a port
         return probe(protocol, line.port, line.baud)
 
@@ -167,7 +173,7 @@ class Front:
 
     def models(self) -> tuple[Path, ...]:
         """Return the models that programs can be compensated with, the last written first."""
-        return tuple(sorted(candidates(Kind.MODEL, self.under), key=lambda path: -path.stat().st_mtime))
+        return tuple(sorted(candidates(CandidateFormat.MODEL, self.under), key=lambda path: -path.stat().st_mtime))
 
     def write_programs(self, choice: Choice, model: Path | None = None) -> tuple[int, Path]:
         """Write NC programs of all circles into a new folder beside the session; return how many, and where.
@@ -190,9 +196,9 @@ class Front:
         names = ["--plan", str(plan.absolute()), "--machine", str(machine.absolute()), "--out", str(folder.absolute())]
         by_model = [] if model is None else ["--model", str(model.absolute())]
         settings = [] if self.settings is None else ["--settings", str(self.settings)]
-        work = Work([*settings, "program", *names, *by_model], self.under)
+        work = BackgroundWork([*settings, "program", *names, *by_model], self.under)
         try:
-            if work.wait() is not Progress.DONE:
+            if work.wait() is not WorkProgress.DONE:
                 raise StationError(work.failure())
             return len(work.answer()["programs"]), folder
         finally:

@@ -14,11 +14,11 @@ from dbbstation.files.recordings.session import read_session
 from dbbstation.files.yaml.out import yaml_text
 from dbbstation.files.yaml.schema import format_for
 from dbbstation.quality.conformity import Conformity
-from dbbstation.service.after import After, Step
+from dbbstation.service.after import After, SessionTask
 from dbbstation.service.choice import Choice
 from dbbstation.service.memory import Line
 from dbbstation.service.session_list import list_sessions
-from dbbstation.service.work import Progress, Work
+from dbbstation.service.work import BackgroundWork, WorkProgress
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -123,19 +123,19 @@ class JobAnswer:
         operated: Operated,
         session: Path,
         missing: Sequence[str],
-        start: Callable[[Sequence[str], Path], Work] = Work,
+        start: Callable[[Sequence[str], Path], BackgroundWork] = BackgroundWork,
     ) -> None:
         self._missing = tuple(missing)
         self._after = After(session, None, operated.tolerances_file(session), start)
-        self._after.do(Step.REPORT)
+        self._after.do(SessionTask.REPORT)
 
     def look(self) -> Answered | None:
         """Return the answer; None while it is worked out."""
         self._after.look()
-        result = self._after.results[Step.REPORT]
-        if result.progress in {None, Progress.RUNNING}:
+        result = self._after.results[SessionTask.REPORT]
+        if result.progress in {None, WorkProgress.RUNNING}:
             return None
-        if result.progress is not Progress.DONE:
+        if result.progress is not WorkProgress.DONE:
             return Answered(Conformity.UNDECIDED, (result.failure or "the report was ended before it was done",))
         return answer_of(result.answer["verdict"], self._missing, result.path)
 

@@ -29,7 +29,7 @@ _POLITE_S = 3.0
 """A command that was asked to end has so long before it is ended [s]."""
 
 
-class Progress(StrEnum):
+class WorkProgress(StrEnum):
     """How work stands."""
 
     RUNNING = "running"
@@ -38,7 +38,7 @@ class Progress(StrEnum):
     CANCELLED = "cancelled"
 
 
-class Work:
+class BackgroundWork:
     """One command of the program, started at once.
 
     Args:
@@ -73,22 +73,22 @@ class Work:
         self._listener.start()
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> WorkProgress:
         """How it stands."""
         code = self._process.poll()
         if code is None:
-            return Progress.RUNNING
+            return WorkProgress.RUNNING
         self._ended_s = self._ended_s or time.monotonic()
         if self._cancelled:
-            return Progress.CANCELLED
-        return Progress.DONE if code == 0 else Progress.FAILED
+            return WorkProgress.CANCELLED
+        return WorkProgress.DONE if code == 0 else WorkProgress.FAILED
 
     @property
     def passed_s(self) -> float:
         """Time since it began, until it ended [s]."""
         return (self._ended_s or time.monotonic()) - self._begun_s
 
-    def wait(self) -> Progress:
+    def wait(self) -> WorkProgress:
         """Wait for its end; return how it ended."""
         self._process.wait()
         return self.progress

@@ -13,7 +13,7 @@ import numpy as np
 
 from dbbstation.catalogue import in_words, line_in
 from dbbstation.diagnosis.simulator.contract import Simulator
-from dbbstation.diagnosis.simulator.model import Model, Output, Parameter, Port, Recorded
+from dbbstation.diagnosis.simulator.model import Model, Output, SimulatorParameter, SimulatorPort, SimulatorRecording
 from dbbstation.diagnosis.simulator.own import PortSource
 from dbbstation.errors import InputError, Problem
 from dbbstation.files.formats.simulator import CONTRACT, SimulatorFile, read_simulator
@@ -35,7 +35,7 @@ FEWEST_ROWS = 30
 
 
 @dataclass(frozen=True, eq=False)
-class Loaded:
+class LoadedSimulator:
     """A simulator with its recordings.
 
     Attributes:
@@ -67,7 +67,7 @@ class Loaded:
 
 def load_simulator(
     path: Path, recordings: Sequence[Path], own_files: Sequence[Path] = (), numbers: NumberLanguage | None = None
-) -> Loaded:
+) -> LoadedSimulator:
     """Read a simulator, its recordings, and physics of the user's own. Python files are executed.
 
     Raises:
@@ -88,11 +88,11 @@ def load_simulator(
     model = Model(
         file.name,
         tuple(parameters),
-        tuple(Port(name, one.unit, dict(one.signals), one.about) for name, one in file.ports.items()),
+        tuple(SimulatorPort(name, one.unit, dict(one.signals), one.about) for name, one in file.ports.items()),
         tuple(Output(name, one.unit, one.filter_s or 0.0) for name, one in file.outputs.items()),
         tuple(_recorded(file, table) for table in tables),
     )
-    return Loaded(path, python, file, model, tables, tuple(_own(own_files, file)), tuple(own_files))
+    return LoadedSimulator(path, python, file, model, tables, tuple(_own(own_files, file)), tuple(own_files))
 
 
 def simulator_of(python: Path) -> Simulator:
@@ -165,14 +165,14 @@ def know(files: Sequence[Path]) -> None:
 
 def _try_once(one: PortSource, signals: Iterable[str]) -> None:
     """Ask physics of the user's own for its numbers, and once for what it does, so that a fault is found before anything is simulated."""
-    values = {p.name: p.shape[len(p.shape) // 2] if p.shape else p.plausible for p in one.parameters()}
+    values = {p.name: p.grid[len(p.grid) // 2] if p.grid else p.plausible for p in one.parameters()}
     float(one.value(0.0, dict.fromkeys(signals, 1.0), values))
 
 
-def _parameter(name: str, key: str, one: ParameterSchema, run: int | None = None) -> Parameter:
+def _parameter(name: str, key: str, one: ParameterSchema, run: int | None = None) -> SimulatorParameter:
     low = -np.inf if one.low is None else one.low
     high = np.inf if one.high is None else one.high
-    return Parameter(name, key, one.value, one.unit, one.uncertainty, low, high, run)
+    return SimulatorParameter(name, key, one.value, one.unit, one.uncertainty, low, high, run)
 
 
 def _tables(
@@ -208,7 +208,9 @@ def _tables(
     return tuple(found)
 
 
-def _recorded(file: SimulatorFile, table: TableFile) -> Recorded:
+def _recorded(file: SimulatorFile, table: TableFile) -> SimulatorRecording:
     inputs: dict[str, NDArray[np.float64]] = {"t": table.values[file.time]}
     inputs |= {name: table.values[column] for name, column in file.inputs.items()}
-    return Recorded(table.file, inputs, {name: table.values[one.column] for name, one in file.outputs.items()})
+    return SimulatorRecording(
+        table.file, inputs, {name: table.values[one.column] for name, one in file.outputs.items()}
+    )

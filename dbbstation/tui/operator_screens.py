@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from dbbstation.service.front import Front
     from dbbstation.service.operated import Answered, JobAnswer, Operated
     from dbbstation.tui.board_screen import Desk
-    from dbbstation.tui.reception import Reception
+    from dbbstation.tui.reception import StationDesk
     from dbbstation.tui.shown import Shown
 
 _NAME = 16
@@ -57,7 +57,7 @@ class JobScreen(RowScreen):
 
     help_name = "job"
 
-    def __init__(self, reception: Reception, front: Front, operated: Operated) -> None:
+    def __init__(self, reception: StationDesk, front: Front, operated: Operated) -> None:
         super().__init__()
         self._reception, self._front, self._operated = reception, front, operated
         self._choice: Choice | None = None

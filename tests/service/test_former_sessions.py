@@ -13,10 +13,10 @@ import pytest
 from dbbstation.files.recordings.session import read_session
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.plan.circle import Direction
-from dbbstation.service.after import USUAL, After, Step
+from dbbstation.service.after import USUAL, After, SessionTask
 from dbbstation.service.former_sessions import Former, InForce, before_and_now, former_sessions, keep_models
 from dbbstation.service.last_session import last_traces
-from dbbstation.service.work import Progress
+from dbbstation.service.work import WorkProgress
 from tests.plant.mechanisms.balls import CmmScatter
 from tests.plant.plan import subset, table_ii_plan
 from tests.plant.session import BEGUN, Program, record
@@ -110,14 +110,14 @@ def test_an_acceptance_is_the_report_of_both_sessions(shop: Path) -> None:
         return begun[-1]
 
     after = After(shop / "now", start=start)  # type: ignore[arg-type]
-    assert not after.can(Step.ACCEPTANCE)
-    assert Step.ACCEPTANCE not in USUAL
+    assert not after.can(SessionTask.ACCEPTANCE)
+    assert SessionTask.ACCEPTANCE not in USUAL
     after.accept(before_and_now(shop / "now").formers[1])
     (work,) = begun
     assert work.arguments[:4] == ["report", str(shop / "now"), "--before", str(shop / "there")]
-    work.progress = Progress.DONE
+    work.progress = WorkProgress.DONE
     after.look()
-    assert after.results[Step.ACCEPTANCE].path == after.folder / "acceptance.html"
+    assert after.results[SessionTask.ACCEPTANCE].path == after.folder / "acceptance.html"
     assert [path.parent for path in after.kept] == [after.folder]
 
 

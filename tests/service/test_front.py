@@ -20,16 +20,16 @@ from dbbstation.files.recordings.session_writer import SessionWriter
 from dbbstation.files.shipped import shipped_folder
 from dbbstation.instrument.library import load_instrument
 from dbbstation.plan.duration import circle_s
-from dbbstation.service.after import After, Result, Step
-from dbbstation.service.candidates import Kind, candidates
-from dbbstation.service.choice import Choice, Part
+from dbbstation.service.after import After, Result, SessionTask
+from dbbstation.service.candidates import CandidateFormat, candidates
+from dbbstation.service.choice import Choice, SetUpPart
 from dbbstation.service.front import Front
 from dbbstation.service.memory import MOST, VIRTUAL, Line, Memory, Remembered
 from dbbstation.service.order import Gate, Order, ordered
 from dbbstation.service.port_probe import probe
 from dbbstation.service.session_list import list_sessions
 from dbbstation.service.shop_temperature import note_temperature, shop_degc
-from dbbstation.service.work import Progress, Work
+from dbbstation.service.work import BackgroundWork, WorkProgress
 from dbbstation.virtual.wire import VirtualInstrument
 from tests.cli.conftest import call
 
@@ -53,9 +53,9 @@ def session(front: Front) -> Path:
     return folder
 
 
-def ended(work: Work) -> Progress:
+def ended(work: BackgroundWork) -> WorkProgress:
     end_s = time.monotonic() + PATIENCE_S
-    while work.progress is Progress.RUNNING:
+    while work.progress is WorkProgress.RUNNING:
         assert time.monotonic() < end_s
         time.sleep(0.02)
     return work.progress
@@ -127,12 +127,12 @@ def test_a_virtual_machine_is_never_offered_unless_it_is_asked_for(front: Front,
     assert front.first_choice().line == REAL
     assert front.goes_on_with(session).line == REAL
     front.memory.write(Remembered().with_session(tried, virtual))
-    assert Part.PORT in front.first_choice().missing()
-    assert Part.PORT in front.goes_on_with(session).missing()
+    assert SetUpPart.PORT in front.first_choice().missing()
+    assert SetUpPart.PORT in front.goes_on_with(session).missing()
     # As a program before this one wrote it.
     text = front.memory.path.read_text()
     front.memory.path.write_text(_with_last_line(text, virtual))
-    assert Part.PORT in front.first_choice().missing()
+    assert SetUpPart.PORT in front.first_choice().missing()
 
 
 def _with_last_line(text: str, line: Line) -> str:
@@ -155,12 +155,12 @@ def test_a_memory_that_cannot_be_kept_harms_nobody(tmp_path: Path) -> None:
 def test_files_to_choose_from_are_known_by_their_format(front: Front, session: Path) -> None:
     shutil.copy(PLAN, front.under / "mine.yaml")
     (front.under / "notes.yaml").write_text("a: 1\n")
-    plans = candidates(Kind.PLAN, front.under)
+    plans = candidates(CandidateFormat.PLAN, front.under)
     assert plans[0] == front.under / "mine.yaml"
     assert PLAN in plans
     assert not [path for path in plans if session in path.parents]
-    assert candidates(Kind.PLAN, front.under, shipped=False) == (front.under / "mine.yaml",)
-    assert MACHINE in candidates(Kind.MACHINE, front.under)
+    assert candidates(CandidateFormat.PLAN, front.under, shipped=False) == (front.under / "mine.yaml",)
+    assert MACHINE in candidates(CandidateFormat.MACHINE, front.under)
 
 
 def test_a_port_answers_with_its_reading_or_says_what_is_wrong() -> None:
@@ -176,7 +176,14 @@ def test_a_port_answers_with_its_reading_or_says_what_is_wrong() -> None:
 
 
 def test_what_is_missing_is_told_in_the_order_it_is_asked_for(front: Front) -> None:
-    assert Choice().missing() == (Part.MACHINE, Part.PLAN, Part.INSTRUMENT, Part.PORT, Part.BAR, Part.FOLDER)
+    assert Choice().missing() == (
+        SetUpPart.MACHINE,
+        SetUpPart.PLAN,
+        SetUpPart.INSTRUMENT,
+        SetUpPart.PORT,
+        SetUpPart.BAR,
+        SetUpPart.FOLDER,
+    )
     assert front.virtual_choice().missing() == ()
     with pytest.raises(ValueError, match="port"):
         front.prepare(Choice())
@@ -202,7 +209,7 @@ def test_a_plan_beyond_the_travel_is_refused(front: Front) -> None:
 
 def test_a_real_session_needs_the_bar_or_a_reason(front: Front) -> None:
     choice = Choice(front.new_folder(), MACHINE, PLAN, REAL)
-    assert choice.missing() == (Part.BAR,)
+    assert choice.missing() == (SetUpPart.BAR,)
     bar = shipped_folder("fixtures") / "bars" / "zerodur.yaml"
     with pytest.raises(InputError, match="last on its calibrator"):
         front.prepare(replace(choice, bar=bar))
@@ -211,22 +218,22 @@ def test_a_real_session_needs_the_bar_or_a_reason(front: Front) -> None:
 
 
 def test_work_answers_with_what_its_command_prints(tmp_path: Path) -> None:
-    work = Work(["evaluate", str(SMALL), "--model", str(tmp_path / "none.yaml")], tmp_path)
-    assert ended(work) is Progress.FAILED
+    work = BackgroundWork(["evaluate", str(SMALL), "--model", str(tmp_path / "none.yaml")], tmp_path)
+    assert ended(work) is WorkProgress.FAILED
     assert "none.yaml" in work.failure()
     work.close()
-    work = Work(["check", str(MACHINE)], tmp_path)
-    assert ended(work) is Progress.DONE
+    work = BackgroundWork(["check", str(MACHINE)], tmp_path)
+    assert ended(work) is WorkProgress.DONE
     assert "provenance" in work.answer()
     work.close()
 
 
 def test_work_can_be_ended(tmp_path: Path) -> None:
-    work = Work(["demo", "--out", str(tmp_path / "demo")], tmp_path)
+    work = BackgroundWork(["demo", "--out", str(tmp_path / "demo")], tmp_path)
     time.sleep(1.0)
-    assert work.progress is Progress.RUNNING
+    assert work.progress is WorkProgress.RUNNING
     work.cancel()
-    assert ended(work) is Progress.CANCELLED
+    assert ended(work) is WorkProgress.CANCELLED
     work.close()
     assert work.passed_s < PATIENCE_S
 
@@ -239,7 +246,7 @@ class Scripted:
 
     def __init__(self, arguments: list[str], folder: Path) -> None:
         self.arguments, self.folder = arguments, folder
-        self.progress = Progress.RUNNING
+        self.progress = WorkProgress.RUNNING
 
     def answer(self) -> dict[str, str]:
         return {"from": self.arguments[0]}
@@ -248,7 +255,7 @@ class Scripted:
         return "it failed"
 
     def cancel(self) -> None:
-        self.progress = Progress.CANCELLED
+        self.progress = WorkProgress.CANCELLED
 
     def close(self) -> None:
         pass
@@ -262,25 +269,25 @@ def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session:
         return begun[-1]
 
     after = After(session, start=start)  # type: ignore[arg-type]
-    assert not after.can(Step.PROGRAMS)
-    after.do(Step.CALIBRATE, Step.PROGRAMS, Step.REPORT)
+    assert not after.can(SessionTask.PROGRAMS)
+    after.do(SessionTask.CALIBRATE, SessionTask.PROGRAMS, SessionTask.REPORT)
     for work in range(3):
         after.look()
         assert after.busy is not None
         assert after.results[after.busy].stage == "fit of 6 runs"
-        begun[work].progress = Progress.DONE
+        begun[work].progress = WorkProgress.DONE
         after.look()
     results = session.parent / "monday-results"
     assert after.busy is None
     assert after.folder == results
     assert [one.arguments[0] for one in begun] == ["calibrate", "program", "report"]
     assert all(str(results / "model.yaml") in one.arguments for one in begun[1:])
-    assert after.results[Step.REPORT].path == results / "report.html"
-    after.do(Step.DIAGNOSE, Step.REPORT)
+    assert after.results[SessionTask.REPORT].path == results / "report.html"
+    after.do(SessionTask.DIAGNOSE, SessionTask.REPORT)
     after.look()
     after.cancel()
     after.look()
-    assert (after.busy, after.results[Step.DIAGNOSE].progress) == (None, Progress.CANCELLED)
+    assert (after.busy, after.results[SessionTask.DIAGNOSE].progress) == (None, WorkProgress.CANCELLED)
     assert after.model == results / "model.yaml"
     # The next sitting goes on with it, as long as the same runs count.
     assert After(session).folder == results
@@ -288,11 +295,11 @@ def test_steps_after_a_session_follow_each_other_and_use_the_best_model(session:
 
 def test_a_failure_ends_the_row_and_says_why(session: Path) -> None:
     after = After(session, start=Scripted)  # type: ignore[arg-type]
-    after.do(Step.CALIBRATE, Step.REPORT)
-    after._running[1].progress = Progress.FAILED
+    after.do(SessionTask.CALIBRATE, SessionTask.REPORT)
+    after._running[1].progress = WorkProgress.FAILED
     after.look()
-    assert after.results[Step.CALIBRATE].failure == "it failed"
-    assert after.results[Step.REPORT] == Result()
+    assert after.results[SessionTask.CALIBRATE].failure == "it failed"
+    assert after.results[SessionTask.REPORT] == Result()
 
 
 def test_virtual_ports_are_offered(front: Front) -> None:

@@ -19,7 +19,7 @@ from dbbstation.quality.finding import Name, found
 from dbbstation.service.front import Front
 from dbbstation.service.memory import Memory
 from dbbstation.service.operated import Answered, JobAnswer, answer_of, read_operated
-from dbbstation.service.work import Progress
+from dbbstation.service.work import WorkProgress
 from dbbstation.station.commands import Accept, Quit, Repeat
 from dbbstation.tui.app import StationApp
 from dbbstation.tui.operator_screens import AnswerScreen, JobScreen, OperateScreen
@@ -47,7 +47,7 @@ def job_file(tmp_path: Path) -> Path:
 class Reported:
     """A report that is made at once."""
 
-    progress, stage, passed_s = Progress.DONE, "", 1.0
+    progress, stage, passed_s = WorkProgress.DONE, "", 1.0
     kind = "within"
 
     def __init__(self, arguments: Sequence[str], folder: Path) -> None:

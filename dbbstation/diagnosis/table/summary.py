@@ -10,7 +10,7 @@ from dbbstation.diagnosis.table.words import sentence_of
 
 if TYPE_CHECKING:
     from dbbstation.diagnosis.table.mismatch import Mismatch
-    from dbbstation.inference.read_off import Finding
+    from dbbstation.inference.read_off import CauseFinding
     from dbbstation.inference.verdict import Value
 
 
@@ -107,7 +107,7 @@ def mismatch_summary(found: Mismatch) -> dict[str, Any]:
     }
 
 
-def _finding(found: Mismatch, finding: Finding) -> dict[str, Any]:
+def _finding(found: Mismatch, finding: CauseFinding) -> dict[str, Any]:
     return {
         "name": finding.name,
         "verdict": str(finding.verdict),

@@ -22,13 +22,13 @@ from dbbstation.inference.seen import seen
 from dbbstation.inference.settle import settle, static_patterns
 from dbbstation.inference.variables import Kind, Variable
 from dbbstation.inference.verdict import Verdict
-from dbbstation.tasks.tables import Asked, load_tables
+from dbbstation.tasks.tables import TableOptions, load_tables
 from tests.diagnosis.table.plant import PULSE_S, Truth, record
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-ASKED = Asked("measured_mm", "simulated_mm")
+ASKED = TableOptions("measured_mm", "simulated_mm")
 
 FOUND = {
     "play": (Truth(play_um=8.0), {"hysteresis of place_mm", "hysteresis of simulated_mm"}, ("half width", 4e-3)),
@@ -44,7 +44,7 @@ FOUND = {
 }
 
 
-def found_in(tmp_path: Path, *truths: Truth, asked: Asked = ASKED, derivative: bool = False) -> Mismatch:
+def found_in(tmp_path: Path, *truths: Truth, asked: TableOptions = ASKED, derivative: bool = False) -> Mismatch:
     paths = [
         record(truth, seed, derivative=derivative).write(tmp_path / f"run{seed}.csv")
         for seed, truth in enumerate(truths, start=3)
@@ -201,7 +201,7 @@ def test_a_robot_measured_by_a_laser_tracker(recordings, tmp_path):
     names, *lines = path.read_text(encoding="utf-8").splitlines()
     fewer = tmp_path / "ur10.csv"
     fewer.write_text("\n".join([names, *lines[::4]]) + "\n", encoding="utf-8")
-    asked = Asked("measured_mm", "model_mm", {"q1": None, "q2": None, "q3": None})
+    asked = TableOptions("measured_mm", "model_mm", {"q1": None, "q2": None, "q3": None})
     found = find_mismatch(load_tables([fewer], asked).table)
     q1 = np.radians(found.table.columns["q1"])
     known = [np.ones(len(q1)), np.cos(q1), np.sin(q1), np.cos(2.0 * q1), np.sin(2.0 * q1)]

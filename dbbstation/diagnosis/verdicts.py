@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from dbbstation.inference.alternatives import EVEN, Alternatives, norm_over_sigm
 from dbbstation.inference.concealment import concealment
 from dbbstation.inference.model_comparison import SCALES
 from dbbstation.inference.square_root import free_directions
-from dbbstation.inference.verdict import ABSENT, OUT, Acts, claim
+from dbbstation.inference.verdict import ABSENT, OUT, SURE, Acts, claim
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -275,7 +276,10 @@ def _why(verdict: Verdict, gains: Gains | None) -> str:
         return "It happened once: no other tests can confirm it."
     if verdict is not Verdict.DOES_NOT_PREDICT or gains is None:
         return ""
-    text = f"It was found in these tests; of {len(gains.parts)} groups of tests that were held back {gains.with_gain} gain by it."
+    text = (
+        f"It was found in these tests; of {len(gains.parts)} groups of tests that were held back {gains.with_gain} gain by it, "
+        f"and all but the best together {gains.without_best:.2g} in log density; {math.log(SURE / ABSENT):.2g} would be sure."
+    )
     if gains.predicts:
         text += " Everything together predicts them worse than the kinematic calibration."
     return text

@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dbbstation.inference.verdict import Gains
+from dbbstation.inference.verdict import DensityGains
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dbbstation.inference.model_comparison import Cause, Member, ModelComparison
 
 LEAST_PARTS = 4
-"""Parts from which on what they say of each other is more than chance: a gain in seven tenths of them, and a spread."""
+"""Parts from which on what they say of each other is more than chance: a gain without the best of them, and a spread."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +39,9 @@ class ChosenAnew:
     brought: tuple[dict[Kind, float], ...]
     whole: tuple[float, ...]
 
-    def gains_of(self, kinds: Collection[Kind]) -> Gains:
+    def gains_of(self, kinds: Collection[Kind]) -> DensityGains:
         """What effects of some kinds brought together in each part; nothing where none of them was chosen."""
-        return Gains(tuple(sum(part.get(kind, 0.0) for kind in set(kinds)) for part in self.brought))
+        return DensityGains(tuple(sum(part.get(kind, 0.0) for kind in set(kinds)) for part in self.brought))
 
     @property
     def is_worse(self) -> bool:

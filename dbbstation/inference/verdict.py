@@ -15,6 +15,7 @@ Sure: a probability of `SURE` or more, and an effect of `OUT` standard deviation
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import Enum, StrEnum, auto
 from typing import Any
@@ -67,8 +68,7 @@ class Gains:
 
     Attributes:
         parts: sum of squares of the errors of prediction of a part without the effect, what else was chosen refitted, less that with it,
-            in the squared unit of what is predicted; on circles, log density of the prediction with it less that without it. Zero where
-            the effect was not chosen.
+            in the squared unit of what is predicted. Zero where the effect was not chosen.
     """
 
     parts: tuple[float, ...]
@@ -84,11 +84,14 @@ class Gains:
         return sum(part > 0.0 for part in self.parts)
 
     @property
+    def without_best(self) -> float:
+        """Over all parts but the best."""
+        return self.total - max(self.parts, default=0.0)
+
+    @property
     def predicts(self) -> bool:
         """Whether it brought something in enough parts, and in sum without the best part."""
-        if not self.parts or self.with_gain < PARTS_WITH_GAIN * len(self.parts):
-            return False
-        return self.total - max(self.parts) > 0.0
+        return bool(self.parts) and self.with_gain >= PARTS_WITH_GAIN * len(self.parts) and self.without_best > 0.0
 
     def plain(self) -> dict[str, Any]:
         """Return it as plain values for JSON."""
@@ -98,6 +101,24 @@ class Gains:
             "total": self.total,
             "predicts": self.predicts,
         }
+
+
+@dataclass(frozen=True)
+class DensityGains(Gains):
+    """What an effect brought in each held-out part, where the density of the prediction is known.
+
+    Its logarithm has a scale of its own: a part that hardly shows the effect brings hardly anything, whatever its sign, and the sum over
+    parts is evidence [Good, J. R. Stat. Soc. B 14 (1952) 107]. So parts need not be counted.
+
+    Attributes:
+        parts: log density of the prediction of a part with the effect less that without it, what else was chosen refitted. Zero where the
+            effect was not chosen.
+    """
+
+    @property
+    def predicts(self) -> bool:
+        """Whether the parts but the best prefer the effect by the odds at which something is sure."""
+        return self.without_best >= math.log(SURE / ABSENT)
 
 
 @dataclass(frozen=True)

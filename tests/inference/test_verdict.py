@@ -14,6 +14,7 @@ from dbbstation.inference.verdict import (
     PARTS_WITH_GAIN,
     SURE,
     Acts,
+    DensityGains,
     Gains,
     Value,
     Verdict,
@@ -53,6 +54,23 @@ def test_tokens_and_their_order():
 )
 def test_what_predicts(parts, predicts):
     assert Gains(parts).predicts is predicts
+
+
+@pytest.mark.parametrize(
+    ("parts", "predicts"),
+    [
+        ((9.0, 3.0), True),  # ln 19 is 2.94
+        ((9.0, 2.9), False),
+        (
+            (20.0, 9.0, 2.0, 1.0, -0.1, -0.2, -0.3, -0.4, 0.0, 0.0),
+            True,
+        ),  # four of ten, and 11 in log density without the best
+        ((0.2,) * 10, False),  # ten of ten, and 1.8
+        ((), False),
+    ],
+)
+def test_what_predicts_by_density(parts, predicts):
+    assert DensityGains(parts).predicts is predicts
 
 
 def test_an_effect_without_use_seldom_predicts(rng):

@@ -143,7 +143,7 @@ class _Walk:
         if event.kind == "RAPID" or index == 0:
             return place + 1
         before = self.wanted[index - 1]
-        self._check_on(before.pose, self.tool[place - 1], PRINTED * before.unit_mm, f"begin of move {index}")
+        self._check_on(before.pose, self.tool[place - 1], PRINTED * (1.0 + before.unit_mm), f"begin of move {index}")
         way = _Arc(before, event) if event.kind == "ARC" else _Line(before, event)
         slack = PRINTED * (1.0 + event.unit_mm) + PRINTED * before.unit_mm
         for end in range(place, len(self.done)):
@@ -176,8 +176,10 @@ class _Walk:
                 return
             took_done += minutes
             # Places and the feed are printed with four decimals: a feed of 0.0002 mm/min has one digit.
-            feed = self.done[piece].feed[0]
-            rounded += 4.0 * PRINTED / feed + (1e-6 + PRINTED / feed) * minutes
+            least_feed = self.done[piece].feed[0] - PRINTED
+            if least_feed <= 0.0:
+                return
+            rounded += 4.0 * PRINTED / least_feed + (1e-6 + PRINTED / least_feed) * minutes
         if abs(took - took_done) > SHARE_OF_TIME * took + rounded:
             raise DiffersError(f"move {index} takes {60 * took_done} s in place of {60 * took} s")
 
@@ -188,6 +190,7 @@ class _Line:
     def __init__(self, before: Event, event: Event) -> None:
         self.start, self.end = before.pose, event.pose
         self.way = self.end - self.start
+        self.unit_mm = max(before.unit_mm, event.unit_mm)
 
     def nearest(self, pose: np.ndarray) -> np.ndarray:
         length = float(np.sum((SCALE * self.way) ** 2))
@@ -201,8 +204,8 @@ class _Line:
     def minutes(self, event: Event) -> float | None:
         """Time at the feed; None where the printed decimals do not tell it."""
         tip, turn = float(np.linalg.norm(self.way[:3])), float(np.linalg.norm(self.way[3:]))
-        if tip > 20.0 * PRINTED * event.unit_mm:
-            return tip / event.feed[0]
+        if tip > 20.0 * PRINTED * self.unit_mm:
+            return tip / event.feed[0] if event.feed[0] > 0.0 else None
         # The tip may move by less than is printed, and F counts along that.
         return turn / event.feed[1] if tip == 0.0 and turn > 0.0 and event.unit_mm > 1.0 else None
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from dbbstation.diagnosis.table.mismatch import RefittedParameter, find_mismatch
-from dbbstation.diagnosis.table.summary import mismatch_summary
 from dbbstation.errors import InputError
 from dbbstation.inference.verdict import Value, Verdict
+from dbbstation.results.of_mismatch import mismatch_result
 from dbbstation.tasks.tables import TableOptions, load_tables, stated_uncertainties
 
 ROWS, NOISE_MM, LINE_MM, STIFFNESS_OFF = 400, 0.01, 0.06, 0.02
@@ -76,12 +76,12 @@ def test_by_default_refitting_moves_the_simulation_by_about_what_it_was_off(path
 
 def test_the_constant_may_be_left_out(path):
     without = told(path, has_offset=False)
-    summary = mismatch_summary(without)
-    assert summary["offset"] is None
-    assert [one["name"] for one in summary["parameters"]] == ["stiffness"]
+    result = mismatch_result(without)
+    assert result.offset is None
+    assert [one.name for one in result.parameters] == ["stiffness"]
     # Half a millimetre that nothing may take up is a mismatch.
-    assert summary["mismatch"]
-    assert mismatch_summary(told(path))["offset"]["value"] == pytest.approx(0.5, abs=0.01)
+    assert result.mismatch
+    assert mismatch_result(told(path)).offset.value == pytest.approx(0.5, abs=0.01)
 
 
 def test_statements_that_fit_nothing_are_refused(path):
